@@ -1,6 +1,7 @@
 """Install a wheel or an sdist into an environment of its own and let it print what the README says.
 
-`python .ci/check_package.py dist/floatbase-0.2.0-py3-none-any.whl`; nothing of the repository but the README is used.
+`python .ci/check_package.py dist/floatbase-0.2.0-py3-none-any.whl`; nothing of the repository but
+the README is used.
 """
 
 from __future__ import annotations
@@ -19,15 +20,30 @@ def printed_by(package: Path, folder: Path) -> str:
     """What the README's first program prints with this package, run in a folder with nothing in it."""
     venv.create(folder / "venv", with_pip=True)
     python, place = folder / "venv" / "bin" / "python", folder / "empty"
-    pip = [str(python), "-m", "pip", "--disable-pip-version-check", "install", "-q", "-c", str(ROOT / "environment.txt")]
+    pip = [
+        str(python),
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "install",
+        "-q",
+        "-c",
+        str(ROOT / "environment.txt"),
+    ]
     subprocess.run([*pip, str(package)], check=True)
     place.mkdir()
     program = _block("python")
-    return subprocess.run([python, "-I", "-c", program], check=True, capture_output=True, text=True, cwd=place).stdout
+    return subprocess.run(
+        [python, "-I", "-c", program], check=True, capture_output=True, text=True, cwd=place
+    ).stdout
 
 
 def _block(language: str) -> str:
-    found = re.search(rf"^```{language}\n(.*?)^```$", (ROOT / "README.md").read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    found = re.search(
+        rf"^```{language}\n(.*?)^```$",
+        (ROOT / "README.md").read_text("utf-8"),
+        flags=re.MULTILINE | re.DOTALL,
+    )
     assert found, language
     return found.group(1)
 

@@ -1,7 +1,8 @@
 """Look at a whole site in a browser: `python .ci/check_site.py build/site`.
 
-Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and every control of every panel
-must change its picture or its note, all without a kernel. Prints how long each page's first picture took and what was found.
+Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and
+every control of every panel must change its picture or its note, all without a kernel. Prints how
+long each page's first picture took and what was found.
 """
 
 from __future__ import annotations
@@ -63,7 +64,11 @@ def faults_of(page: Any, address: str) -> Iterator[str]:
             moved += 1
             if not _answers(page, figure, frames, controls, which):
                 yield f"picture {number}: control {which} changes nothing"
-    print(f"{address}: {figures.count()} pictures, {moved} controls, first picture after {first:.1f} s", file=sys.stderr)
+    print(
+        f"{address}: {figures.count()} pictures, {moved} controls, first picture after {first:.1f} "
+        f"s",
+        file=sys.stderr,
+    )
 
 
 def _frames(page: Any, figure: Any) -> list[Any]:
@@ -75,7 +80,8 @@ def _frames(page: Any, figure: Any) -> list[Any]:
 
 
 def _answers(page: Any, figure: Any, frames: list[Any], controls: Any, which: int) -> bool:
-    """Whether some place of a control changes what is seen, with the others where they are or at their ends.
+    """Whether some place of a control changes what is seen, with the others where they are or at
+    their ends.
 
     The direction of a push, for instance, changes nothing while the push is 0 N.
     """
@@ -91,7 +97,10 @@ def _moves(page: Any, figure: Any, frames: list[Any], control: Any) -> bool:
     control.scroll_into_view_if_needed()
 
     def seen() -> list[Any]:
-        return [figure.locator(".floatbase-note").inner_html(), *(frame.evaluate(SEEN) for frame in frames)]
+        return [
+            figure.locator(".floatbase-note").inner_html(),
+            *(frame.evaluate(SEEN) for frame in frames),
+        ]
 
     before, place = seen(), 0
     while control.evaluate(MOVE, place):

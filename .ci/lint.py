@@ -1,6 +1,8 @@
-"""Check the files that no test runs: lock, container, hub, workflows, README, and the pages that the code writes.
+"""Check the files that no test runs: lock, container, hub, workflows, README, and the pages that
+the code writes.
 
-`python .ci/lint.py` prints what is wrong and exits with 1 if anything is. It builds nothing and needs no network.
+`python .ci/lint.py` prints what is wrong and exits with 1 if anything is. It builds nothing and
+needs no network.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ TARGETS += re.findall(r"^[a-z-]+ ([a-z-]+):(?!=)", text("Makefile"), flags=re.M)
 
 def lock() -> Faults:
     """Every dependency is pinned to one version within its range, on every platform."""
-    lines = [line for line in text("environment.txt").splitlines() if line and not line.startswith("#")]
+    lines = [
+        line for line in text("environment.txt").splitlines() if line and not line.startswith("#")
+    ]
     pins = {canonicalize_name(pin.name): pin for pin in map(Requirement, lines)}
     if len(pins) < len(lines):
         yield "a package is pinned twice"
@@ -43,7 +47,9 @@ def lock() -> Faults:
         if pin.url or [spec.operator for spec in pin.specifier] != ["=="]:
             yield f"{pin} is not an exact version"
     extras = PROJECT["optional-dependencies"].values()
-    for required in (Requirement(line) for lines in (PROJECT["dependencies"], *extras) for line in lines):
+    for required in (
+        Requirement(line) for lines in (PROJECT["dependencies"], *extras) for line in lines
+    ):
         pin = pins.get(canonicalize_name(required.name))
         if pin is None or pin.marker:
             yield f"{required.name} is not pinned for every platform; run `make lock`"
@@ -54,7 +60,11 @@ def lock() -> Faults:
 def version() -> Faults:
     """The version is the same everywhere."""
     number = PROJECT["version"]
-    lines = {"CITATION.cff": f"version: {number}", "CHANGELOG.md": f"## [{number}]", "floatbase/__init__.py": f'= "{number}"'}
+    lines = {
+        "CITATION.cff": f"version: {number}",
+        "CHANGELOG.md": f"## [{number}]",
+        "floatbase/__init__.py": f'= "{number}"',
+    }
     yield from (f"{path} has no {line}" for path, line in lines.items() if line not in text(path))
 
 
@@ -63,11 +73,18 @@ def container() -> Faults:
     docker = text("Dockerfile")
     for path in ("Dockerfile", ".binder/postBuild"):
         installed = [line for line in text(path).splitlines() if "pip install" in line]
-        if not installed or any(part.count("-c environment.txt") < part.count("pip install") for part in installed):
+        if not installed or any(
+            part.count("-c environment.txt") < part.count("pip install") for part in installed
+        ):
             yield f"{path} installs without -c environment.txt"
-        if not re.search(r"NUMBA_CPU_NAME=generic.*pip install.*-m floatbase compile", text(path), flags=re.S):
+        if not re.search(
+            r"NUMBA_CPU_NAME=generic.*pip install.*-m floatbase compile", text(path), flags=re.S
+        ):
             yield f"{path} does not compile for a generic processor after it installs"
-    if not re.search(r"^USER learner$(?!.*^(?:USER|RUN) ).*^CMD ", docker, flags=re.M | re.S) or "allow-root" in docker:
+    if (
+        not re.search(r"^USER learner$(?!.*^(?:USER|RUN) ).*^CMD ", docker, flags=re.M | re.S)
+        or "allow-root" in docker
+    ):
         yield "the container runs as root"
     _, _, command = json.loads(re.findall(r"^CMD (.+)$", docker, flags=re.M)[-1])
     subprocess.run(["sh", "-n", "-c", command], check=True)
@@ -81,7 +98,9 @@ def pythons() -> Faults:
     named = {
         "Dockerfile": re.findall(r"^FROM python:(3\.\d+)", text("Dockerfile"), flags=re.M),
         ".binder/runtime.txt": re.findall(r"python-(3\.\d+)", text(".binder/runtime.txt")),
-        ".devcontainer/devcontainer.json": re.findall(r"python:(3\.\d+)", text(".devcontainer/devcontainer.json")),
+        ".devcontainer/devcontainer.json": re.findall(
+            r"python:(3\.\d+)", text(".devcontainer/devcontainer.json")
+        ),
         ".github/workflows/test.yml": re.findall(r'"(3\.\d+)"', text(".github/workflows/test.yml")),
     }
     for path, found in named.items():
@@ -92,7 +111,10 @@ def pythons() -> Faults:
 def scripts() -> Faults:
     """Scripts are executable and have no syntax error."""
     for path in (".binder/postBuild", ".binder/start", ".ci/run"):
-        if not os.access(ROOT / path, os.X_OK) or subprocess.run(["bash", "-n", ROOT / path]).returncode:
+        if (
+            not os.access(ROOT / path, os.X_OK)
+            or subprocess.run(["bash", "-n", ROOT / path]).returncode
+        ):
             yield f"{path} cannot be run"
 
 
@@ -109,7 +131,11 @@ def workflows() -> Faults:
     """A release is tested before it is published, by scripts that exist, and without a password."""
     tests, publish = (text(f".github/workflows/{name}.yml") for name in ("test", "publish"))
     release = publish[publish.index("  pypi:") : publish.index("  site:")]
-    for needed, there in {"needs: [package, tests]": release, "id-token: write": release, "workflow_call:": tests}.items():
+    for needed, there in {
+        "needs: [package, tests]": release,
+        "id-token: write": release,
+        "workflow_call:": tests,
+    }.items():
         if needed not in there:
             yield f"a workflow has no {needed}"
     for script in re.findall(r"\.ci/\w+(?:\.py)?", tests + publish):
@@ -122,14 +148,22 @@ def workflows() -> Faults:
 def commands() -> Faults:
     """Make targets and files that texts name exist."""
     readme = text("README.md")
-    named = re.findall(r'(?:[`"]|    )make ([a-z-]+)', readme + text(".devcontainer/devcontainer.json"))
+    named = re.findall(
+        r'(?:[`"]|    )make ([a-z-]+)', readme + text(".devcontainer/devcontainer.json")
+    )
     yield from (f"there is no target make {name}" for name in set(named) - set(TARGETS))
     links = {link for link in re.findall(r"\]\(([^)#]+)\)", readme) if "://" not in link}
-    yield from (f"the README links to {link}, which does not exist" for link in links if not (ROOT / link).exists())
+    yield from (
+        f"the README links to {link}, which does not exist"
+        for link in links
+        if not (ROOT / link).exists()
+    )
 
 
 def pages() -> Faults:
-    """The pages that the code writes are up to date, and every equation has a function, a test and a lesson."""
+    """The pages that the code writes are up to date, and every equation has a function, a test and
+    a lesson.
+    """
     from floatbase.lessons.publish import (
         NOTEBOOKS,
         README,
@@ -151,13 +185,30 @@ def pages() -> Faults:
     entries = equations.entries()
     yield from (f"no test names {entry.path}" for entry in entries if not entry.tests)
     found = {number for entry in entries for number in entry.equations}
-    yield from (f"{number}: the docstrings and the map do not agree" for number in found ^ set(equations.TITLES))
-    taught = {name: _numbers(row) for row in lesson_table().splitlines() for name in re.findall(r"notebooks/(\w+\.ipynb)", row)}
-    yield from (f"no lesson teaches {number}" for number in set(equations.TITLES) - set().union(*taught.values()))
+    yield from (
+        f"{number}: the docstrings and the map do not agree"
+        for number in found ^ set(equations.TITLES)
+    )
+    taught = {
+        name: _numbers(row)
+        for row in lesson_table().splitlines()
+        for name in re.findall(r"notebooks/(\w+\.ipynb)", row)
+    }
+    yield from (
+        f"no lesson teaches {number}"
+        for number in set(equations.TITLES) - set().union(*taught.values())
+    )
     for name, numbers in taught.items():
-        cells = [cell.source for cell in read_notebook(NOTEBOOKS / name).cells if cell.cell_type == "markdown"]
+        cells = [
+            cell.source
+            for cell in read_notebook(NOTEBOOKS / name).cells
+            if cell.cell_type == "markdown"
+        ]
         (source,) = re.findall(r"^\*\*Source\*\*.*$", "\n".join(cells), flags=re.M)
-        yield from (f"the source line of {name} does not name {number}" for number in numbers - _numbers(source))
+        yield from (
+            f"the source line of {name} does not name {number}"
+            for number in numbers - _numbers(source)
+        )
 
 
 def _numbers(ranges: str) -> set[str]:

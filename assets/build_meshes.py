@@ -2,12 +2,14 @@
 
 Needs the packages trimesh, pycollada and fast-simplification. Reading the result needs only numpy.
 
-It loads the visuals of a robot's URDF material by material, welds them, decimates them to a number of faces for the whole
-robot, splits them at creases so that edges look sharp, and merges them into one mesh with coloured vertices for each joint.
-The file `assets/meshes/<robot>.npz` contains, for part i: `joints[i]`, its joint's name; rows
-`vertex_start[i]:vertex_start[i + 1]` of `vertices` (int16, times `steps[i]` metres, in the joint's frame) and of `colours`
-(index of `palette`, 0-255); rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices).
-`appearance` and `moving` say which robots look like that: those for whose URDF `appearance_digest(urdf, moving)` is the same.
+It loads the visuals of a robot's URDF material by material, welds them, decimates them to a number
+of faces for the whole robot, splits them at creases so that edges look sharp, and merges them into
+one mesh with coloured vertices for each joint. The file `assets/meshes/<robot>.npz` contains, for
+part i: `joints[i]`, its joint's name; rows `vertex_start[i]:vertex_start[i + 1]` of `vertices`
+(int16, times `steps[i]` metres, in the joint's frame) and of `colours` (index of `palette`, 0-255);
+rows `face_start[i]:face_start[i + 1]` of `faces` (indices of the part's own vertices). `appearance`
+and `moving` say which robots look like that: those for whose URDF `appearance_digest(urdf, moving)`
+is the same.
 """
 
 from __future__ import annotations
@@ -47,24 +49,32 @@ def budget(pieces: list[VisualMesh], total: float) -> list[int]:
     low, high = 0.0, 1e6
     for _ in range(60):
         share = (low + high) / 2
-        low, high = (low, share) if np.minimum(have, 24 + share * size).sum() > total else (share, high)
+        low, high = (
+            (low, share) if np.minimum(have, 24 + share * size).sum() > total else (share, high)
+        )
     return [int(n) for n in np.minimum(have, 24 + low * size)]
 
 
 def lighten(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """Weld a mesh, decimate it to a number of faces, drop degenerate faces, and split vertices at creases."""
+    """Weld a mesh, decimate it to a number of faces, drop degenerate faces, and split vertices at
+    creases.
+    """
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if faces < len(mesh.faces):
         points, triangles = fast_simplification.simplify(
             mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), target_count=faces, agg=7
         )
-        mesh = trimesh.Trimesh(np.clip(points, *mesh.bounds), triangles)  # back into the original's box
+        mesh = trimesh.Trimesh(
+            np.clip(points, *mesh.bounds), triangles
+        )  # back into the original's box
     mesh.update_faces(mesh.nondegenerate_faces())
     return trimesh.graph.smooth_shade(mesh, angle=CREASE) if len(mesh.faces) else mesh
 
 
 def merge(pieces: list[Light], palette: list[bytes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices, m, faces and palette indices of the pieces of one joint. Adds new colours to the palette."""
+    """Vertices, m, faces and palette indices of the pieces of one joint. Adds new colours to the
+    palette.
+    """
     vertices, faces, colours, start = [], [], [], 0
     for colour, mesh in pieces:
         code = np.clip(np.round(255 * colour), 0, 255).astype(np.uint8).tobytes()
@@ -91,7 +101,9 @@ def write(robot: Robot, pieces: list[VisualMesh], total: float) -> Path:
     """Write the light meshes with `total` faces, print their numbers, and return the file."""
     light: dict[int, list[Light]] = {}
     for piece, faces in zip(pieces, budget(pieces, total), strict=True):
-        light.setdefault(piece.joint, []).append((paint(robot.name, piece), lighten(piece.mesh.copy(), faces)))
+        light.setdefault(piece.joint, []).append(
+            (paint(robot.name, piece), lighten(piece.mesh.copy(), faces))
+        )
     palette: list[bytes] = []
     parts = [merge(light[joint], palette) for joint in sorted(light)]
     steps = [np.abs(vertices).max() / 32767 for vertices, *_ in parts]
@@ -106,14 +118,17 @@ def write(robot: Robot, pieces: list[VisualMesh], total: float) -> Path:
         palette=np.frombuffer(b"".join(palette), np.uint8).reshape(-1, 3),
         vertex_start=np.cumsum([0] + [len(v) for v, *_ in parts]),
         face_start=np.cumsum([0] + [len(f) for _, f, _ in parts]),
-        vertices=np.vstack([np.round(v / s) for (v, *_), s in zip(parts, steps, strict=True)]).astype(np.int16),
+        vertices=np.vstack(
+            [np.round(v / s) for (v, *_), s in zip(parts, steps, strict=True)]
+        ).astype(np.int16),
         faces=np.vstack([f for _, f, _ in parts]).astype(np.uint16),
         colours=np.concatenate([c for *_, c in parts]),
     )
     before, after = sum(len(p.mesh.faces) for p in pieces), sum(len(f) for _, f, _ in parts)
     vertices = sum(len(v) for v, *_ in parts)
     print(
-        f"{robot.name}: {before} -> {after} faces, {vertices} vertices, {len(parts)} parts, {len(palette)} colours, "
+        f"{robot.name}: {before} -> {after} faces, {vertices} vertices, {len(parts)} parts, "
+        f"{len(palette)} colours, "
         f"{path.stat().st_size / 1000:.0f} KB"
     )
     return path

@@ -1,7 +1,8 @@
-"""Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs playwright and a Chromium.
+"""Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs
+playwright and a Chromium.
 
-They show the course text's figures, every robot of the catalogue with its forces and friction cones, go2 with four-sided
-cones, and the feet of talos.
+They show the course text's figures, every robot of the catalogue with its forces and friction
+cones, go2 with four-sided cones, and the feet of talos.
 """
 
 from __future__ import annotations
@@ -21,21 +22,34 @@ from floatbase.lessons import FIGURES
 from floatbase.viewer import Viewer
 
 OUT = Path(__file__).parent / "pictures"
-FLAGS = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
 SIZE = {"width": 1000, "height": 640}
 
 
 def standing(name: str, facets: int | None = None) -> Viewer:
-    """A standing robot with forces that carry its weight. The first two forces lean, the second up to its cone."""
+    """A standing robot with forces that carry its weight. The first two forces lean, the second up
+    to its cone.
+    """
     robot = fb.load(name)
     state = robot.standing()
     view = Viewer(robot, background="white", facets=facets)
     if not robot.feet:
         return view.show(state)
-    contacts = (fb.Contacts.flat_feet if robot.feet[0].is_flat else fb.Contacts.points)(robot, mu=0.6)
+    contacts = (fb.Contacts.flat_feet if robot.feet[0].is_flat else fb.Contacts.points)(
+        robot, mu=0.6
+    )
     forces = np.zeros((contacts.n_points, 3))
     forces[:, 2] = robot.weight / contacts.n_points
-    forces[0, 0], forces[1, 1] = 0.25 * forces[0, 2], 0.6 * np.cos(np.pi / 4 if facets else 0.0) * forces[1, 2]
+    forces[0, 0], forces[1, 1] = (
+        0.25 * forces[0, 2],
+        0.6 * np.cos(np.pi / 4 if facets else 0.0) * forces[1, 2],
+    )
     return view.show(state, contacts, forces, support=True)
 
 
@@ -50,20 +64,28 @@ SCENES: dict[str, Callable[[], Viewer]] = {
 def main(names: list[str]) -> None:
     """Draw each scene, take a screenshot of its page, and save it with 255 colours."""
     OUT.mkdir(exist_ok=True)
-    browser_path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    browser_path = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path, args=FLAGS)
         for name in names:
             view = SCENES[name]()
             page = browser.new_page(viewport=SIZE)
             page.goto(view.url)
-            page.wait_for_function("window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render")
+            page.wait_for_function(
+                "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
+            )
             page.add_style_tag(content=".dg { display: none; }")
             page.screenshot(path=str(OUT / f"{name}.png"))
             page.close()
             view.close()
             with Image.open(OUT / f"{name}.png") as picture:
-                picture.convert("RGB").quantize(255, Image.Quantize.MAXCOVERAGE).save(OUT / f"{name}.png", optimize=True)
+                picture.convert("RGB").quantize(255, Image.Quantize.MAXCOVERAGE).save(
+                    OUT / f"{name}.png", optimize=True
+                )
             print(f"{name}: {(OUT / f'{name}.png').stat().st_size / 1000:.0f} KB")
         browser.close()
 

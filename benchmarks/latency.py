@@ -1,9 +1,11 @@
-"""How long a picture in JupyterLab is behind a slider: `python benchmarks/latency.py [another copy of the project …]`.
+"""How long a picture in JupyterLab is behind a slider:
+`python benchmarks/latency.py [another copy of the project …]`.
 
-A notebook with one `slider_panel` of go2 runs in a real JupyterLab and a real browser, once for this copy of the project and
-once for each other one, and their sliders are moved by turns, a few moves each. Told are the times from the key that moves
-the slider to the frame in the page, and to the picture drawn from it, as medians and as ratios to the first copy: on a
-machine with other work only these say much.
+A notebook with one `slider_panel` of go2 runs in a real JupyterLab and a real browser, once for
+this copy of the project and once for each other one, and their sliders are moved by turns, a few
+moves each. Told are the times from the key that moves the slider to the frame in the page, and to
+the picture drawn from it, as medians and as ratios to the first copy: on a machine with other work
+only these say much.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ import numpy as np
 from viewer import FLAGS, machine
 
 TURN = 10  # moves of one copy before the next one's turn
-REST = 1.0  # s from move to move: so that each is on its own, also where a processor draws and needs half a second for it
+# s from move to move: so that each is on its own, also where a processor draws and needs half a
+# second for it
+REST = 1.0
 LONGEST = 180  # s until a notebook has run
 CELL = """
 import floatbase as fb
@@ -42,7 +46,10 @@ def draw(lean):
 slider_panel(view, draw, lean=(-20.0, 0.0, 20.0, "N"))
 """
 NOTEBOOK = "jupyterapp.shell.currentWidget"
-READY = f"() => window.jupyterapp?.shell && {NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
+READY = (
+    f"() => window.jupyterapp?.shell && "
+    f"{NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
+)
 KEYS = """() => { window.keys = []; window.addEventListener("keydown",
   () => keys.push(performance.timeOrigin + performance.now()), true); }"""
 FRAMES = """() => {
@@ -57,18 +64,37 @@ FRAMES = """() => {
 
 @contextmanager
 def lab(copy: Path) -> Iterator[str]:
-    """The address of a JupyterLab whose kernels use a copy of the project, in a folder with the notebook."""
+    """The address of a JupyterLab whose kernels use a copy of the project, in a folder with the
+    notebook.
+    """
     with tempfile.TemporaryDirectory() as home:
         cell = nbformat.v4.new_code_cell(CELL)
         kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
-        nbformat.write(nbformat.v4.new_notebook(cells=[cell], metadata=kernel), Path(home) / "slider.ipynb")
+        nbformat.write(
+            nbformat.v4.new_notebook(cells=[cell], metadata=kernel), Path(home) / "slider.ipynb"
+        )
         places = dict.fromkeys(("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "HOME"), home)
-        command = [sys.executable, "-m", "jupyterlab", "--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"]
-        command += ["--IdentityProvider.token=t", "--LabApp.expose_app_in_browser=True", "--LabApp.news_url=None", home]
+        command = [
+            sys.executable,
+            "-m",
+            "jupyterlab",
+            "--no-browser",
+            "--ip=127.0.0.1",
+            "--port=0",
+            "--allow-root",
+        ]
+        command += [
+            "--IdentityProvider.token=t",
+            "--LabApp.expose_app_in_browser=True",
+            "--LabApp.news_url=None",
+            home,
+        ]
         log = Path(home) / "log"
         with log.open("w") as sink:
             environment = {**os.environ, **places, "PYTHONPATH": str(copy)}
-            server = subprocess.Popen(command, env=environment, stdout=sink, stderr=sink, start_new_session=True, cwd=home)
+            server = subprocess.Popen(
+                command, env=environment, stdout=sink, stderr=sink, start_new_session=True, cwd=home
+            )
         try:
             while not (found := re.search(r"http://127\.0\.0\.1:\d+", log.read_text())):
                 time.sleep(0.2)
@@ -85,7 +111,9 @@ def opened(browser: Any, address: str) -> tuple[Any, Any]:
     page.goto(f"{address}/lab/tree/slider.ipynb?token=t")
     page.wait_for_selector(".jp-Notebook .jp-CodeCell")
     page.wait_for_function(READY)
-    while not page.locator(".jp-OutputArea iframe").count():  # a kernel that is still starting drops the wish
+    while not page.locator(
+        ".jp-OutputArea iframe"
+    ).count():  # a kernel that is still starting drops the wish
         page.evaluate("() => { window.jupyterapp.commands.execute('notebook:run-all-cells'); }")
         time.sleep(8)
     frame = page.locator(".jp-OutputArea iframe").first.element_handle().content_frame()
@@ -120,7 +148,9 @@ def main(arguments: list[str] | None = None) -> int:
     times: dict[Path, list[tuple[float, float, int]]] = {copy: [] for copy in copies}
     with ExitStack() as stack:
         addresses = [stack.enter_context(lab(copy.resolve())) for copy in copies]
-        browser = stack.enter_context(sync_playwright()).chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        browser = stack.enter_context(sync_playwright()).chromium.launch(
+            executable_path=shutil.which("chromium"), args=FLAGS
+        )
         pages = [opened(browser, address) for address in addresses]
         for turn in range(-(-options.moves // TURN)):
             for copy, (page, frame) in zip(copies, pages, strict=True):
@@ -131,7 +161,10 @@ def main(arguments: list[str] | None = None) -> int:
     for copy in copies:
         frame, drawn, frames = np.median(times[copy], axis=0)
         ratios = json.dumps([round(float(x), 2) for x in (frame / first[0], drawn / first[1])])
-        print(f"{copy.name:20} frame after {frame:6.1f} ms, picture after {drawn:6.1f} ms, frames {frames:g}, ratios {ratios}")
+        print(
+            f"{copy.name:20} frame after {frame:6.1f} ms, picture after {drawn:6.1f} ms, frames "
+            f"{frames:g}, ratios {ratios}"
+        )
     return 0
 
 

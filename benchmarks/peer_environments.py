@@ -1,8 +1,9 @@
-"""An environment for each peer that floatbase is compared with, made once and kept: `python_of` gives its Python.
+"""An environment for each peer that floatbase is compared with, made once and kept: `python_of`
+gives its Python.
 
-TSID's wheel was built against an older Pinocchio than the current one and fails with it (in `RobotWrapper`), so its library
-and bindings are compiled from their source packages, which takes some minutes, a C++ compiler and make. placo comes as a wheel
-that needs Pinocchio 3.8.
+TSID's wheel was built against an older Pinocchio than the current one and fails with it (in
+`RobotWrapper`), so its library and bindings are compiled from their source packages, which takes
+some minutes, a C++ compiler and make. placo comes as a wheel that needs Pinocchio 3.8.
 """
 
 from __future__ import annotations
@@ -49,7 +50,9 @@ def python_of(peer: str, home: Path) -> Path:
 def versions(python: Path, names: Sequence[str]) -> dict[str, str]:
     """The versions of packages in an environment."""
     code = "import sys; from importlib.metadata import version; print(*map(version, sys.argv[1:]))"
-    said = subprocess.run([str(python), "-c", code, *names], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(
+        [str(python), "-c", code, *names], capture_output=True, text=True, check=True
+    ).stdout
     return dict(zip(names, said.split(), strict=True))
 
 
@@ -62,7 +65,10 @@ def _key(peer: str) -> str:
 def _check_tools(peer: str) -> None:
     for tool, package in (("c++", "g++"), ("make", "make")) if peer == "tsid" else ():
         if shutil.which(tool) is None:
-            raise MissingError(f"TSID is compiled here, and there is no {tool} (on Debian and Ubuntu: apt install {package}).")
+            raise MissingError(
+                f"TSID is compiled here, and there is no {tool} (on Debian and Ubuntu: apt install "
+                f"{package})."
+            )
 
 
 def _steps(peer: str, folder: Path) -> Iterator[list[str]]:
@@ -72,21 +78,47 @@ def _steps(peer: str, folder: Path) -> Iterator[list[str]]:
     if peer == "placo":
         yield [*pip, f"placo=={PLACO}", "pin==3.8.0"]
         return
-    yield [*pip, "cmeel[build]", "eiquadprog[build]", f"pin[build]=={version('pin')}", "jrl-cmakemodules", "scipy"]
+    yield [
+        *pip,
+        "cmeel[build]",
+        "eiquadprog[build]",
+        f"pin[build]=={version('pin')}",
+        "jrl-cmakemodules",
+        "scipy",
+    ]
     for package in ("libtsid", "tsid"):
         print(f"Compiling {package} {TSID}: some minutes.", flush=True)
-        yield [*pip, "--no-build-isolation", "--no-deps", "--no-cache-dir", "--no-binary", package, f"{package}=={TSID}"]
+        yield [
+            *pip,
+            "--no-build-isolation",
+            "--no-deps",
+            "--no-cache-dir",
+            "--no-binary",
+            package,
+            f"{package}=={TSID}",
+        ]
 
 
 def _run(command: list[str], folder: Path) -> None:
     """Run a command in an environment; what it prints goes to `log.txt` there."""
     jobs = str(os.cpu_count() or 1)
-    settings = {"PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "CMEEL_RUN_TESTS": "OFF", "CMEEL_JOBS": jobs}
+    settings = {
+        "PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}",
+        "CMEEL_RUN_TESTS": "OFF",
+        "CMEEL_JOBS": jobs,
+    }
     log = folder / "log.txt"
     with log.open("a") as out:
         out.write(f"$ {' '.join(command)}\n")
         out.flush()
-        code = subprocess.run(command, stdout=out, stderr=subprocess.STDOUT, env=os.environ | settings).returncode
+        code = subprocess.run(
+            command, stdout=out, stderr=subprocess.STDOUT, env=os.environ | settings
+        ).returncode
     if code:
-        wrong = [line.strip()[:200] for line in log.read_text().splitlines() if "error" in line.lower()][-3:]
-        raise MissingError(f"`{' '.join(command)}` ended with code {code}: {' / '.join(wrong)}. All that it said is in {log}.")
+        wrong = [
+            line.strip()[:200] for line in log.read_text().splitlines() if "error" in line.lower()
+        ][-3:]
+        raise MissingError(
+            f"`{' '.join(command)}` ended with code {code}: {' / '.join(wrong)}. All that it said "
+            f"is in {log}."
+        )

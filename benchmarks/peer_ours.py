@@ -1,4 +1,6 @@
-"""floatbase's side of the comparison: what its users write. Started by `peers.py`; the argument is one of `WAYS`."""
+"""floatbase's side of the comparison: what its users write. Started by `peers.py`; the argument is
+one of `WAYS`.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from floatbase.errors import InfeasibleError
 
 def build(description: dict) -> Contender:
     """The controller of a problem."""
-    controller = peer_problems.problem(description["robot"], description["peer"]).controller(sys.argv[1])
+    controller = peer_problems.problem(description["robot"], description["peer"]).controller(
+        sys.argv[1]
+    )
 
     def tick(q, v):
         try:

@@ -1,7 +1,9 @@
-"""placo's side of the comparison: `peers.py` starts it in placo's environment. What is said here is said in placo's own words.
+"""placo's side of the comparison: `peers.py` starts it in placo's environment. What is said here is
+said in placo's own words.
 
-Contacts are hard tasks without gains (J q̈ = -J̇ q̇), torque limits and force weights are set, everything that would change the
-optimum unasked (joint limits, the default torque cost) is off or set to the problem's.
+Contacts are hard tasks without gains (J q̈ = -J̇ q̇), torque limits and force weights are set,
+everything that would change the optimum unasked (joint limits, the default torque cost) is off or
+set to the problem's.
 """
 
 from __future__ import annotations
@@ -16,17 +18,23 @@ from peer_wire import Contender, serve
 
 def build(description: dict) -> Contender:
     """The solver of a problem."""
-    robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, _prepared(description["urdf"], description["contacts"]))
+    robot = placo.RobotWrapper(
+        "", placo.Flags.ignore_collisions, _prepared(description["urdf"], description["contacts"])
+    )
     names = [name for name in robot.model.names if name not in ("universe", "root_joint")]
     if names != description["joints"]:
-        raise SystemExit(f"placo orders the joints as {names}, the problem as {description['joints']}.")
+        raise SystemExit(
+            f"placo orders the joints as {names}, the problem as {description['joints']}."
+        )
     solver = placo.DynamicsSolver(robot)
     solver.torque_cost = description["torque_weight"]
     solver.problem.regularization = description["hessian"]
     solver.enable_joint_limits(False)
     solver.enable_velocity_limits(False)
     solver.enable_torque_limits(True)
-    for joint, limit, armature in zip(names, description["torque_limits"], description["armature"], strict=True):
+    for joint, limit, armature in zip(
+        names, description["torque_limits"], description["armature"], strict=True
+    ):
         solver.set_torque_limit(joint, limit)
         robot.set_rotor_inertia(joint, armature)
         robot.set_gear_ratio(joint, 1.0)
@@ -51,7 +59,9 @@ def build(description: dict) -> Contender:
 
 
 def _prepared(urdf: str, contacts: list[dict]) -> str:
-    """The URDF without its meshes, which no torque depends on, and with a massless link at each corner of a sole."""
+    """The URDF without its meshes, which no torque depends on, and with a massless link at each
+    corner of a sole.
+    """
     root = ET.fromstring(urdf)
     for link in root.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
@@ -68,7 +78,9 @@ def _prepared(urdf: str, contacts: list[dict]) -> str:
 
 
 def _add_tasks(solver: placo.DynamicsSolver, description: dict) -> None:
-    desired = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
+    desired = {
+        kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")
+    }
     com = solver.add_com_task(desired["com"])
     base = solver.add_orientation_task(description["base"], desired["orientation"])
     posture = solver.add_joints_task()
@@ -79,7 +91,9 @@ def _add_tasks(solver: placo.DynamicsSolver, description: dict) -> None:
 
 
 def _add_contact(solver: placo.DynamicsSolver, contact: dict, force_weight: float) -> None:
-    """A point, a sole that carries a wrench (planar), or a sole that carries a force at each corner."""
+    """A point, a sole that carries a wrench (planar), or a sole that carries a force at each
+    corner.
+    """
     frame, corners = contact["frame"], contact["corners"]
     if corners is None:
         task = _kept(solver.add_position_task(frame, np.zeros(3)), frame, "hard", 1.0)
@@ -94,14 +108,19 @@ def _add_contact(solver: placo.DynamicsSolver, contact: dict, force_weight: floa
             made[0].weight_moments = force_weight
         else:
             names = [_corner(frame, i) for i in range(len(corners))]
-            carriers = [_kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0) for name in names]
+            carriers = [
+                _kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0)
+                for name in names
+            ]
             made = [solver.add_unilateral_point_contact(carrier) for carrier in carriers]
     for one in made:
         one.mu, one.weight_forces, one.weight_tangentials = contact["mu"], force_weight, 0.0
 
 
 def _kept(task, name: str, priority: str, weight: float):
-    """The task without gains, so that hard it says J q̈ = -J̇ q̇, and without weight only gives a contact its Jacobian."""
+    """The task without gains, so that hard it says J q̈ = -J̇ q̇, and without weight only gives a
+    contact its Jacobian.
+    """
     task.configure(name, priority, weight)
     task.kp = task.kd = 0.0
     return task

@@ -1,16 +1,20 @@
-"""The problems on which floatbase and its C++ peers are compared: one optimum, in words that each of them has.
+"""The problems on which floatbase and its C++ peers are compared: one optimum, in words that each
+of them has.
 
-Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains and weights of
-`fb.standing_tasks`, but for the posture's weight, 0.1), four friction facets |f_x|, |f_y| ≤ μ f_z, no pull, torque limits. What
-the peers cannot say, the problem does without:
+Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains
+and weights of `fb.standing_tasks`, but for the posture's weight, 0.1), four friction facets |f_x|,
+|f_y| ≤ μ f_z, no pull, torque limits. What the peers cannot say, the problem does without:
 
 - contacts are at the foot frames themselves, not at the balls' lowest points; normals point up;
-- the peers' friction pyramids touch the cone from outside (`inner_approximation=False`) and turn with a flat foot, so Talos' soles are level
-  and straight in every state, as they are on level ground;
-- TSID (from Python) has no torque regularisation, and for flat feet only one of the foot's wrench rather than of the corner
-  forces. It adds 1e-8 to the diagonal of its Hessian: that is a force regularisation, and on flat feet the only one;
-- placo's flat feet are a force at each corner there too: points without weight carry the forces, the foot's frame keeps still.
-  Its own flat foot carries a wrench without a limit to the moment about the normal; that is an easier problem, measured apart.
+- the peers' friction pyramids touch the cone from outside (`inner_approximation=False`) and turn
+  with a flat foot, so Talos' soles are level and straight in every state, as they are on level
+  ground;
+- TSID (from Python) has no torque regularisation, and for flat feet only one of the foot's wrench
+  rather than of the corner forces. It adds 1e-8 to the diagonal of its Hessian: that is a force
+  regularisation, and on flat feet the only one;
+- placo's flat feet are a force at each corner there too: points without weight carry the forces,
+  the foot's frame keeps still. Its own flat foot carries a wrench without a limit to the moment
+  about the normal; that is an easier problem, measured apart.
 """
 
 from __future__ import annotations
@@ -28,14 +32,22 @@ import floatbase as fb
 ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 MU = 0.7
-WAYS = ("compiled", "own", "reference")  # floatbase's answers; own: compiled, with a task as a user writes it
-POSTURE = 0.1  # weight; with that of standing_tasks, 1e-3, the peers' solver loses the digits in which torques are compared
+WAYS = (
+    "compiled",
+    "own",
+    "reference",
+)  # floatbase's answers; own: compiled, with a task as a user writes it
+# weight; with that of standing_tasks, 1e-3, the peers' solver loses the digits in which torques are
+# compared
+POSTURE = 0.1
 HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
 
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Weights of ‖λ‖² and ‖τ‖², as the peer is told and as the same optimum needs them in floatbase."""
+    """Weights of ‖λ‖² and ‖τ‖², as the peer is told and as the same optimum needs them in
+    floatbase.
+    """
 
     peer_force: float
     peer_torque: float
@@ -94,12 +106,17 @@ class Problem:
         com, *others = self.tasks
         tasks = [OwnCoM(com.position) if way == "own" else com, *others]
         backend = "compiled" if way == "own" else way
-        return fb.WholeBodyController(self.robot, self.contacts, tasks, facets=4, inner_approximation=False, backend=backend)
+        return fb.WholeBodyController(
+            self.robot, self.contacts, tasks, facets=4, inner_approximation=False, backend=backend
+        )
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""
         found = [self.robot.random_state(seed, SPREADS[label]) for seed in range(n)]
-        return [(level_soles(self.robot, s.q) if self.is_flat else np.array(s.q), np.array(s.v)) for s in found]
+        return [
+            (level_soles(self.robot, s.q) if self.is_flat else np.array(s.q), np.array(s.v))
+            for s in found
+        ]
 
     @property
     def description(self) -> dict[str, Any]:
@@ -120,7 +137,12 @@ class Problem:
             "hessian": self.regularisation.hessian,
             "torque_weight": self.regularisation.peer_torque,
             "contacts": [
-                {"frame": foot.frame, "mu": MU, "corners": _plain(foot.corners), "planar": self.peer == "placo planar"}
+                {
+                    "frame": foot.frame,
+                    "mu": MU,
+                    "corners": _plain(foot.corners),
+                    "planar": self.peer == "placo planar",
+                }
                 for foot in robot.feet
             ],
         }
@@ -136,13 +158,19 @@ def _told(task: Any, target: Any) -> dict[str, Any]:
 
 @lru_cache
 def problem(robot: str, peer: str) -> Problem:
-    """The problem of that name. Point feet are taken without their balls: they touch at their frames."""
+    """The problem of that name. Point feet are taken without their balls: they touch at their
+    frames.
+    """
     feet = fb.load(robot).feet
-    return Problem(fb.load(robot, feet=[foot if foot.is_flat else foot.frame for foot in feet]), peer)
+    return Problem(
+        fb.load(robot, feet=[foot if foot.is_flat else foot.frame for foot in feet]), peer
+    )
 
 
 def level_soles(robot: fb.Robot, q: np.ndarray) -> np.ndarray:
-    """q with its leg joints changed until every foot's frame is that of the world: Newton's method with least steps."""
+    """q with its leg joints changed until every foot's frame is that of the world: Newton's method
+    with least steps.
+    """
     model, data, q = robot.model, robot.model.createData(), np.array(q)
     frames = [robot.frame_id(foot.frame) for foot in robot.feet]
     for _ in range(50):
@@ -151,6 +179,8 @@ def level_soles(robot: fb.Robot, q: np.ndarray) -> np.ndarray:
         error = np.concatenate([pin.log3(data.oMf[frame].rotation) for frame in frames])
         if np.max(np.abs(error)) < 1e-14:
             break
-        J = np.vstack([pin.getFrameJacobian(model, data, frame, pin.LOCAL)[3:, 6:] for frame in frames])
+        J = np.vstack(
+            [pin.getFrameJacobian(model, data, frame, pin.LOCAL)[3:, 6:] for frame in frames]
+        )
         q = pin.integrate(model, q, np.concatenate([np.zeros(6), -np.linalg.pinv(J) @ error]))
     return q

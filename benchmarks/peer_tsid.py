@@ -1,7 +1,8 @@
-"""TSID's side of the comparison: `peers.py` starts it in TSID's environment. What is said here is said in TSID's own words.
+"""TSID's side of the comparison: `peers.py` starts it in TSID's environment. What is said here is
+said in TSID's own words.
 
-Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are regularised alike along all axes (by default the
-normal counts a thousandth) and may be as large as they like.
+Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are regularised alike along
+all axes (by default the normal counts a thousandth) and may be as large as they like.
 """
 
 from __future__ import annotations
@@ -19,12 +20,18 @@ def build(description: dict) -> Contender:
     """The formulation and solver of a problem."""
     model = pin.buildModelFromXML(description["urdf"], pin.JointModelFreeFlyer())
     if list(model.names)[2:] != description["joints"]:
-        raise SystemExit(f"TSID orders the joints as {list(model.names)[2:]}, the problem as {description['joints']}.")
+        raise SystemExit(
+            f"TSID orders the joints as {list(model.names)[2:]}, the problem as "
+            f"{description['joints']}."
+        )
     model.armature = np.concatenate([np.zeros(6), description["armature"]])
     robot = tsid.RobotWrapper(model, tsid.RootJointType.FLOATING_BASE_SYSTEM, False)
     formulation = tsid.InverseDynamicsFormulationAccForce("standing", robot, False)
     formulation.computeProblemData(0.0, pin.neutral(model), np.zeros(model.nv))
-    kept = [_add_contact(formulation, robot, contact, description["force_weight"]) for contact in description["contacts"]]
+    kept = [
+        _add_contact(formulation, robot, contact, description["force_weight"])
+        for contact in description["contacts"]
+    ]
     kept += [*_add_tasks(formulation, robot, description), robot]
     solver = tsid.SolverHQuadProgFast("solver")
     solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
@@ -49,7 +56,16 @@ def _add_contact(formulation, robot, contact: dict, force_weight: float):
         size = 3
         made.setRegularizationTaskWeightVector(np.ones(size))
     else:
-        made = tsid.Contact6d(frame, robot, frame, np.array(contact["corners"]).T, normal, contact["mu"], 0.0, NO_LIMIT)
+        made = tsid.Contact6d(
+            frame,
+            robot,
+            frame,
+            np.array(contact["corners"]).T,
+            normal,
+            contact["mu"],
+            0.0,
+            NO_LIMIT,
+        )
         size = 6
     made.setKp(np.zeros(size))
     made.setKd(np.zeros(size))
@@ -63,9 +79,17 @@ def _add_tasks(formulation, robot, description: dict) -> list:
     base = tsid.TaskSE3Equality("orientation", robot, description["base"])
     base.setMask(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))
     posture = tsid.TaskJointPosture("posture", robot)
-    desired = {kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")}
-    desired["orientation"] = np.concatenate([np.zeros(3), desired["orientation"].ravel(order="F")])  # position, then columns
-    for task, kind, size in ((com, "com", 3), (base, "orientation", 6), (posture, "posture", robot.na)):
+    desired = {
+        kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")
+    }
+    desired["orientation"] = np.concatenate(
+        [np.zeros(3), desired["orientation"].ravel(order="F")]
+    )  # position, then columns
+    for task, kind, size in (
+        (com, "com", 3),
+        (base, "orientation", 6),
+        (posture, "posture", robot.na),
+    ):
         task.setKp(description[kind]["kp"] * np.ones(size))
         task.setKd(description[kind]["kd"] * np.ones(size))
         sample = tsid.TrajectorySample(desired[kind].size, size)

@@ -1,6 +1,8 @@
-"""How `peers.py` talks with the processes that it compares, each in an environment of its own; needs numpy alone.
+"""How `peers.py` talks with the processes that it compares, each in an environment of its own;
+needs numpy alone.
 
-An order is a line of JSON on the standard input of a process, the answer a line on its standard output:
+An order is a line of JSON on the standard input of a process, the answer a line on its standard
+output:
 
     {"problem": {…}}                 build the problem that `peer_problems.Problem.description` describes
     {"states": {label: [[q, v], …]}} keep these states
@@ -28,7 +30,8 @@ import numpy as np
 class Contender:
     """One way to solve a problem.
 
-    tick: q, v -> torques [N·m], or None where the solver found none. stages: the tick in pieces, by name; the first takes q and
+    tick: q, v -> torques [N·m], or None where the solver found none. stages: the tick in pieces, by
+        name; the first takes q and
     v, each other what the one before it gave.
     """
 
@@ -48,15 +51,21 @@ def serve(build: Callable[[dict[str, Any]], Contender]) -> None:
         if order == "problem":
             contender = build(what)
         elif order == "states":
-            states = {label: [(np.array(q), np.array(v)) for q, v in rows] for label, rows in what.items()}
+            states = {
+                label: [(np.array(q), np.array(v)) for q, v in rows] for label, rows in what.items()
+            }
         else:
             assert contender is not None, "the problem comes first"
-            answer = {"torques": _torques, "clock": _clock, "stages": _stages}[order](contender, states[what])
+            answer = {"torques": _torques, "clock": _clock, "stages": _stages}[order](
+                contender, states[what]
+            )
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
 
 
-def _torques(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[list[float] | None]:
+def _torques(
+    contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> list[list[float] | None]:
     found = [contender.tick(q, v) for q, v in states]
     return [None if tau is None else np.asarray(tau).tolist() for tau in found]
 
@@ -70,7 +79,9 @@ def _clock(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]
     return times
 
 
-def _stages(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
+def _stages(
+    contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> dict[str, float]:
     times = np.empty((len(states), len(contender.stages)))
     for row, (q, v) in zip(times, states, strict=True):
         given: tuple[Any, ...] = (q, v)
@@ -84,8 +95,14 @@ def _stages(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]
 class Process:
     """A contender in a process of its own: `script` served by the `python` of its environment."""
 
-    def __init__(self, python: Path, script: Path, arguments: Sequence[str] = (), paths: Sequence[Path] = ()):
-        quiet = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(map(str, paths))}
+    def __init__(
+        self, python: Path, script: Path, arguments: Sequence[str] = (), paths: Sequence[Path] = ()
+    ):
+        quiet = {
+            "OPENBLAS_NUM_THREADS": "1",
+            "OMP_NUM_THREADS": "1",
+            "PYTHONPATH": os.pathsep.join(map(str, paths)),
+        }
         self.name = script.stem
         self.process = subprocess.Popen(
             [str(python), str(script), *arguments],
@@ -97,7 +114,9 @@ class Process:
         )
 
     def ask(self, order: str, what: Any) -> Any:
-        """The answer to one order. Raises `RuntimeError` with what the process said when it ended instead."""
+        """The answer to one order. Raises `RuntimeError` with what the process said when it ended
+        instead.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         try:
             self.process.stdin.write(json.dumps({order: what}) + "\n")
@@ -107,7 +126,9 @@ class Process:
             line = ""
         if not line:
             said = self.process.communicate()[1] or "nothing"
-            raise RuntimeError(f"{self.name} ended with code {self.process.returncode}. It said: {said[-2000:]}")
+            raise RuntimeError(
+                f"{self.name} ended with code {self.process.returncode}. It said: {said[-2000:]}"
+            )
         return json.loads(line)
 
     def close(self) -> None:

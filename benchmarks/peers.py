@@ -1,11 +1,14 @@
-"""floatbase's tick against TSID and placo, the C++ libraries one would bind to otherwise: torques first, then times.
+"""floatbase's tick against TSID and placo, the C++ libraries one would bind to otherwise: torques
+first, then times.
 
     python benchmarks/peers.py                  makes what is missing, compares, measures -> benchmarks/peers.md, peers.png
-    python benchmarks/peers.py --env FOLDER     where the peers' environments are kept; build/peers by default
+    python benchmarks/peers.py --env FOLDER     where the peers' environments are kept; build/peers
+                                                by default
     python benchmarks/peers.py --peers placo    only these
 
-Each library runs in a process of its own, in its own environment, through its own Python binding, on the same states; blocks of
-ticks take turns, so that a busy moment of the machine meets both. `peer_problems.py` says how the problems are made the same.
+Each library runs in a process of its own, in its own environment, through its own Python binding,
+on the same states; blocks of ticks take turns, so that a busy moment of the machine meets both.
+`peer_problems.py` says how the problems are made the same.
 """
 
 from __future__ import annotations
@@ -24,12 +27,17 @@ from peer_wire import Process
 from tick import machine
 
 HERE = Path(__file__).parent
-TOLERANCE = 1e-6  # of the strongest motor's limit, by which torques may differ for the optimum to count as one
+# of the strongest motor's limit, by which torques may differ for the optimum to count as one
+TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
 SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", PLANAR: "peer_placo.py"}
 RUNS = {  # our way, whom it is measured beside, robots
-    "tsid": (("compiled", "tsid", ROBOTS), ("own", "tsid", ROBOTS), ("reference", "tsid", ("go2",))),
+    "tsid": (
+        ("compiled", "tsid", ROBOTS),
+        ("own", "tsid", ROBOTS),
+        ("reference", "tsid", ("go2",)),
+    ),
     "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
 }
 
@@ -38,9 +46,10 @@ RUNS = {  # our way, whom it is measured beside, robots
 class Row:
     """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
 
-    differences: of the torques, for each state, N·m; those up to tolerance count as none. within: the largest between
-    the path measured and the reference one on every fifth state, N·m. ours, theirs: times, µs. ratios: of the medians of each
-    block.
+    differences: of the torques, for each state, N·m; those up to tolerance count as none. within:
+        the largest between
+    the path measured and the reference one on every fifth state, N·m. ours, theirs: times, µs.
+    ratios: of the medians of each block.
     """
 
     way: str
@@ -73,19 +82,30 @@ class Row:
         return float(np.median(self.ratios)) if self.states else np.nan
 
 
-def compare(pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
+def compare(
+    pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int
+) -> Iterator[Row]:
     """Rows of one robot, one of our ways and one peer."""
     problem = peer_problems.problem(robot, peer)
-    everything = {label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS}
+    everything = {
+        label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS
+    }
     for process in pair:
         process.ask("problem", problem.description)
         process.ask("states", everything)
     found = {label: [process.ask("torques", label) for process in pair] for label in SPREADS}
-    kept = {label: [i for i, both in enumerate(zip(*found[label], strict=True)) if None not in both] for label in SPREADS}
+    kept = {
+        label: [i for i, both in enumerate(zip(*found[label], strict=True)) if None not in both]
+        for label in SPREADS
+    }
     for process in pair:
-        process.ask("states", {label: [everything[label][i] for i in kept[label]] for label in SPREADS})
+        process.ask(
+            "states", {label: [everything[label][i] for i in kept[label]] for label in SPREADS}
+        )
     turns: dict[str, list[list[list[float]]]] = {label: [] for label in SPREADS}
-    for _ in range(rounds):  # all rows in every turn: a slow second of the machine is then a few turns of each, not one row
+    for _ in range(rounds):
+        # all rows in every turn: a slow second of the machine is then a few turns of each, not one
+        # row
         for label in SPREADS:
             turns[label].append([process.ask("clock", label) for process in pair])
     for label in SPREADS:
@@ -116,7 +136,9 @@ def _differences(ours: Sequence[np.ndarray], theirs: Sequence[np.ndarray]) -> np
 
 
 def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: Sequence) -> float:
-    """The largest difference from floatbase's reference backend on some of the states, N·m, where that says who rounds."""
+    """The largest difference from floatbase's reference backend on some of the states, N·m, where
+    that says who rounds.
+    """
     if problem.peer == PLANAR or not states:
         return np.nan
     reference = problem.controller("reference")
@@ -130,32 +152,54 @@ def ours(way: str) -> Process:
 
 def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
-    for way, name, robot in [(way, name, robot) for way, name, robots in RUNS[peer] for robot in robots]:
+    for way, name, robot in [
+        (way, name, robot) for way, name, robots in RUNS[peer] for robot in robots
+    ]:
         pair = [ours(way), Process(python, HERE / SIDES[name])]
-        some = (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)  # it takes long
+        some = (
+            (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)
+        )  # it takes long
         yield from compare(pair, way, robot, name, *some)
         for process in pair:
             process.close()
 
 
-# results -------------------------------------------------------------------------------------------------------------------
+# results ------------------------------------------------------------------------------------------
 
 
 def torque_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| our way | robot | peer | states | compared | no answer: ours, peer | largest difference | from our reference |"
+    yield (
+        "| our way | robot | peer | states | compared | no answer: ours, peer | largest "
+        "difference | from our reference |"
+    )
     yield "|---" * 8 + "|"
     for row in rows:
-        missing, size = " and ".join(map(str, row.unanswered)), f"{row.difference:.1e} N·m | {row.within:.1e} N·m"
-        yield f"| {row.way} | {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | {size} |"
+        missing, size = (
+            " and ".join(map(str, row.unanswered)),
+            f"{row.difference:.1e} N·m | {row.within:.1e} N·m",
+        )
+        yield (
+            f"| {row.way} | {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | "
+            f"{size} |"
+        )
 
 
 def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
-    yield f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio | 10 to 90 % of blocks |"
+    yield (
+        f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio "
+        f"| 10 to 90 % of blocks |"
+    )
     yield "|---|---|---|---|---|---|---|---|---|"
     for row in rows:
-        numbers = " | ".join(f"{x:.1f} µs" for x in (*np.percentile(row.ours, [50, 99]), *np.percentile(row.theirs, [50, 99])))
+        numbers = " | ".join(
+            f"{x:.1f} µs"
+            for x in (*np.percentile(row.ours, [50, 99]), *np.percentile(row.theirs, [50, 99]))
+        )
         low, high = np.percentile(row.ratios, [10, 90])
-        yield f"| {row.robot} | {row.peer} | {row.label} | {numbers} | **{row.ratio:.2f}** | {low:.2f} to {high:.2f} |"
+        yield (
+            f"| {row.robot} | {row.peer} | {row.label} | {numbers} | **{row.ratio:.2f}** | "
+            f"{low:.2f} to {high:.2f} |"
+        )
 
 
 def stage_table(rows: Sequence[Row]) -> Iterator[str]:
@@ -175,19 +219,34 @@ def plot(rows: Sequence[Row]) -> None:
 
     peers = list(dict.fromkeys(row.peer for row in rows))
     size = (9.0, 2.6 * len(peers))
-    figure, axes = plt.subplots(len(peers), len(ROBOTS), figsize=size, constrained_layout=True, squeeze=False)
-    for ax, (peer, robot) in zip(axes.flat, [(peer, robot) for peer in peers for robot in ROBOTS], strict=True):
+    figure, axes = plt.subplots(
+        len(peers), len(ROBOTS), figsize=size, constrained_layout=True, squeeze=False
+    )
+    for ax, (peer, robot) in zip(
+        axes.flat, [(peer, robot) for peer in peers for robot in ROBOTS], strict=True
+    ):
         chosen = [row for row in rows if (row.peer, row.robot) == (peer, robot)]
-        for shift, times, label, color in ((-0.2, "theirs", "the peer", "0.65"), (0.2, "ours", "floatbase", "tab:blue")):
+        for shift, times, label, color in (
+            (-0.2, "theirs", "the peer", "0.65"),
+            (0.2, "ours", "floatbase", "tab:blue"),
+        ):
             heights = [float(np.median(getattr(row, times))) for row in chosen]
             ax.bar(np.arange(len(chosen)) + shift, heights, 0.4, label=label, color=color)
         for x, row in enumerate(chosen):
-            ax.annotate(f"{row.ratio:.2f} ×", (x, np.median(row.theirs)), (0, 3), textcoords="offset points", ha="center")
+            ax.annotate(
+                f"{row.ratio:.2f} ×",
+                (x, np.median(row.theirs)),
+                (0, 3),
+                textcoords="offset points",
+                ha="center",
+            )
         ax.set_xticks(range(len(chosen)), [row.label for row in chosen])
         ax.set(title=f"{robot} against {peer}", ylabel="median tick, µs")
         ax.margins(y=0.15)
         ax.spines[["top", "right"]].set_visible(False)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False
+    )
     figure.savefig(HERE / "peers.png", dpi=120)
 
 
@@ -215,17 +274,48 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
     """The text of peers.md."""
     equal = [row for row in rows if row.peer != PLANAR]
     other = [row for row in equal if not row.is_same]
-    compiled, own, reference = ([row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS)
-    peers = "; ".join(f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items())
-    lines = ["# The tick against C++ peers, measured", "", f"`python benchmarks/peers.py` on {machine()}. {peers}.", ""]
+    compiled, own, reference = (
+        [row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS
+    )
+    peers = "; ".join(
+        f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items()
+    )
+    lines = [
+        "# The tick against C++ peers, measured",
+        "",
+        f"`python benchmarks/peers.py` on {machine()}. {peers}.",
+        "",
+    ]
     lines += [f"**Not measured: {why}**\n" for why in lacking]
     lines += [INTRODUCTION, ""]
-    lines += ["## The same optimum", "", (peer_problems.__doc__ or "").strip(), "", SAMENESS, "", *torque_table(equal), ""]
-    lines += [f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}, {row.way}.\n" for row in other]
+    lines += [
+        "## The same optimum",
+        "",
+        (peer_problems.__doc__ or "").strip(),
+        "",
+        SAMENESS,
+        "",
+        *torque_table(equal),
+        "",
+    ]
+    lines += [
+        f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}, {row.way}.\n"
+        for row in other
+    ]
     lines += ["## Times", "", *time_table(compiled), ""]
     if reference:
-        lines += ['The reference backend, `backend="reference"`:', "", *time_table(reference, "reference"), ""]
-    lines += ["Inside the peers' ticks, medians of each call alone:", "", *stage_table(compiled), ""]
+        lines += [
+            'The reference backend, `backend="reference"`:',
+            "",
+            *time_table(reference, "reference"),
+            "",
+        ]
+    lines += [
+        "Inside the peers' ticks, medians of each call alone:",
+        "",
+        *stage_table(compiled),
+        "",
+    ]
     if own:
         lines += ["## A user-defined task", "", OWN, "", *time_table(own, "own task"), ""]
     planar = [row for row in rows if row.peer == PLANAR]
@@ -237,20 +327,32 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
 def planar_section(rows: Sequence[Row]) -> Iterator[str]:
     """placo's own flat foot, which floatbase has no equal to."""
     yield (
-        "placo's own flat foot carries six numbers instead of twelve, and has no limit to the moment about its normal: it "
-        "answers an easier problem. Where friction at the corners can give its wrenches, its torques are those of floatbase."
+        "placo's own flat foot carries six numbers instead of twelve, and has no limit to the "
+        "moment about its normal: it "
+        "answers an easier problem. Where friction at the corners can give its wrenches, its "
+        "torques are those of floatbase."
     )
     yield ""
     for row in rows:
-        agree, largest = int(np.sum(row.differences <= row.tolerance)), f"the largest difference is {row.difference:.1f} N·m"
+        agree, largest = (
+            int(np.sum(row.differences <= row.tolerance)),
+            f"the largest difference is {row.difference:.1f} N·m",
+        )
         yield f"- {row.label}: {agree} of {row.states} states have the same torques; {largest}."
     yield ""
     yield from time_table(rows)
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--env", type=Path, default=HERE.parent / "build" / "peers", help="folder of the peers' environments")
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    ask.add_argument(
+        "--env",
+        type=Path,
+        default=HERE.parent / "build" / "peers",
+        help="folder of the peers' environments",
+    )
     ask.add_argument("--peers", nargs="+", choices=PACKAGES, default=list(PACKAGES))
     ask.add_argument("--states", type=int, default=200, help="random states for each row")
     ask.add_argument("--rounds", type=int, default=100, help="turns that each side takes")

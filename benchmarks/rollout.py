@@ -3,9 +3,10 @@
     python benchmarks/rollout.py             -> benchmarks/rollout.md
     python benchmarks/rollout.py --turns 10  fewer turns, for a quick look
 
-The bare loop reads the state, asks the controller and advances the physics, and nothing else: no check, no record, no look at
-whether the robot fell. Both take turns on one simulation and one controller, so that a busy moment of the machine meets both.
-Ratios are to be trusted, microseconds to be taken with salt.
+The bare loop reads the state, asks the controller and advances the physics, and nothing else: no
+check, no record, no look at whether the robot fell. Both take turns on one simulation and one
+controller, so that a busy moment of the machine meets both. Ratios are to be trusted, microseconds
+to be taken with salt.
 """
 
 from __future__ import annotations
@@ -42,7 +43,11 @@ def recorded(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
         raise SystemExit(f"{sim.robot.name}: {run.outcome}")
 
 
-def tick_time(loop: Callable[[fb.Simulation, fb.WholeBodyController], None], sim: fb.Simulation, controller: object) -> float:
+def tick_time(
+    loop: Callable[[fb.Simulation, fb.WholeBodyController], None],
+    sim: fb.Simulation,
+    controller: object,
+) -> float:
     """µs of the processor for each tick of a turn that starts from standing."""
     sim.reset()
     start = time.thread_time()
@@ -54,19 +59,39 @@ def row(name: str, turns: int) -> str:
     """One robot: medians over all turns, and the median of the ratios turn by turn."""
     robot = fb.load(name)
     controller, sim = tick.controller(robot), fb.Simulation(robot)
-    times = np.array([[tick_time(loop, sim, controller) for loop in (bare, recorded)] for _ in range(turns)])
-    each = " | ".join(f"{t:.1f} µs | {1e6 * sim.timestep / t:.1f} ×" for t in np.median(times, axis=0))
+    times = np.array(
+        [[tick_time(loop, sim, controller) for loop in (bare, recorded)] for _ in range(turns)]
+    )
+    each = " | ".join(
+        f"{t:.1f} µs | {1e6 * sim.timestep / t:.1f} ×" for t in np.median(times, axis=0)
+    )
     return f"| {name} | {each} | **{np.median(times[:, 0] / times[:, 1]):.2f}** |"
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     ask.add_argument("--turns", type=int, default=50, help="of each loop, for each robot")
     turns = ask.parse_args().turns
-    lines = ["# The rollout, measured", "", f"`python benchmarks/rollout.py` on {tick.machine()}.", ""]
-    lines += [f"A robot stands on all its feet at 1 kHz, {TICKS} ticks a turn, {turns} turns of each loop: time for each tick,"]
-    lines += ["and times real time. The ratio is the rollout's speed as a part of the bare loop's.", ""]
-    lines += ["| robot | bare loop | × real time | `fb.rollout` | × real time | ratio |", "|---" * 6 + "|"]
+    lines = [
+        "# The rollout, measured",
+        "",
+        f"`python benchmarks/rollout.py` on {tick.machine()}.",
+        "",
+    ]
+    lines += [
+        f"A robot stands on all its feet at 1 kHz, {TICKS} ticks a turn, {turns} turns of each "
+        f"loop: time for each tick,"
+    ]
+    lines += [
+        "and times real time. The ratio is the rollout's speed as a part of the bare loop's.",
+        "",
+    ]
+    lines += [
+        "| robot | bare loop | × real time | `fb.rollout` | × real time | ratio |",
+        "|---" * 6 + "|",
+    ]
     print("\n".join(lines), flush=True)
     for name in ROBOTS:
         lines.append(row(name, turns))

@@ -1,11 +1,12 @@
-"""What leaks, slows down or breaks after many times: one command, a table, and exit code 1 when something does.
+"""What leaks, slows down or breaks after many times: one command, a table, and exit code 1 when
+something does.
 
     python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: 10 to 20 minutes
     python benchmarks/soak.py ticks kills           some of them
     python benchmarks/soak.py viewers --times 20    so many times
 
-Each runs in a process of its own. What counts is by how much a straight line through its memory, threads and open
-descriptors rises after the warm-up, and whether what it looks at holds.
+Each runs in a process of its own. What counts is by how much a straight line through its memory,
+threads and open descriptors rises after the warm-up, and whether what it looks at holds.
 """
 
 from __future__ import annotations
@@ -37,27 +38,37 @@ from floatbase.control import LinearInequality
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.simulation import LiveSimulation
 
-# how much may stay in all: MB, because the allocator keeps freed memory for later; and a connection that is being closed
+# how much may stay in all: MB, because the allocator keeps freed memory for later; and a connection
+# that is being closed
 LIMITS = {"memory, MB": 8.0, "threads": 1.0, "descriptors": 2.0}
 SAMPLES = 40  # of the three, after the warm-up
-SLOWED = 3.0  # times as long as without pages; a call that waits for a page takes a thousand times as long
-PACE = 0.97  # of real time that a live picture keeps, but for the slice under way when the clock is read
+# times as long as without pages; a call that waits for a page takes a thousand times as long
+SLOWED = 3.0
+# of real time that a live picture keeps, but for the slice under way when the clock is read
+PACE = 0.97
 PATIENCE = 60.0  # s for what takes a moment
 
-Soak = Iterator[Callable[[], object]]  # yields a function that does it once; what does not hold is an AssertionError
+Soak = Iterator[
+    Callable[[], object]
+]  # yields a function that does it once; what does not hold is an AssertionError
 
 
-# controller and simulation ----------------------------------------------------------------------------------------------------
+# controller and simulation ------------------------------------------------------------------------
 
 
 def stander(robot: fb.Robot, **options: Any) -> fb.WholeBodyController:
-    return fb.WholeBodyController(robot, fb.Contacts.feet(robot), fb.standing_tasks(robot.standing()), **options)
+    return fb.WholeBodyController(
+        robot, fb.Contacts.feet(robot), fb.standing_tasks(robot.standing()), **options
+    )
 
 
 def ticks() -> Soak:
     """The controller at states around standing."""
     robot = fb.load("go2")
-    controller, states = stander(robot), cycle([robot.random_state(seed, 0.1) for seed in range(1000)])
+    controller, states = (
+        stander(robot),
+        cycle([robot.random_state(seed, 0.1) for seed in range(1000)]),
+    )
 
     def step() -> None:
         state = next(states)
@@ -84,13 +95,17 @@ def own() -> Soak:
     """The controller with a task, rows and a user-defined bound."""
     robot = fb.load("go2")
     at, contacts = robot.standing(), fb.Contacts.feet(robot)
-    inequality = LinearInequality("acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0)))
+    inequality = LinearInequality(
+        "acceleration", "qdd", lambda eom, t: (np.eye(eom.nv)[6:], np.full(eom.d, 50.0))
+    )
     options: dict[str, Any] = {
         "inequalities": [inequality],
         "max_normal_force": {"FL_foot": lambda t: 40.0},
         "backend": "compiled",
     }
-    controller = fb.WholeBodyController(robot, contacts, [Height(at.com[2]), *fb.standing_tasks(at)], **options)
+    controller = fb.WholeBodyController(
+        robot, contacts, [Height(at.com[2]), *fb.standing_tasks(at)], **options
+    )
     states = cycle([robot.random_state(seed, 0.05) for seed in range(1000)])
 
     def step() -> None:
@@ -101,7 +116,9 @@ def own() -> Soak:
 
 
 def infeasible() -> Soak:
-    """The controller with limits that no motion can meet: it answers with an error that names the rows in conflict."""
+    """The controller with limits that no motion can meet: it answers with an error that names the
+    rows in conflict.
+    """
     robot = fb.load("go2")
     controller = stander(robot, min_normal_force=500.0)
     states = cycle([robot.random_state(seed, 0.02) for seed in range(100)])
@@ -129,17 +146,24 @@ def rollouts() -> Soak:
 
 
 def walking() -> Soak:
-    """A second of go2's trot in a live picture, another velocity in each, and now and then a push; it must keep real time."""
+    """A second of go2's trot in a live picture, another velocity in each, and now and then a push;
+    it must keep real time.
+    """
     robot = fb.load("go2")
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot))
     rng, paces = np.random.default_rng(0), list[float]()
     with closing(fb.Viewer(robot)) as view:
         run = LiveSimulation(
-            fb.Simulation(robot), walk, lambda record: view.show(record.final, record.contacts, record.measured[-1])
+            fb.Simulation(robot),
+            walk,
+            lambda record: view.show(record.final, record.contacts, record.measured[-1]),
         )
 
         def step() -> None:
-            walk.velocity, walk.yaw_rate = rng.uniform([-0.1, -0.1], [0.4, 0.1]), rng.uniform(-0.3, 0.3)
+            walk.velocity, walk.yaw_rate = (
+                rng.uniform([-0.1, -0.1], [0.4, 0.1]),
+                rng.uniform(-0.3, 0.3),
+            )
             if rng.uniform() < 0.2:
                 angle = rng.uniform(0.0, 2.0 * np.pi)
                 run.push(60.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))
@@ -156,11 +180,13 @@ def walking() -> Soak:
         raise AssertionError(f"it reaches {np.median(paces):.0%} of real time")
 
 
-# viewer -----------------------------------------------------------------------------------------------------------------------
+# viewer -------------------------------------------------------------------------------------------
 
 
 def viewer() -> Soak:
-    """A picture that changes, while two pages never read. When the viewer has dropped them, others come."""
+    """A picture that changes, while two pages never read. When the viewer has dropped them, others
+    come.
+    """
     robot = fb.load("go2")
     home, contacts, numbers = robot.standing(), fb.Contacts.points(robot), count()
     forces = 0.25 * robot.weight * np.tile([0.1, 0.0, 1.0], (4, 1))
@@ -188,7 +214,9 @@ def viewer() -> Soak:
         yield step
         slow = 1e6 * np.median(spent)
         if slow > SLOWED * alone:
-            raise AssertionError(f"pages that never read slow a picture down from {alone:.0f} to {slow:.0f} µs")
+            raise AssertionError(
+                f"pages that never read slow a picture down from {alone:.0f} to {slow:.0f} µs"
+            )
         close(pages)
 
 
@@ -214,7 +242,8 @@ def sleeper(port: int) -> socket.socket:
     """A page that connects and never reads."""
     page = socket.create_connection(("127.0.0.1", port))
     page.sendall(
-        f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: "
+        f"Upgrade\r\n"
         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
     )
     return page
@@ -233,7 +262,7 @@ def wait_for(condition: Callable[[], bool], otherwise: str) -> None:
         time.sleep(0.001)
 
 
-# all of them ------------------------------------------------------------------------------------------------------------------
+# all of them --------------------------------------------------------------------------------------
 
 # what is done, and how many times
 SOAKS: dict[str, tuple[Callable[[], Soak], int]] = {
@@ -250,7 +279,9 @@ SOAKS: dict[str, tuple[Callable[[], Soak], int]] = {
 
 
 class Row(NamedTuple):
-    """One soak. values: of memory, threads and descriptors at the end. growth: of each. broken: what does not hold."""
+    """One soak. values: of memory, threads and descriptors at the end. growth: of each. broken:
+    what does not hold.
+    """
 
     name: str
     times: int
@@ -285,28 +316,50 @@ def run(name: str, times: int) -> Row:
     for (what, limit), much in zip(LIMITS.items(), growth, strict=True):
         if much > limit:
             broken = "; ".join(filter(None, [broken, f"{what}: +{much:.1f}"]))
-    return Row(name, times, time.perf_counter() - start, tuple(float(value[-1]) for value in values), growth, broken)
+    return Row(
+        name,
+        times,
+        time.perf_counter() - start,
+        tuple(float(value[-1]) for value in values),
+        growth,
+        broken,
+    )
 
 
 def table(rows: list[Row]) -> Iterator[str]:
-    yield "| soak | times | s | " + " | ".join(f"{what}: end, rise (≤ {limit:g})" for what, limit in LIMITS.items()) + " | |"
+    yield (
+        "| soak | times | s | "
+        + " | ".join(f"{what}: end, rise (≤ {limit:g})" for what, limit in LIMITS.items())
+        + " | |"
+    )
     yield "|---" * (4 + len(LIMITS)) + "|"
     for row in rows:
-        numbers = " | ".join(f"{end:.0f}, {much:+.1f}" for end, much in zip(row.values, row.growth, strict=True))
-        yield f"| {row.name} | {row.times} | {row.seconds:.0f} | {numbers} | {row.broken or 'holds'} |"
+        numbers = " | ".join(
+            f"{end:.0f}, {much:+.1f}" for end, much in zip(row.values, row.growth, strict=True)
+        )
+        yield (
+            f"| {row.name} | {row.times} | {row.seconds:.0f} | {numbers} | "
+            f"{row.broken or 'holds'} |"
+        )
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run what is asked for and print the table. Returns 1 if anything leaks or breaks, else 0."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("soaks", nargs="*", metavar="soak", help=f"of {', '.join(SOAKS)}; all without any")
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    ask.add_argument(
+        "soaks", nargs="*", metavar="soak", help=f"of {', '.join(SOAKS)}; all without any"
+    )
     ask.add_argument("--times", type=int, help="do each so many times")
     options = ask.parse_args(arguments)
     if unknown := set(options.soaks) - set(SOAKS):
         ask.error(f"there is no soak {', '.join(unknown)}; there are {', '.join(SOAKS)}")
     names = options.soaks or list(SOAKS)
     rows = []
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as processes:
+    with ProcessPoolExecutor(
+        1, multiprocessing.get_context("spawn"), max_tasks_per_child=1
+    ) as processes:
         for row in processes.map(run, names, [options.times or SOAKS[name][1] for name in names]):
             print(f"{row.name}: {row.broken or 'holds'}, {row.seconds:.0f} s", flush=True)
             rows.append(row)

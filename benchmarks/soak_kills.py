@@ -1,4 +1,6 @@
-"""Files while the processes that write them are killed, a learner's and a sweep's: a part of `python benchmarks/soak.py`."""
+"""Files while the processes that write them are killed, a learner's and a sweep's: a part of
+`python benchmarks/soak.py`.
+"""
 
 from __future__ import annotations
 
@@ -40,9 +42,14 @@ CELLS = 100  # of a lesson: so many that a kill may fall into the writing of a f
 
 
 def kills() -> Iterator[Callable[[], object]]:
-    """`prepare` and `record`, killed at a random moment; then they run to their end, and nothing is lost."""
+    """`prepare` and `record`, killed at a random moment; then they run to their end, and nothing is
+    lost.
+    """
     dice, numbers, marks = random.Random(0), count(1), set[str]()
-    with tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name, patch.dict(os.environ, FLOATBASE_HOME=name):
+    with (
+        tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name,
+        patch.dict(os.environ, FLOATBASE_HOME=name),
+    ):
         course, mine = Path(name), Path(name, MY_FOLDER)
         for lesson in range(LESSONS):
             write(course / f"{lesson}.ipynb", ["course 0"] * CELLS)
@@ -68,7 +75,9 @@ def kills() -> Iterator[Callable[[], object]]:
 
 
 def sweeps() -> Iterator[Callable[[], object]]:
-    """A sweep, killed at a random moment and started again until its table is whole; then another one begins."""
+    """A sweep, killed at a random moment and started again until its table is whole; then another
+    one begins.
+    """
     dice, lost = random.Random(0), 0
     with tempfile.TemporaryDirectory(prefix="floatbase-soak-") as name:
         rows, calls, script = Path(name, "rows.jsonl"), Path(name, "calls"), Path(name, "script.py")
@@ -77,19 +86,27 @@ def sweeps() -> Iterator[Callable[[], object]]:
         def step() -> None:
             nonlocal lost
             before = whole_lines(rows)
-            with subprocess.Popen([sys.executable, script.name], cwd=name, stderr=subprocess.DEVNULL) as running:
+            with subprocess.Popen(
+                [sys.executable, script.name], cwd=name, stderr=subprocess.DEVNULL
+            ) as running:
                 with suppress(subprocess.TimeoutExpired):
                     running.wait(dice.uniform(0.0, 4.0))
                 running.kill()
-            assert running.returncode in (0, -signal.SIGKILL), f"the sweep ended with {running.returncode}"
+            assert running.returncode in (0, -signal.SIGKILL), (
+                f"the sweep ended with {running.returncode}"
+            )
             lines = whole_lines(rows)
             assert lines[: len(before)] == before, "a kill changed rows that were there"
             lost += running.returncode != 0
             if running.returncode == 0:
                 table = Table.read(rows)
-                assert [row["result"] for row in table.rows] == [i / 7 for i in range(POINTS)], "the table is another one"
+                assert [row["result"] for row in table.rows] == [i / 7 for i in range(POINTS)], (
+                    "the table is another one"
+                )
                 twice = len(calls.read_text().split()) - POINTS
-                assert twice <= IN_FLIGHT * lost, f"{twice} points were computed again after {lost} kills"
+                assert twice <= IN_FLIGHT * lost, (
+                    f"{twice} points were computed again after {lost} kills"
+                )
                 rows.unlink()
                 calls.unlink()
                 lost = 0
@@ -107,17 +124,26 @@ def whole_lines(path: Path) -> list[bytes]:
 
 def write(path: Path, texts: list[str]) -> None:
     """A notebook with these cells."""
-    made = [{"cell_type": "markdown", "id": f"{i}", "metadata": {}, "source": text} for i, text in enumerate(texts)]
-    path.write_text(json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}), encoding="utf-8")
+    made = [
+        {"cell_type": "markdown", "id": f"{i}", "metadata": {}, "source": text}
+        for i, text in enumerate(texts)
+    ]
+    path.write_text(
+        json.dumps({"cells": made, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}),
+        encoding="utf-8",
+    )
 
 
 def cells(path: Path) -> list[str]:
     """What `write` wrote."""
-    return ["".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]]
+    return [
+        "".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+    ]
 
 
 def judge_copies(course: Path, mine: Path, marks: set[str], is_done: bool = False) -> None:
-    """All files are whole and hold what the learner wrote; after an update that has come to its end, the course's texts too.
+    """All files are whole and hold what the learner wrote; after an update that has come to its
+    end, the course's texts too.
 
     marks: cells that the learner wrote. is_done: whether the last update has come to its end.
     """
@@ -132,7 +158,8 @@ def judge_copies(course: Path, mine: Path, marks: set[str], is_done: bool = Fals
         faults["not there"] = {
             lesson
             for lesson, text in lessons.items()
-            if text not in [held[:CELLS] for name, held in copies.items() if name.split(".")[0] == lesson]
+            if text
+            not in [held[:CELLS] for name, held in copies.items() if name.split(".")[0] == lesson]
         }
         faults["left over"] = {path.name for path in mine.iterdir()} - {*copies, ".from.json"}
     for what, names in faults.items():
@@ -140,7 +167,9 @@ def judge_copies(course: Path, mine: Path, marks: set[str], is_done: bool = Fals
 
 
 def judge_tries(name: str, dice: random.Random) -> None:
-    """The tries of an exercise that a process had counted when it was killed are there, the others' too, and it goes on."""
+    """The tries of an exercise that a process had counted when it was killed are there, the others'
+    too, and it goes on.
+    """
     others = progress.load()
     before = others.pop(name, {"tries": 0})["tries"]
 
@@ -152,14 +181,18 @@ def judge_tries(name: str, dice: random.Random) -> None:
     told = killed(record, dice.uniform(0.0, 0.01))
     found = progress.load()
     now = found.pop(name, {"tries": 0})["tries"]
-    assert now - before in (told, told + 1), f"{told} tries were counted before a kill, {now - before} are there after it"
+    assert now - before in (told, told + 1), (
+        f"{told} tries were counted before a kill, {now - before} are there after it"
+    )
     assert found == others, "a kill changed the tries of other exercises"
     progress.record_try(name, right=True)
     assert progress.load()[name]["tries"] == now + 1, "after a kill a try is not counted"
 
 
 def killed(action: Callable[[Callable[[], object]], object], after: float) -> int:
-    """Run an action in a process that is killed after so many seconds. Returns how often it called what it was given."""
+    """Run an action in a process that is killed after so many seconds. Returns how often it called
+    what it was given.
+    """
     ear, mouth = os.pipe()
     child = os.fork()
     if not child:
@@ -178,5 +211,7 @@ def killed(action: Callable[[Callable[[], object]], object], after: float) -> in
         with suppress(ProcessLookupError):
             os.kill(child, signal.SIGKILL)
         told = len(heard.read())
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 1, "the process to be killed ended with an error"
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 1, (
+        "the process to be killed ended with an error"
+    )
     return told

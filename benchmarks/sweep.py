@@ -1,13 +1,15 @@
 """Ten thousand pushes of go2 as one sweep: `python benchmarks/sweep.py`.
 
-Each push acts for 0.1 s on a go2 that stands, from another side and with another force, and is watched for 0.6 s in all. The
-sweep runs with one worker, with two, and then again with two after it was killed (SIGKILL) at a random moment; and on a Dask
-cluster of two processes on this machine (left out without Dask). All tables must be equal, to the last bit. Times are of the
-whole sweep, with the start of the processes. The points that were computed twice are counted by what the function leaves in a
-file at each call, which costs microseconds.
+Each push acts for 0.1 s on a go2 that stands, from another side and with another force, and is
+watched for 0.6 s in all. The sweep runs with one worker, with two, and then again with two after it
+was killed (SIGKILL) at a random moment; and on a Dask cluster of two processes on this machine
+(left out without Dask). All tables must be equal, to the last bit. Times are of the whole sweep,
+with the start of the processes. The points that were computed twice are counted by what the
+function leaves in a file at each call, which costs microseconds.
 
-Returns 1 if a table differs, if more is computed twice than the points in flight, or if two workers are less than 1.8 times as
-fast as one, which is judged from 2000 points on: fewer are over before the processes' start stops counting.
+Returns 1 if a table differs, if more is computed twice than the points in flight, or if two workers
+are less than 1.8 times as fast as one, which is judged from 2000 points on: fewer are over before
+the processes' start stops counting.
 """
 
 from __future__ import annotations
@@ -44,7 +46,9 @@ def setup() -> tuple[fb.Simulation, fb.WholeBodyController]:
     """go2 with its controller."""
     robot = fb.load("go2")
     contacts = fb.Contacts.points(robot, mu=0.7)
-    return fb.Simulation(robot), fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    return fb.Simulation(robot), fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(robot.standing())
+    )
 
 
 def push(made: Any, direction: float, force: float) -> dict[str, Any]:
@@ -65,8 +69,19 @@ def timed(points: int, **options: Any) -> tuple[Table, float]:
 
 
 def killed(points: int, workers: int, path: Path, rows: int) -> int:
-    """Run the sweep in a process of its own, kill it when a number of rows is in the file, and give the number found there."""
-    command = [sys.executable, __file__, "--points", str(points), "--only", str(path), "--workers", str(workers)]
+    """Run the sweep in a process of its own, kill it when a number of rows is in the file, and give
+    the number found there.
+    """
+    command = [
+        sys.executable,
+        __file__,
+        "--points",
+        str(points),
+        "--only",
+        str(path),
+        "--workers",
+        str(workers),
+    ]
     running = subprocess.Popen(command)
     while running.poll() is None and (not path.exists() or path.read_bytes().count(b"\n") <= rows):
         time.sleep(random.uniform(0.0, 0.05))
@@ -78,7 +93,9 @@ def killed(points: int, workers: int, path: Path, rows: int) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the times, and compare the tables. Returns 1 if something is not as it must be, else 0."""
-    parser = argparse.ArgumentParser(description="Ten thousand pushes, in one and in two processes, killed, and on Dask.")
+    parser = argparse.ArgumentParser(
+        description="Ten thousand pushes, in one and in two processes, killed, and on Dask."
+    )
     parser.add_argument("--points", type=int, default=10_000, help="how many pushes (10000)")
     parser.add_argument("--workers", type=int, default=2, help="to compare with one (2)")
     parser.add_argument("--only", type=Path, help="only sweep, into this file")
@@ -103,7 +120,10 @@ def main(arguments: list[str] | None = None) -> int:
         before = killed(n, workers, file, random.randrange(n))
         resumed, took = timed(n, to=file, workers=workers)
         twice = len(calls.read_bytes()) - n
-        print(f"killed with {before} of {n} rows, went on for {took:.1f} s; {twice} points computed twice")
+        print(
+            f"killed with {before} of {n} rows, went on for {took:.1f} s; {twice} points computed "
+            f"twice"
+        )
         wrong += [] if resumed.rows == one.rows else ["the table of the killed sweep is another"]
         wrong += [] if twice <= IN_FLIGHT * workers else [f"{twice} points were computed twice"]
 
@@ -112,12 +132,16 @@ def main(arguments: list[str] | None = None) -> int:
         except ImportError:
             print('Dask: left out; pip install "floatbase[cluster]"')
         else:
-            with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
+            with LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None
+            ) as cluster:
                 on_dask, took = timed(n, cluster=cluster.scheduler_address)
             print(f"Dask       {took:8.1f} s")
             wrong += [] if on_dask.rows == one.rows else ["Dask gives another table"]
     fell = int(np.sum(one["outcome"] == "fell"))
-    print(f"{n} pushes of up to {LARGEST:g} N: {fell} ended in a fall, {len(one.errors)} in an error")
+    print(
+        f"{n} pushes of up to {LARGEST:g} N: {fell} ended in a fall, {len(one.errors)} in an error"
+    )
     print("\n".join(wrong) or "all tables are equal")
     return int(bool(wrong))
 

@@ -1,9 +1,11 @@
 """How fast the controller's tick is, and that its backends agree: one command, a table and a plot.
 
     python benchmarks/tick.py                      times, growth -> benchmarks/tick.md, benchmarks/tick.png
-    python benchmarks/tick.py --agreement 2000     compares the backends on that many random states for each robot and stance
+    python benchmarks/tick.py --agreement 2000     compares the backends on that many random states
+                                                   for each robot and stance
 
-Both backends take turns within one run, on the same states. Times are ratios to be trusted, microseconds to be taken with salt.
+Both backends take turns within one run, on the same states. Times are ratios to be trusted,
+microseconds to be taken with salt.
 """
 
 from __future__ import annotations
@@ -37,10 +39,14 @@ def two_points(robot: fb.Robot) -> fb.Contacts:
     return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
 
 
-def controller(robot: fb.Robot, backend: str = "compiled", **options: object) -> fb.WholeBodyController:
+def controller(
+    robot: fb.Robot, backend: str = "compiled", **options: object
+) -> fb.WholeBodyController:
     """Keep standing on all feet."""
     contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
-    return fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), backend=backend, **options)
+    return fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(robot.standing()), backend=backend, **options
+    )
 
 
 def states(robot: fb.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -62,17 +68,22 @@ def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) 
 def interleaved(
     calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int
 ) -> list[np.ndarray]:
-    """Times of several ways to do the same thing, in turns, so that a busy moment of the machine meets all of them."""
+    """Times of several ways to do the same thing, in turns, so that a busy moment of the machine
+    meets all of them.
+    """
     blocks = [[clock(call, arguments) for call in calls] for _ in range(rounds)]
     return [np.concatenate([block[i] for block in blocks]) for i in range(len(calls))]
 
 
-# tick time -----------------------------------------------------------------------------------------------------------------
+# tick time ----------------------------------------------------------------------------------------
 
 
 def tick_times(n: int) -> Iterator[str]:
     """Both backends, by robot and difficulty."""
-    yield "| robot | states | active rows | compiled median | compiled p99 | reference median | reference p99 | times faster |"
+    yield (
+        "| robot | states | active rows | compiled median | compiled p99 | reference median | "
+        "reference p99 | times faster |"
+    )
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -80,16 +91,23 @@ def tick_times(n: int) -> Iterator[str]:
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
             active = np.mean([len(controllers[0](q, v).active) for q, v in at[:50]])
-            numbers = np.concatenate([np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)])
+            numbers = np.concatenate(
+                [np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)]
+            )
             text = " | ".join(f"{number:.1f} µs" for number in numbers)
             yield f"| {name} | {label} | {active:.1f} | {text} | {numbers[2] / numbers[0]:.0f} × |"
 
 
 def parts(n: int) -> Iterator[str]:
-    """The compiled tick taken apart: it is stopped after one part, two, ..., and the times are taken from each other."""
+    """The compiled tick taken apart: it is stopped after one part, two, ..., and the times are
+    taken from each other.
+    """
     from floatbase.control.tick import tick
 
-    yield "| robot | states | dynamics | rows | elimination | objective | optimum | Python around them |"
+    yield (
+        "| robot | states | dynamics | rows | elimination | objective | optimum | Python around "
+        "them |"
+    )
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -100,10 +118,16 @@ def parts(n: int) -> Iterator[str]:
             for q, v in states(robot, n, spread):
                 update = clock(compiled.dynamics.update, [(q, v)] * 5)
                 given = (q, v, compiled.default_inputs.packed, *compiled.arguments, numbers)
-                ticks = [clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.N_STAGES + 1)]
+                ticks = [
+                    clock(tick.tick, [(*given, last)] * 5) for last in range(1, tick.N_STAGES + 1)
+                ]
                 ends = [np.min(times) for times in (update, *ticks, clock(command, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
-            yield f"| {name} | {label} | " + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0)) + " |"
+            yield (
+                f"| {name} | {label} | "
+                + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0))
+                + " |"
+            )
 
 
 class OwnCoM:
@@ -121,8 +145,13 @@ class OwnCoM:
 
 
 def own(n: int) -> Iterator[str]:
-    """The same problem with the package's task for the centre of mass, with a user's, and with rows and a constraint beside."""
-    yield "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | own task, reference |"
+    """The same problem with the package's task for the centre of mass, with a user's, and with rows
+    and a constraint beside.
+    """
+    yield (
+        "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | "
+        "own task, reference |"
+    )
     yield "|---" * 7 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -130,21 +159,33 @@ def own(n: int) -> Iterator[str]:
         joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
-        inequality = LinearInequality("acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0)))
-        held = feet + fb.Contacts([LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))])
+        inequality = LinearInequality(
+            "acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0))
+        )
+        held = feet + fb.Contacts(
+            [LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))]
+        )
         ways = [
             fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="compiled"),
-            fb.WholeBodyController(robot, feet, mine, inequalities=[inequality], backend="compiled"),
+            fb.WholeBodyController(
+                robot, feet, mine, inequalities=[inequality], backend="compiled"
+            ),
             fb.WholeBodyController(robot, held, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="reference"),
         ]
         for label in ("easy", "saturated"):
-            medians = [np.median(times) for times in interleaved(ways, states(robot, n, SPREADS[label]), 3)]
-            yield f"| {name} | {label} | " + " | ".join(f"{median:.1f} µs" for median in medians) + " |"
+            medians = [
+                np.median(times) for times in interleaved(ways, states(robot, n, SPREADS[label]), 3)
+            ]
+            yield (
+                f"| {name} | {label} | "
+                + " | ".join(f"{median:.1f} µs" for median in medians)
+                + " |"
+            )
 
 
-# growth --------------------------------------------------------------------------------------------------------------------
+# growth -------------------------------------------------------------------------------------------
 
 
 def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
@@ -152,9 +193,17 @@ def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
     go2, talos = fb.load("go2"), fb.load("talos")
     frames = [foot.frame for foot in go2.feet]
     families = {
-        "facets (go2)": [(n_facets, controller(go2, facets=n_facets)) for n_facets in (4, 8, 16, 32, 64)],
-        "contacts (go2)": [(i, controller(go2, contacts=fb.Contacts.points(go2, frames=frames[:i]))) for i in (1, 2, 3, 4)],
-        "joints (two points)": [(r.d, controller(r, contacts=two_points(r))) for r in (go2, fb.load("anymal_kinova"), talos)],
+        "facets (go2)": [
+            (n_facets, controller(go2, facets=n_facets)) for n_facets in (4, 8, 16, 32, 64)
+        ],
+        "contacts (go2)": [
+            (i, controller(go2, contacts=fb.Contacts.points(go2, frames=frames[:i])))
+            for i in (1, 2, 3, 4)
+        ],
+        "joints (two points)": [
+            (r.d, controller(r, contacts=two_points(r)))
+            for r in (go2, fb.load("anymal_kinova"), talos)
+        ],
     }
     found: dict[str, list[tuple[float, ...]]] = {}
     for family, members in families.items():
@@ -177,7 +226,9 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, len(curves), figsize=(11, 3.4), constrained_layout=True, sharey=True)
+    figure, axes = plt.subplots(
+        1, len(curves), figsize=(11, 3.4), constrained_layout=True, sharey=True
+    )
     figure.suptitle("A tick of the compiled backend")
     top = 1.1 * max(max(row[1:]) for rows in curves.values() for row in rows)
     for ax, (family, rows) in zip(axes, curves.items(), strict=True):
@@ -191,19 +242,24 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
     figure.savefig(HERE / "tick.png", dpi=120)
 
 
-# agreement, long run ---------------------------------------------------------------------------------------------------------
+# agreement, long run ------------------------------------------------------------------------------
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
     """Largest torque difference between the backends, on n random states of every robot and stance."""
-    yield "| robot | feet | states | infeasible | left to the reference backend | largest difference |"
+    yield (
+        "| robot | feet | states | infeasible | left to the reference backend | largest "
+        "difference |"
+    )
     yield "|---" * 6 + "|"
     for name in names or fb.catalogue():
         robot = fb.load(name)
         feet = fb.Contacts.feet(robot)
         for count in range(min(1, len(feet)), len(feet) + 1):
             contacts = feet.only(*feet.names[:count]) if count else feet
-            compiled, reference = (controller(robot, backend, contacts=contacts) for backend in BACKENDS)
+            compiled, reference = (
+                controller(robot, backend, contacts=contacts) for backend in BACKENDS
+            )
             worst, left, infeasible = 0.0, 0, 0
             for seed in range(n):
                 state = robot.random_state(seed, tuple(SPREADS.values())[seed % 3])
@@ -219,7 +275,9 @@ def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
             yield f"| {name} | {count} | {n} | {infeasible} | {left} | {worst:.1e} N·m |"
 
 
-def check_verdict(compiled: fb.WholeBodyController, state: fb.State, rows: Sequence[str], where: str) -> None:
+def check_verdict(
+    compiled: fb.WholeBodyController, state: fb.State, rows: Sequence[str], where: str
+) -> None:
     """End with a message unless the controller calls the state infeasible, with the same rows."""
     try:
         compiled(state.q, state.v)
@@ -247,17 +305,36 @@ def machine() -> str:
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
-        cpu = next(line.split(":")[1].strip() for line in info.read_text().splitlines() if line.startswith("model name"))
+        cpu = next(
+            line.split(":")[1].strip()
+            for line in info.read_text().splitlines()
+            if line.startswith("model name")
+        )
     names = ("numpy", "pin", "numba", "daqp", "mujoco")
-    packages = ", ".join([f"floatbase {fb.__version__}", *(f"{name} {version(name)}" for name in names)])
-    return f"{cpu}, {os.cpu_count()} cores, one used; Python {platform.python_version()}, {packages}"
+    packages = ", ".join(
+        [f"floatbase {fb.__version__}", *(f"{name} {version(name)}" for name in names)]
+    )
+    return (
+        f"{cpu}, {os.cpu_count()} cores, one used; Python {platform.python_version()}, {packages}"
+    )
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--states", type=int, default=400, help="random states for each row of the table")
-    ask.add_argument("--agreement", type=int, default=0, help="compare the backends on so many states, and measure no times")
-    ask.add_argument("--long", type=int, default=0, help="run so many ticks, and measure nothing else")
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    ask.add_argument(
+        "--states", type=int, default=400, help="random states for each row of the table"
+    )
+    ask.add_argument(
+        "--agreement",
+        type=int,
+        default=0,
+        help="compare the backends on so many states, and measure no times",
+    )
+    ask.add_argument(
+        "--long", type=int, default=0, help="run so many ticks, and measure nothing else"
+    )
     options = ask.parse_args()
     if options.agreement or options.long:
         for line in agreement(options.agreement) if options.agreement else long_run(options.long):
@@ -266,8 +343,14 @@ def main() -> None:
     curves = growth(options.states // 4)
     plot(curves)
     lines = ["# The tick, measured", "", f"`python benchmarks/tick.py` on {machine()}.", ""]
-    lines += ["States are random around standing. Joints and attitude stray by 0.02 (easy), 0.1 (medium) and 0.3 rad"]
-    lines += ["(saturated: friction or torque limits hold most of them), velocities by as much a second.", ""]
+    lines += [
+        "States are random around standing. Joints and attitude stray by 0.02 (easy), 0.1 (medium) "
+        "and 0.3 rad"
+    ]
+    lines += [
+        "(saturated: friction or torque limits hold most of them), velocities by as much a second.",
+        "",
+    ]
     lines += [*tick_times(options.states), ""]
     lines += [
         "Compiled, part by part (stopped after each part, best of 5, median over states):",
@@ -275,9 +358,23 @@ def main() -> None:
         *parts(options.states // 4),
         "",
     ]
-    lines += ["What a user writes, run at every tick beside the compiled one (median):", "", *own(options.states // 4), ""]
-    lines += ["Growth, median tick (tick.png):", "", "| what | number | easy | saturated |", "|---|---|---|---|"]
-    lines += [f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |" for what, rows in curves.items() for x, a, b in rows]
+    lines += [
+        "What a user writes, run at every tick beside the compiled one (median):",
+        "",
+        *own(options.states // 4),
+        "",
+    ]
+    lines += [
+        "Growth, median tick (tick.png):",
+        "",
+        "| what | number | easy | saturated |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |"
+        for what, rows in curves.items()
+        for x, a, b in rows
+    ]
     lines.append("")
     (HERE / "tick.md").write_text("\n".join(lines), encoding="utf-8")
     print("\n".join(lines))

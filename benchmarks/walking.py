@@ -1,9 +1,11 @@
-"""How the robots walk: every figure that `floatbase.behaviours` is held to, on MuJoCo, in one command and one table.
+"""How the robots walk: every figure that `floatbase.behaviours` is held to, on MuJoCo, in one
+command and one table.
 
     python benchmarks/walking.py             -> benchmarks/walking.md
     python benchmarks/walking.py --pushes 6  fewer pushes, for a quick look
 
-Friction is 0.6 in the controller and 1 on the ground, pushes take 0.1 s. The control period is 1 ms, and 2 ms where it says so.
+Friction is 0.6 in the controller and 1 on the ground, pushes take 0.1 s. The control period is 1
+ms, and 2 ms where it says so.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ def robot_of(name: str) -> tuple[fb.Robot, fb.Contacts]:
 
 
 def walked(
-    name: str, gait: Callable[[fb.Robot], Gait], velocity: tuple[float, float], duration: float, *pushes: fb.Push,
+    name: str, gait: Callable[[fb.Robot], Gait], velocity: tuple[float, float], duration: float,
+    *pushes: fb.Push,
     period: float = 1e-3, **options: object,
 ) -> tuple[Rollout, Walk]:  # fmt: skip
     robot, contacts = robot_of(name)
@@ -54,17 +57,41 @@ def speed(run: Rollout, begin: float, end: float) -> np.ndarray:
 def jump(run: Rollout) -> float:
     """Median over the changes of stance of the largest jump of a torque, N·m."""
     changes = [i for i in range(1, len(run)) if run.contacts_at(i) is not run.contacts_at(i - 1)]
-    return float(np.median([np.abs(run.tau_desired[i] - run.tau_desired[i - 1]).max() for i in changes]))
+    return float(
+        np.median([np.abs(run.tau_desired[i] - run.tau_desired[i - 1]).max() for i in changes])
+    )
 
 
 def lifted(name: str, period: float) -> Row:
-    run, walk = walked(name, lambda robot: replace(Gait.crawl(robot, 1.2, 1.0), stop=9.0), (0.0, 0.0), 11.0, period=period)
+    run, walk = walked(
+        name,
+        lambda robot: replace(Gait.crawl(robot, 1.2, 1.0), stop=9.0),
+        (0.0, 0.0),
+        11.0,
+        period=period,
+    )
     rise = 1e3 * (run.foot_positions[:, :, 2].max(axis=0) - run.foot_positions[0, :, 2]).min()
     drift = 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
-    com = 1e3 * np.linalg.norm(run.com[-1, :2] - walk.plan(run.time[-1])[0])  # feet roll by millimetres while it comes there
-    found = f"{rise:.1f} mm, CoM {com:.1f} mm from its goal, tilt {tilt(run):.2f}°, drift {drift:.1f} mm"
-    holds = run.outcome == "completed" and rise >= 48.0 and tilt(run) <= 0.3 and drift <= 10.0 and com <= 1.0
-    return f"{name}: each foot lifted 5 cm{at(period)}", found, "≥ 48 mm, ≤ 1 mm, ≤ 0.3°, ≤ 10 mm", holds
+    com = 1e3 * np.linalg.norm(
+        run.com[-1, :2] - walk.plan(run.time[-1])[0]
+    )  # feet roll by millimetres while it comes there
+    found = (
+        f"{rise:.1f} mm, CoM {com:.1f} mm from its goal, tilt {tilt(run):.2f}°, drift "
+        f"{drift:.1f} mm"
+    )
+    holds = (
+        run.outcome == "completed"
+        and rise >= 48.0
+        and tilt(run) <= 0.3
+        and drift <= 10.0
+        and com <= 1.0
+    )
+    return (
+        f"{name}: each foot lifted 5 cm{at(period)}",
+        found,
+        "≥ 48 mm, ≤ 1 mm, ≤ 0.3°, ≤ 10 mm",
+        holds,
+    )
 
 
 def crawled(name: str, most: float, period: float) -> Row:
@@ -72,15 +99,30 @@ def crawled(name: str, most: float, period: float) -> Row:
     run, _ = walked(name, Gait.crawl, (step, 0.0), 11.0, period=period)
     v = speed(run, 3.0, 11.0)[0]
     found = f"{100 * v:.1f} cm/s, tilt {tilt(run):.2f}°, torques jump {jump(run):.2f} N·m"
-    holds = run.outcome == "completed" and abs(v / step - 1.0) <= 0.05 and tilt(run) <= 0.5 and jump(run) <= most
-    return f"{name}: crawl{at(period)}", found, f"{100 * step:g} cm/s ± 5 %, ≤ 0.5°, ≤ {most:g} N·m", holds
+    holds = (
+        run.outcome == "completed"
+        and abs(v / step - 1.0) <= 0.05
+        and tilt(run) <= 0.5
+        and jump(run) <= most
+    )
+    return (
+        f"{name}: crawl{at(period)}",
+        found,
+        f"{100 * step:g} cm/s ± 5 %, ≤ 0.5°, ≤ {most:g} N·m",
+        holds,
+    )
 
 
 def in_place(period: float) -> Row:
     run, _ = walked("go2", Gait.trot, (0.0, 0.0), 11.0, period=period)
     drift = 1e3 * np.linalg.norm(run.com[-1, :2] - run.com[round(1.0 / period), :2])
     holds = run.outcome == "completed" and drift <= 20.0 and tilt(run) <= 0.5
-    return f"go2: trot in place 10 s{at(period)}", f"drift {drift:.1f} mm, tilt {tilt(run):.2f}°", "≤ 20 mm, ≤ 0.5°", holds
+    return (
+        f"go2: trot in place 10 s{at(period)}",
+        f"drift {drift:.1f} mm, tilt {tilt(run):.2f}°",
+        "≤ 20 mm, ≤ 0.5°",
+        holds,
+    )
 
 
 def trotted(period: float) -> Row:
@@ -88,22 +130,40 @@ def trotted(period: float) -> Row:
     v, peak = speed(run, 2.0, 11.0)[0], run.measured[:, 2::3].max() / walk.robot.weight
     aside = 1e3 * abs(run.com[-1, 1])
     found = f"{v:.3f} m/s, y {aside:.0f} mm, tilt {tilt(run):.2f}°, foot peak {peak:.2f} weights"
-    holds = run.outcome == "completed" and abs(v / 0.3 - 1.0) <= 0.03 and aside <= 30 and tilt(run) <= 0.5 and peak <= 1.2
+    holds = (
+        run.outcome == "completed"
+        and abs(v / 0.3 - 1.0) <= 0.03
+        and aside <= 30
+        and tilt(run) <= 0.5
+        and peak <= 1.2
+    )
     return f"go2: trot 0.3 m/s 10 s{at(period)}", found, "± 3 %, ≤ 30 mm, ≤ 0.5°, ≤ 1.2", holds
 
 
 def pushed(force: float, period: float) -> Row:
-    run, _ = walked("go2", Gait.trot, (0.3, 0.0), 8.0, fb.Push(np.array([0.0, force, 0.0]), 4.0), period=period)
+    run, _ = walked(
+        "go2", Gait.trot, (0.3, 0.0), 8.0, fb.Push(np.array([0.0, force, 0.0]), 4.0), period=period
+    )
     aside, small = 1e3 * abs(run.com[-1, 1]), force <= 60.0
     found = f"{run.outcome}, {aside:.0f} mm aside, tilt {tilt(run):.1f}°"
     holds = run.outcome == "completed" and (not small or (aside <= 150.0 and tilt(run) <= 2.0))
-    return f"go2: the same, {force:g} N aside{at(period)}", found, "≤ 150 mm, ≤ 2°" if small else "completed", holds
+    return (
+        f"go2: the same, {force:g} N aside{at(period)}",
+        found,
+        "≤ 150 mm, ≤ 2°" if small else "completed",
+        holds,
+    )
 
 
 def one_leg(period: float) -> Row:
-    run, _ = walked("talos", lambda robot: Gait.walk(robot, 2.6, 1.0), (0.0, 0.0), 8.2, period=period)
+    run, _ = walked(
+        "talos", lambda robot: Gait.walk(robot, 2.6, 1.0), (0.0, 0.0), 8.2, period=period
+    )
     feet = 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
-    found = f"{run.outcome}, tilt {tilt(run):.2f}°, feet back within {feet:.2f} mm, torques jump {jump(run):.1f} N·m"
+    found = (
+        f"{run.outcome}, tilt {tilt(run):.2f}°, feet back within {feet:.2f} mm, torques jump "
+        f"{jump(run):.1f} N·m"
+    )
     holds = run.outcome == "completed" and tilt(run) <= 0.2 and feet <= 2.0 and jump(run) <= 20.0
     return f"talos: one foot up 2.6 s each{at(period)}", found, "≤ 0.2°, ≤ 2 mm, ≤ 20 N·m", holds
 
@@ -113,10 +173,23 @@ def talos_walks(period: float) -> Row:
     v, peak = speed(run, 2.4, 10.8)[0], run.measured[:, 2::3].max() / walk.robot.weight
     steps, rows = list(walk.history), np.arange(round(2.0 / period), len(run), 10)
     plans = np.searchsorted([step.time for step in steps], run.time[rows], side="right") - 1
-    error = [np.linalg.norm(steps[p].plan(run.time[i])[0] - run.com[i, :2]) for p, i in zip(plans, rows, strict=True)]
-    found = f"{v:.3f} m/s, CoM {1e3 * max(error):.1f} mm off, tilt {tilt(run):.2f}°, corner peak {peak:.2f} weights"
-    holds = abs(v / 0.2 - 1.0) <= 0.03 and 1e3 * max(error) <= 8.0 and tilt(run) <= 0.5 and peak <= 0.9
-    return f"talos: 0.2 m/s 10 s{at(period)}", found, "± 3 %, ≤ 8 mm, ≤ 0.5°, ≤ 0.9", run.outcome == "completed" and holds
+    error = [
+        np.linalg.norm(steps[p].plan(run.time[i])[0] - run.com[i, :2])
+        for p, i in zip(plans, rows, strict=True)
+    ]
+    found = (
+        f"{v:.3f} m/s, CoM {1e3 * max(error):.1f} mm off, tilt {tilt(run):.2f}°, corner peak "
+        f"{peak:.2f} weights"
+    )
+    holds = (
+        abs(v / 0.2 - 1.0) <= 0.03 and 1e3 * max(error) <= 8.0 and tilt(run) <= 0.5 and peak <= 0.9
+    )
+    return (
+        f"talos: 0.2 m/s 10 s{at(period)}",
+        found,
+        "± 3 %, ≤ 8 mm, ≤ 0.5°, ≤ 0.9",
+        run.outcome == "completed" and holds,
+    )
 
 
 def directions(n: int) -> Iterator[np.ndarray]:
@@ -130,7 +203,9 @@ def talos_pushed(n: int) -> Row:
     done = 0
     for x, y, phase in directions(n):
         push = fb.Push(300.0 * np.array([x, y, 0.0]), 3.0 + phase)
-        done += walked("talos", Gait.walk, (0.2, 0.0), 7.5, push, period=2e-3)[0].outcome == "completed"
+        done += (
+            walked("talos", Gait.walk, (0.2, 0.0), 7.5, push, period=2e-3)[0].outcome == "completed"
+        )
     return (
         f"talos: 0.2 m/s and 300 N, {n} random directions (2 ms)",
         f"{done} of {n}",
@@ -147,27 +222,47 @@ def recovered(name: str, low: float, high: float, gait: Callable[[fb.Robot], Gai
         push = fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), 0.5)
         for steps, outcomes in survived.items():
             stand = Stand(robot, contacts, gait(robot) if steps else None)
-            outcomes.append(fb.rollout(fb.Simulation(robot), stand, 4.0, [push], 2e-3).outcome == "completed")
+            outcomes.append(
+                fb.rollout(fb.Simulation(robot), stand, 4.0, [push], 2e-3).outcome == "completed"
+            )
     stood, stepped = (sum(survived[steps]) for steps in (False, True))
     lost = sum(a and not b for a, b in zip(survived[False], survived[True], strict=True))
     enough = 26 * n // 30 if name == "talos" else 27 * n // 30
     more = stood + 8 * n // 30 if name == "talos" else 2 * stood
     found = f"standing {stood}, with steps {stepped} of {n}; {lost} lost by stepping"
     what = f"{name}: {n} pushes of {low:g} to {high:g} N (2 ms)"
-    return what, found, f"steps ≥ {max(enough, more)}, none lost", stepped >= max(enough, more) and lost == 0
+    return (
+        what,
+        found,
+        f"steps ≥ {max(enough, more)}, none lost",
+        stepped >= max(enough, more) and lost == 0,
+    )
 
 
 def tick(name: str, gait: Callable[[fb.Robot], Gait]) -> Row:
     robot, contacts = robot_of(name)
-    walk, sim, times, backends = Walk(robot, contacts, gait(robot), (0.2, 0.0)), fb.Simulation(robot), [], set()
+    walk, sim, times, backends = (
+        Walk(robot, contacts, gait(robot), (0.2, 0.0)),
+        fb.Simulation(robot),
+        [],
+        set(),
+    )
     for _ in range(3000):
         begin = time.thread_time()
         command = walk(sim.q, sim.v, sim.time)
         times.append(1e6 * (time.thread_time() - begin))
         backends.add(command.backend)
         sim.advance(command.tau)
-    found = f"{np.median(times):.0f} µs, slowest {max(times) / 1e3:.1f} ms, {' and '.join(sorted(backends))}"
-    return f"{name}: a tick of `Walk`", found, "≤ 300 µs, compiled", np.median(times) <= 300.0 and backends == {"compiled"}
+    found = (
+        f"{np.median(times):.0f} µs, slowest {max(times) / 1e3:.1f} ms, "
+        f"{' and '.join(sorted(backends))}"
+    )
+    return (
+        f"{name}: a tick of `Walk`",
+        found,
+        "≤ 300 µs, compiled",
+        np.median(times) <= 300.0 and backends == {"compiled"},
+    )
 
 
 def at(period: float) -> str:
@@ -191,8 +286,12 @@ def rows(n: int) -> Iterator[Callable[[], Row]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pushes", type=int, default=30, help="how many in each series, 30 by default")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--pushes", type=int, default=30, help="how many in each series, 30 by default"
+    )
     given = parser.parse_args()
     lines = ["| what | found | required | |", "|---|---|---|---|"]
     for row in rows(given.pushes):
@@ -201,9 +300,8 @@ def main() -> None:
         print(lines[-1], flush=True)
     if given.pushes == 30:
         text = (
-            f"# How the robots walk\n\n`python benchmarks/walking.py`, floatbase {fb.__version__}.\n\n"
-            + "\n".join(lines)
-            + "\n"
+            f"# How the robots walk\n\n`python benchmarks/walking.py`, floatbase "
+            f"{fb.__version__}.\n\n" + "\n".join(lines) + "\n"
         )
         Path(__file__).with_suffix(".md").write_text(text, encoding="utf-8")
 

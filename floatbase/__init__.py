@@ -10,16 +10,19 @@
     run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
 
 Robots        catalogue, load, load_urdf, Robot, State
-Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques (14), feasible_space (13)
-Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask, TorqueTask, standing_tasks
+Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques
+              (14), feasible_space (13)
+Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask,
+              TorqueTask, standing_tasks
 Control       WholeBodyController (26)(27), QP, solve
 Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_recovery
 Walking       from floatbase.behaviours import Gait, Walk, Stand
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
 
-Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from their packages, such as
-`from floatbase.friction import FrictionPolyhedron`. Physics and pictures load when they are first used.
+Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from
+their packages, such as `from floatbase.friction import FrictionPolyhedron`. Physics and pictures
+load when they are first used.
 """
 
 from __future__ import annotations
@@ -50,7 +53,15 @@ from floatbase.qp import QP, solve
 from floatbase.robots import Robot, State, catalogue, load, load_urdf
 
 if TYPE_CHECKING:
-    from floatbase.simulation import Ground, Push, Rollout, Simulation, push_recovery, rollout, sweep
+    from floatbase.simulation import (
+        Ground,
+        Push,
+        Rollout,
+        Simulation,
+        push_recovery,
+        rollout,
+        sweep,
+    )
     from floatbase.viewer import Viewer
 
 __version__ = "0.2.0"
@@ -105,7 +116,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
-        other = "other names are in its packages, as in `from floatbase.friction import FrictionPolyhedron`"
+        other = (
+            "other names are in its packages, as in `from floatbase.friction import "
+            "FrictionPolyhedron`"
+        )
         raise AttributeError(f"module 'floatbase' has no attribute {name!r}; {other}")
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value

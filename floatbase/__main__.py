@@ -21,26 +21,50 @@ _POLL_INTERVAL = 0.05  # s between looks for a page: soon enough for a reader
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="floatbase", description="Controlling floating-based robots.")
+    parser = argparse.ArgumentParser(
+        prog="floatbase", description="Controlling floating-based robots."
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("robots", help="list the robots and what they are for")
     view = commands.add_parser("view", help="a live robot in the browser; end it with Ctrl-C")
     view.add_argument("robot", help="a name that `robots` lists, or the file of a URDF")
-    view.add_argument("--feet", nargs="+", default=[], metavar="LINK", help="links of a URDF that stand on the ground")
-    view.add_argument("--foot-radius", type=float, default=None, metavar="M", help="radius of balls at these feet, m")
-    view.add_argument("--fixed", action="store_true", help="bolt the root link of a URDF to the ground")
-    view.add_argument("--friction", type=float, default=0.7, help="coefficient of friction of the ground (0.7)")
+    view.add_argument(
+        "--feet",
+        nargs="+",
+        default=[],
+        metavar="LINK",
+        help="links of a URDF that stand on the ground",
+    )
+    view.add_argument(
+        "--foot-radius",
+        type=float,
+        default=None,
+        metavar="M",
+        help="radius of balls at these feet, m",
+    )
+    view.add_argument(
+        "--fixed", action="store_true", help="bolt the root link of a URDF to the ground"
+    )
+    view.add_argument(
+        "--friction", type=float, default=0.7, help="coefficient of friction of the ground (0.7)"
+    )
     view.add_argument("--background", default="light", help="white, light or dark (light)")
     view.add_argument("--port", type=int, default=0, help="port of the page (a free one)")
-    view.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    commands.add_parser("compile", help="compile the controller's tick, so that the first controller need not")
+    view.add_argument(
+        "--no-browser", action="store_true", help="print the address and open nothing"
+    )
+    commands.add_parser(
+        "compile", help="compile the controller's tick, so that the first controller need not"
+    )
     options = parser.parse_args(arguments)
     if options.command == "robots":
         print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
         return 0
     if options.command == "compile":
         go2 = fb.load("go2")
-        controller = fb.WholeBodyController(go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing()))
+        controller = fb.WholeBodyController(
+            go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
+        )
         print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
         return 0
     try:
@@ -54,17 +78,30 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """The robot that a command line names. Raises `FloatbaseError`."""
     if not options.robot.lower().endswith((".urdf", ".xml")):
         return fb.load(options.robot)
-    return fb.load_urdf(options.robot, floating=not options.fixed, feet=options.feet, foot_radius=options.foot_radius)
+    return fb.load_urdf(
+        options.robot,
+        floating=not options.fixed,
+        feet=options.feet,
+        foot_radius=options.foot_radius,
+    )
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:
-    """What the page says when it has ended. given: arguments of the command line; requested_port: the port among them, 0 for none."""
-    command = shlex.join(["python", "-m", "floatbase", *given, *([] if requested_port else ["--port", str(port)])])
-    return f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
+    """What the page says when it has ended. given: arguments of the command line; requested_port:
+    the port among them, 0 for none.
+    """
+    command = shlex.join(
+        ["python", "-m", "floatbase", *given, *([] if requested_port else ["--port", str(port)])]
+    )
+    return (
+        f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
+    )
 
 
 def start_when_connected(page: Playground, ended: threading.Event) -> None:
-    """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for want of a reader."""
+    """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for
+    want of a reader.
+    """
     while not (page.view.window.n_pages or ended.wait(_POLL_INTERVAL)):
         pass
     if not ended.is_set():
@@ -73,17 +110,25 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line, to be told."""
-    from floatbase.playground import Playground, Settings  # loads MuJoCo and the viewer, which the other commands do without
+    from floatbase.playground import (
+        Playground,
+        Settings,
+    )  # loads MuJoCo and the viewer, which the other commands do without
 
     ended = threading.Event()
-    before = {number: signal.signal(number, lambda *_: ended.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {
+        number: signal.signal(number, lambda *_: ended.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         robot = _load_robot(options)
         settings = Settings(friction=(options.friction, options.friction))
         page = Playground(robot, settings, background=options.background, port=options.port)
         with closing(page):
             page.view.show(page.session.sim.state)
-            page.view.set_disconnect_message(_restart_message(given, options.port, page.view.window.port))
+            page.view.set_disconnect_message(
+                _restart_message(given, options.port, page.view.window.port)
+            )
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
                 page.view.window.open()

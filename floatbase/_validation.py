@@ -18,9 +18,15 @@ from floatbase.errors import InputError
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 _FLOAT64 = np.dtype(np.float64)
-MAX_MAGNITUDE = 1e30  # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
+# in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
+MAX_MAGNITUDE = 1e30
 _ZERO_NORM = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
-_NO_ARTICLE = ("Contacts", "EquationsOfMotion", "Limits", "HydraulicActuators")  # names that take no article
+_NO_ARTICLE = (
+    "Contacts",
+    "EquationsOfMotion",
+    "Limits",
+    "HydraulicActuators",
+)  # names that take no article
 _MAX_REPR = 60  # characters of a value that a message repeats
 
 # how to get one, by class: for the messages of `as_instance`
@@ -42,10 +48,11 @@ _EXAMPLES = {
 
 
 class cached_property(functools.cached_property[T]):
-    """What a value computes of itself when it is first asked for, and keeps; where threads ask at once, what the first found.
+    """What a value computes of itself when it is first asked for, and keeps; where threads ask at
+    once, what the first found.
 
-    It takes no lock, as that of functools does in Python 3.11: values find the same whenever they compute it, and in a forked
-    process nobody is left to release a lock that another thread held.
+    It takes no lock, as that of functools does in Python 3.11: values find the same whenever they
+    compute it, and in a forked process nobody is left to release a lock that another thread held.
     """
 
     @overload
@@ -60,16 +67,21 @@ class cached_property(functools.cached_property[T]):
 
 
 class Value:
-    """Base of values: they do not change, so a copy is the value itself, and out of a pickle their arrays come read-only.
+    """Base of values: they do not change, so a copy is the value itself, and out of a pickle their
+    arrays come read-only.
 
     What a value has computed for itself (`cached_property`) stays behind and is computed anew.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise FrozenInstanceError(f"cannot assign to field {name!r}: a {type(self).__name__} does not change")
+        raise FrozenInstanceError(
+            f"cannot assign to field {name!r}: a {type(self).__name__} does not change"
+        )
 
     def __delattr__(self, name: str) -> None:
-        raise FrozenInstanceError(f"cannot delete field {name!r}: a {type(self).__name__} does not change")
+        raise FrozenInstanceError(
+            f"cannot delete field {name!r}: a {type(self).__name__} does not change"
+        )
 
     def __copy__(self) -> Self:
         return self
@@ -78,45 +90,75 @@ class Value:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        computed = {name for name in vars(self) if isinstance(getattr(type(self), name, None), functools.cached_property)}
-        computed -= set(getattr(self, "__dataclass_fields__", ()))  # given here, though a class above computes it
+        computed = {
+            name
+            for name in vars(self)
+            if isinstance(getattr(type(self), name, None), functools.cached_property)
+        }
+        computed -= set(
+            getattr(self, "__dataclass_fields__", ())
+        )  # given here, though a class above computes it
         kept = {name: value for name, value in vars(self).items() if name not in computed}
-        return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
+        return {
+            name: dict(value) if isinstance(value, MappingProxyType) else value
+            for name, value in kept.items()
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
-            object.__setattr__(self, name, MappingProxyType(value) if type(value) is dict else value)
+            object.__setattr__(
+                self, name, MappingProxyType(value) if type(value) is dict else value
+            )
 
 
 class FixedAttributes:
-    """Base of objects that keep what they were made with: once they are `_initialised`, no public attribute changes.
+    """Base of objects that keep what they were made with: once they are `_initialised`, no public
+    attribute changes.
 
-    A class derived from one of them may set attributes of its own; properties that can be set stay so.
+    A class derived from one of them may set attributes of its own; properties that can be set stay
+    so.
     """
 
     _hints: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
 
     def __setattr__(self, name: str, value: object) -> None:
         has_hint = name in self._hints
-        settable = name.startswith("_") or getattr(getattr(type(self), name, None), "fset", None) is not None
-        if settable or "_initialised" not in vars(self) or not (has_hint or FixedAttributes in type(self).__bases__):
+        settable = (
+            name.startswith("_")
+            or getattr(getattr(type(self), name, None), "fset", None) is not None
+        )
+        if (
+            settable
+            or "_initialised" not in vars(self)
+            or not (has_hint or FixedAttributes in type(self).__bases__)
+        ):
             object.__setattr__(self, name, value)
             return
         cls = type(self).__name__
         if has_hint:
-            raise InputError(f"{name} of a {cls} cannot be set once it is made: {self._hints[name]}.")
+            raise InputError(
+                f"{name} of a {cls} cannot be set once it is made: {self._hints[name]}."
+            )
         close = get_close_matches(name, self._hints, n=1)
-        raise InputError(f"a {cls} has no {name!r} to set{f'; {close[0]}? {self._hints[close[0]]}' if close else ''}.")
+        raise InputError(
+            f"a {cls} has no {name!r} to "
+            f"set{f'; {close[0]}? {self._hints[close[0]]}' if close else ''}."
+        )
 
 
 def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:
-    """`value`, after checking that it is a `kind`. example: how to get one, where the table above has none."""
+    """`value`, after checking that it is a `kind`. example: how to get one, where the table above
+    has none.
+    """
     if isinstance(value, cls):
         return value
     example = example or _EXAMPLES.get(cls.__name__, "")
-    raise InputError(f"{name} must be {_with_article(cls)}{f', as {example}' if example else ''}, not {short_repr(value)}.")
+    raise InputError(
+        f"{name} must be {_with_article(cls)}{f', as {example}' if example else ''}, not "
+        f"{short_repr(value)}."
+    )
 
 
 def as_string(name: str, value: object) -> str:
@@ -128,10 +170,16 @@ def as_string(name: str, value: object) -> str:
 
 def as_strings(name: str, value: Any) -> tuple[str, ...]:
     """`value` as a tuple, after checking that it is a list of texts, and not one text."""
-    if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(entry, str) for entry in value):
+    if (
+        isinstance(value, Sequence)
+        and not isinstance(value, str)
+        and all(isinstance(entry, str) for entry in value)
+    ):
         return tuple(value)
     example = value if isinstance(value, str) else "…"
-    raise InputError(f'{name} must be a list of names, as in {name}=["{example}"], not {short_repr(value)}.')
+    raise InputError(
+        f'{name} must be a list of names, as in {name}=["{example}"], not {short_repr(value)}.'
+    )
 
 
 def as_bool(name: str, value: object) -> bool:
@@ -152,7 +200,9 @@ def as_callable(name: str, value: Any, usage: str) -> Any:
 
 
 def signature_error(function: Any, *args: object, **kwargs: object) -> str:
-    """What a function takes, and why it cannot be called like this; "" where it can, or hides it, as compiled ones do."""
+    """What a function takes, and why it cannot be called like this; "" where it can, or hides it,
+    as compiled ones do.
+    """
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):
@@ -160,13 +210,19 @@ def signature_error(function: Any, *args: object, **kwargs: object) -> str:
     try:
         signature.bind(*args, **kwargs)
     except TypeError as error:
-        return f"{getattr(function, '__name__', type(function).__name__)} takes {signature}: {error}"
+        return (
+            f"{getattr(function, '__name__', type(function).__name__)} takes {signature}: {error}"
+        )
     return ""
 
 
 def as_integer(name: str, value: Any, minimum: int, maximum: int, reason: str = "") -> int:
-    """`value` as an int, after checking that it is a whole number from `least` to `most`. why: the reason for the bounds."""
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    """`value` as an int, after checking that it is a whole number from `least` to `most`. why: the
+    reason for the bounds.
+    """
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
+        value, bool
+    )
     if is_number and minimum <= value <= maximum and value == int(value):
         return int(value)
     raise InputError(
@@ -178,7 +234,8 @@ def as_integer(name: str, value: Any, minimum: int, maximum: int, reason: str = 
 def read_only(value: Any) -> Array:
     """`value` as a float64 array that cannot be written to: a copy, unless it is one already.
 
-    A read-only array is taken at its word: numpy does not tell of views that were taken of it before and can be written to.
+    A read-only array is taken at its word: numpy does not tell of views that were taken of it
+    before and can be written to.
     """
     if _is_read_only(value):
         return value
@@ -192,15 +249,25 @@ def frozen(array: Array) -> Array:
 
 
 def _is_read_only(value: Any) -> bool:
-    """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one that can."""
-    if type(value) is not np.ndarray or value.dtype is not _FLOAT64 or (flags := value.flags).writeable:
+    """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one
+    that can.
+    """
+    if (
+        type(value) is not np.ndarray
+        or value.dtype is not _FLOAT64
+        or (flags := value.flags).writeable
+    ):
         return False
     base = value.base
-    return flags.c_contiguous and (base is None or (type(base) is np.ndarray and not base.flags.writeable))
+    return flags.c_contiguous and (
+        base is None or (type(base) is np.ndarray and not base.flags.writeable)
+    )
 
 
 def numeric_copy(value: Any) -> Array | None:
-    """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth values, dates, objects."""
+    """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth
+    values, dates, objects.
+    """
     if type(value) is np.ndarray and value.dtype is _FLOAT64:
         return value.copy("K")  # most of them, and in the controller's loop
     try:
@@ -213,23 +280,44 @@ def numeric_copy(value: Any) -> Array | None:
 
 
 def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
-    """`value`, `read_only`, after checking that it holds plain numbers of `shape` (None = any length), finite ones.
+    """`value`, `read_only`, after checking that it holds plain numbers of `shape` (None = any
+    length), finite ones.
 
     Raises `InputError` with the name, the shape found and the shape required.
     """
     array = value if _is_read_only(value) else numeric_copy(value)
     if array is None:
         required = f"numbers of shape {_shape_str(shape)}" if shape else "a number"
-        raise InputError(f"{name} must be {required}{f' ({unit})' if unit else ''}, not {short_repr(value)}.")
+        raise InputError(
+            f"{name} must be {required}{f' ({unit})' if unit else ''}, not {short_repr(value)}."
+        )
     if array.shape != shape and not _shape_matches(array.shape, shape):
         required = f"have shape {_shape_str(shape)}" if shape else "be one number"
-        hint = ": one row alone is rows[:1], not rows[0]" if array.ndim == 1 and shape[:-1] in ((None,), (1,)) else ""
-        raise InputError(f"{name} has shape {array.shape}; it must {required}{f' ({unit})' if unit else ''}{hint}.")
-    # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger, the entries decide
-    if not (np.vdot(array, array) <= MAX_MAGNITUDE**2 or (bounded := np.abs(array) <= MAX_MAGNITUDE).all()):
+        hint = (
+            ": one row alone is rows[:1], not rows[0]"
+            if array.ndim == 1 and shape[:-1] in ((None,), (1,))
+            else ""
+        )
+        raise InputError(
+            f"{name} has shape {array.shape}; it must "
+            f"{required}{f' ({unit})' if unit else ''}{hint}."
+        )
+    # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger,
+    # the entries decide
+    if not (
+        np.vdot(array, array) <= MAX_MAGNITUDE**2
+        or (bounded := np.abs(array) <= MAX_MAGNITUDE).all()
+    ):
         at = tuple(np.argwhere(~bounded)[0].tolist())
-        place = f"holds {array[at]:g} at index {list(at)}; every entry must be" if shape else f"is {array[at]:g}; it must be"
-        raise InputError(f"{name} {place} a finite number{f' of at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}.")
+        place = (
+            f"holds {array[at]:g} at index {list(at)}; every entry must be"
+            if shape
+            else f"is {array[at]:g}; it must be"
+        )
+        raise InputError(
+            f"{name} {place} a finite "
+            f"number{f' of at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}."
+        )
     return frozen(array)
 
 
@@ -241,23 +329,43 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
 
 
 def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
-    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked. k: None for any."""
+    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked.
+    k: None for any.
+    """
     array = numeric_copy(forces)
-    one_row_per_point = array is not None and array.ndim == 2 and array.shape[1] == 3  # not (3, k / 3): another order
-    return as_array(name, array.ravel() if array is not None and one_row_per_point else forces, (k,), "N")
+    one_row_per_point = (
+        array is not None and array.ndim == 2 and array.shape[1] == 3
+    )  # not (3, k / 3): another order
+    return as_array(
+        name, array.ravel() if array is not None and one_row_per_point else forces, (k,), "N"
+    )
 
 
-def as_number(name: str, value: Any, unit: str = "", minimum: float = -MAX_MAGNITUDE, maximum: float = MAX_MAGNITUDE) -> float:
+def as_number(
+    name: str,
+    value: Any,
+    unit: str = "",
+    minimum: float = -MAX_MAGNITUDE,
+    maximum: float = MAX_MAGNITUDE,
+) -> float:
     """`value` as a float, after checking that it is a plain number from `least` to `most`."""
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if minimum <= result <= maximum:
         return result
-    bounds = "a finite number" if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE else f"from {minimum:g} to {maximum:g}"
+    bounds = (
+        "a finite number"
+        if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE
+        else f"from {minimum:g} to {maximum:g}"
+    )
     raise InputError(f"{name} is {result:g}; it must be {bounds}{f' ({unit})' if unit else ''}.")
 
 
-def as_positive(name: str, value: Any, unit: str = "", allow_zero: bool = False, maximum: float = MAX_MAGNITUDE) -> float:
-    """`value` as a float, after checking that it is above zero (or not below, with `allow_zero`) and at most `most`."""
+def as_positive(
+    name: str, value: Any, unit: str = "", allow_zero: bool = False, maximum: float = MAX_MAGNITUDE
+) -> float:
+    """`value` as a float, after checking that it is above zero (or not below, with `allow_zero`)
+    and at most `most`.
+    """
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if 0.0 < result <= maximum or (result == 0.0 and allow_zero):
         return result
@@ -273,7 +381,9 @@ def short_repr(value: object) -> str:
         return f"{_with_article(type(value))} of {value.dtype} of shape {value.shape}"
     if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
         return f"a whole number beyond {MAX_MAGNITUDE:g}"
-    if value is None or isinstance(value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray):
+    if value is None or isinstance(
+        value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray
+    ):
         text = " ".join(repr(value).split())
         return text if len(text) <= _MAX_REPR else f"{text[:_MAX_REPR]}…"
     return _with_article(type(value))
@@ -295,7 +405,8 @@ def unit_vector(name: str, value: Any) -> Array:
 
 
 def as_half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
-    """Planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,), m, checked.
+    """Planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,), m,
+    checked.
 
     normal: (3,) for one plane, (n, 3) for several. offset: m, one number for all, or (n,).
     """
@@ -303,7 +414,9 @@ def as_half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
     if array is None or array.ndim != 2 or array.shape[1] != 3 or not len(array):
         normals = unit_vector(f"normal of {name}", normal)[None]
     else:
-        normals = np.array([unit_vector(f"normal {i} of {name}", row) for i, row in enumerate(array)])
+        normals = np.array(
+            [unit_vector(f"normal {i} of {name}", row) for i, row in enumerate(array)]
+        )
     distance = numeric_copy(offset)
     shape = () if distance is None or distance.ndim == 0 else (len(normals),)
     offsets = np.broadcast_to(as_array(f"offset of {name}", offset, shape, "m"), len(normals))

@@ -27,8 +27,11 @@ from floatbase.errors import InputError
 
 MAX_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB
 CURVATURE_TOLERANCE = 1e-12  # curvature below this part of the largest counts as none
-_NEGATIVE_CURVATURE_TOLERANCE = 1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
-_SLOPE_TOLERANCE = 1e-7  # part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
+_NEGATIVE_CURVATURE_TOLERANCE = (
+    1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
+)
+# part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
+_SLOPE_TOLERANCE = 1e-7
 
 _NO_BLOCKS: Mapping[str, slice] = MappingProxyType({})
 
@@ -37,7 +40,8 @@ _NO_BLOCKS: Mapping[str, slice] = MappingProxyType({})
 class Affine(Value):
     """The map x -> A x + b.
 
-    A: shape (m, n); b: shape (m,). `blocks` names slices of the output: `f["tau"]` is the `Affine` of those rows.
+    A: shape (m, n); b: shape (m,). `blocks` names slices of the output: `f["tau"]` is the `Affine`
+        of those rows.
     Raises `InputError` when the shapes do not fit or an entry is not finite.
     """
 
@@ -46,7 +50,9 @@ class Affine(Value):
     blocks: Mapping[str, slice]
     __array_ufunc__ = None  # array + map is ours to add up, and so are array * map and array @ map
 
-    def __init__(self, A: npt.ArrayLike, b: npt.ArrayLike, blocks: Mapping[str, slice] = _NO_BLOCKS):
+    def __init__(
+        self, A: npt.ArrayLike, b: npt.ArrayLike, blocks: Mapping[str, slice] = _NO_BLOCKS
+    ):
         values = self.__dict__  # written to directly: user-defined tasks make one at every tick
         values["A"] = A = as_array("A", A, (None, None))
         values["b"], values["blocks"] = as_array("b", b, (len(A),)), as_blocks(blocks)
@@ -70,14 +76,21 @@ class Affine(Value):
 
     @staticmethod
     def stack(**parts: Affine) -> Affine:
-        """One map whose output is the outputs of `parts` one after the other, as blocks of those names."""
+        """One map whose output is the outputs of `parts` one after the other, as blocks of those
+        names.
+        """
         if not parts:
             raise InputError("stack needs at least one map.")
         widths = {name: as_instance(name, f, Affine).n_in for name, f in parts.items()}
         if len(set(widths.values())) > 1:
-            raise InputError(f"maps that are stacked must start from the same space; input sizes: {widths}.")
+            raise InputError(
+                f"maps that are stacked must start from the same space; input sizes: {widths}."
+            )
         ends = np.cumsum([f.n_out for f in parts.values()])
-        blocks = {name: slice(int(end) - f.n_out, int(end)) for (name, f), end in zip(parts.items(), ends, strict=True)}
+        blocks = {
+            name: slice(int(end) - f.n_out, int(end))
+            for (name, f), end in zip(parts.items(), ends, strict=True)
+        }
         A = np.vstack([f.A for f in parts.values()])
         return Affine(A, np.concatenate([f.b for f in parts.values()]), blocks)
 
@@ -96,23 +109,33 @@ class Affine(Value):
         numeric = numeric_copy(x)
         x = as_array("x", x, (self.n_in,)) if numeric is None else numeric
         if x.ndim not in (1, 2) or x.shape[0] != self.n_in:
-            raise InputError(f"x has shape {x.shape}; this map takes shape ({self.n_in},) or ({self.n_in}, N).")
+            raise InputError(
+                f"x has shape {x.shape}; this map takes shape ({self.n_in},) or ({self.n_in}, N)."
+            )
         x = as_array("x", x, x.shape)
         return self.A @ x + (self.b if x.ndim == 1 else self.b[:, None])
 
     def __getitem__(self, block: str) -> Affine:
         """The rows of one named block."""
         if not isinstance(block, str) or block not in self.blocks:
-            raise InputError(f"this map has no block {block!r}; its blocks are {list(self.blocks)}.")
+            raise InputError(
+                f"this map has no block {block!r}; its blocks are {list(self.blocks)}."
+            )
         rows = self.blocks[block]
         return Affine(self.A[rows], self.b[rows])
 
     def __matmul__(self, inner: Affine) -> Affine:
         """Composition: (f @ g)(x) = f(g(x)). Keeps the block names of f."""
         if not isinstance(inner, Affine):
-            raise InputError("only maps can be composed; the value of f at x is f(x), and Affine.linear(B) is a matrix's map.")
+            raise InputError(
+                "only maps can be composed; the value of f at x is f(x), and Affine.linear(B) is a "
+                "matrix's map."
+            )
         if inner.n_out != self.n_in:
-            raise InputError(f"cannot compose: the inner map gives {inner.n_out} numbers, the outer takes {self.n_in}.")
+            raise InputError(
+                f"cannot compose: the inner map gives {inner.n_out} numbers, the outer takes "
+                f"{self.n_in}."
+            )
         return Affine(self.A @ inner.A, self.A @ inner.b + self.b, self.blocks)
 
     def __add__(self, other: Affine | npt.ArrayLike) -> Affine:
@@ -124,7 +147,11 @@ class Affine(Value):
         return Affine(self.A, self.b + as_array("the constant", other, (self.n_out,)), self.blocks)
 
     def __sub__(self, other: Affine | npt.ArrayLike) -> Affine:
-        return self + (-1.0 * other if isinstance(other, Affine) else -as_array("the constant", other, (self.n_out,)))
+        return self + (
+            -1.0 * other
+            if isinstance(other, Affine)
+            else -as_array("the constant", other, (self.n_out,))
+        )
 
     def __radd__(self, other: npt.ArrayLike) -> Affine:
         """constant + map, the same as map + constant."""
@@ -159,7 +186,8 @@ class Affine(Value):
 class Quadratic(Value):
     """The cost x -> ½ xᵀ H x + gᵀ x + c.
 
-    H: shape (n, n), made symmetric; g: shape (n,); c: a number. Raises `InputError` when the shapes do not fit.
+    H: shape (n, n), made symmetric; g: shape (n,); c: a number. Raises `InputError` when the shapes
+        do not fit.
     """
 
     H: Array
@@ -185,7 +213,9 @@ class Quadratic(Value):
     @staticmethod
     def from_affine(residual: Affine, weight: float = 1.0) -> Quadratic:
         """The cost (weight / 2) ‖residual(x)‖²."""
-        return Quadratic.from_residual(as_instance("residual", residual, Affine).A, -residual.b, weight)
+        return Quadratic.from_residual(
+            as_instance("residual", residual, Affine).A, -residual.b, weight
+        )
 
     @staticmethod
     def zero(n: int) -> Quadratic:
@@ -207,20 +237,27 @@ class Quadratic(Value):
         return self.H @ as_array("x", x, (self.n,)) + self.g
 
     def pullback(self, f: Affine) -> Quadratic:
-        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source: [FBR], §3."""
+        """(15)(18) The same cost seen from the space that f starts in: x -> self(f(x)). Source:
+        [FBR], §3.
+        """
         if as_instance("f", f, Affine).n_out != self.n:
-            raise InputError(f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}.")
+            raise InputError(
+                f"cannot pull back: the map gives {f.n_out} numbers, the cost takes {self.n}."
+            )
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
 
     def minimiser(self) -> Array:
-        """The minimiser of smallest norm, shape (n,). Raises `InputError` where the cost has no minimum."""
+        """The minimiser of smallest norm, shape (n,). Raises `InputError` where the cost has no
+        minimum.
+        """
         return self.argmin_over(np.eye(self.n)).b
 
     def argmin_over(self, N: npt.ArrayLike) -> Affine:
         """x -> the point of least cost on x + span N; N: orthonormal columns, shape (n, p).
 
-        The cost there is `self.pullback(self.argmin_over(N))`. A direction that costs nothing is left alone. Raises
-        `InputError` where the cost falls for ever along a column of N: negative curvature, or slope without curvature.
+        The cost there is `self.pullback(self.argmin_over(N))`. A direction that costs nothing is
+        left alone. Raises `InputError` where the cost falls for ever along a column of N: negative
+        curvature, or slope without curvature.
         """
         N = as_array("N", N, (self.n, None))
         values, vectors = np.linalg.eigh(N.T @ self.H @ N)
@@ -229,9 +266,13 @@ class Quadratic(Value):
             raise InputError(f"the cost has no minimum: its smallest curvature is {values[0]:.3g}.")
         curved = values > CURVATURE_TOLERANCE * largest
         slope = vectors.T @ (N.T @ self.g)
-        if np.any(np.abs(slope[~curved]) > _SLOPE_TOLERANCE * (1.0 + float(np.abs(self.g).max(initial=0.0)))):
+        if np.any(
+            np.abs(slope[~curved])
+            > _SLOPE_TOLERANCE * (1.0 + float(np.abs(self.g).max(initial=0.0)))
+        ):
             raise InputError(
-                "the cost has no minimum: it falls for ever along a direction without curvature. Add a cost there."
+                "the cost has no minimum: it falls for ever along a direction without curvature. "
+                "Add a cost there."
             )
         W = N @ vectors[:, curved]
         step = W / values[curved]
@@ -258,8 +299,13 @@ def _as_factor(kind: str, scale: object) -> float:
     factor = numeric_copy(scale)
     if factor is not None and factor.ndim == 0 and abs(factor) <= MAX_MAGNITUDE:
         return float(factor)
-    what = f"an array of shape {scale.shape}" if isinstance(scale, np.ndarray) else short_repr(scale)
-    raise InputError(f"a {kind} can be multiplied by a finite number, not by {what}; to compose maps write f @ g.")
+    what = (
+        f"an array of shape {scale.shape}" if isinstance(scale, np.ndarray) else short_repr(scale)
+    )
+    raise InputError(
+        f"a {kind} can be multiplied by a finite number, not by {what}; to compose maps write f @ "
+        f"g."
+    )
 
 
 def as_dimension(name: str, n: int) -> int:
@@ -276,6 +322,10 @@ def as_blocks(blocks: Mapping[str, slice]) -> Mapping[str, slice]:
     """A read-only copy of names of slices, checked."""
     if blocks is _NO_BLOCKS or (type(blocks) is dict and not blocks):
         return _NO_BLOCKS  # most maps have none
-    if isinstance(blocks, Mapping) and all(isinstance(k, str) and isinstance(v, slice) for k, v in blocks.items()):
+    if isinstance(blocks, Mapping) and all(
+        isinstance(k, str) and isinstance(v, slice) for k, v in blocks.items()
+    ):
         return MappingProxyType(dict(blocks))
-    raise InputError(f'blocks must be names of slices, as {{"tau": slice(0, 12)}}, not {short_repr(blocks)}.')
+    raise InputError(
+        f'blocks must be names of slices, as {{"tau": slice(0, 12)}}, not {short_repr(blocks)}.'
+    )

@@ -14,11 +14,15 @@ class FloatbaseError(Exception):
 
 
 class InputError(FloatbaseError, ValueError):
-    """A value handed in cannot be used: wrong shape, NaN, a quaternion that is not of unit length, μ ≤ 0, …"""
+    """A value handed in cannot be used: wrong shape, NaN, a quaternion that is not of unit length,
+    μ ≤ 0, …
+    """
 
 
 class UnknownNameError(FloatbaseError, KeyError):
-    """A robot, frame, task or back end of that name does not exist; the message lists the near ones."""
+    """A robot, frame, task or back end of that name does not exist; the message lists the near
+    ones.
+    """
 
     def __str__(self) -> str:  # KeyError would print the repr of the message
         return str(self.args[0])
@@ -29,14 +33,16 @@ class RobotWarning(UserWarning):
 
 
 class SimulationWarning(UserWarning):
-    """A rollout runs, and a part of what it was given does nothing; the message says which, and why."""
+    """A rollout runs, and a part of what it was given does nothing; the message says which, and
+    why.
+    """
 
 
 class InfeasibleError(FloatbaseError):
     """No point satisfies all constraints of a quadratic program.
 
-    `constraints` holds the names of a smallest set of constraints in conflict: they can be met without any one of them. Other
-    constraints may be in conflict too.
+    `constraints` holds the names of a smallest set of constraints in conflict: they can be met
+    without any one of them. Other constraints may be in conflict too.
     """
 
     def __init__(self, message: str, constraints: Iterable[str] = ()):
@@ -45,7 +51,9 @@ class InfeasibleError(FloatbaseError):
 
 
 class SolverError(FloatbaseError):
-    """A solver gave up (iteration limit, cycling, not convex) although the problem was not shown to be infeasible."""
+    """A solver gave up (iteration limit, cycling, not convex) although the problem was not shown to
+    be infeasible.
+    """
 
 
 class SimulationError(FloatbaseError):
@@ -57,12 +65,18 @@ class ViewerError(FloatbaseError):
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
-    """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are few."""
+    """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are
+    few.
+    """
     known = sorted(known)
     query = str(name).strip().lower()
     matches = get_close_matches(query, {k.lower() for k in known}, n=5)
-    close = [k for match in matches for k in known if k.lower() == match][:5] or [k for k in known if query in k.lower()][:5]
+    close = [k for match in matches for k in known if k.lower() == match][:5] or [
+        k for k in known if query in k.lower()
+    ][:5]
     parts = ["near names: " + ", ".join(close)] if close else []
     if not close or len(known) <= 6:
         parts.append("known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else ""))
-    return UnknownNameError(f"unknown {kind} {name!r}; {'; '.join(parts)}." + (f" {hint}" if hint else ""))
+    return UnknownNameError(
+        f"unknown {kind} {name!r}; {'; '.join(parts)}." + (f" {hint}" if hint else "")
+    )

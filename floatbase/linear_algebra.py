@@ -1,4 +1,6 @@
-"""Rank, null space and row lengths: the few decisions of linear algebra that every package must take alike."""
+"""Rank, null space and row lengths: the few decisions of linear algebra that every package must
+take alike.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,18 @@ RANK_TOLERANCE = 1e-9  # singular values below this part of the largest count as
 def rank(A: npt.ArrayLike, absolute: bool = False) -> int:
     """Number of singular values of A above `RANK_TOLERANCE` times the largest.
 
-    absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding altogether.
+    absolute: above `RANK_TOLERANCE` itself, for parts of orthonormal columns, which may be rounding
+        altogether.
     """
     return svd_with_rank(A, absolute)[3]
 
 
 def svd_with_rank(A: npt.ArrayLike, absolute: bool = False) -> tuple[Array, Array, Array, int]:
-    """The singular value decomposition A = U diag(s) Vᵀ and the rank r of A: (U, s, Vᵀ, r); absolute as for `rank`.
+    """The singular value decomposition A = U diag(s) Vᵀ and the rank r of A: (U, s, Vᵀ, r);
+    absolute as for `rank`.
 
-    A: (m, n). U: (m, m), its first r columns span the range of A, the others what A does not reach. s: falling. Vᵀ: (n, n),
+    A: (m, n). U: (m, m), its first r columns span the range of A, the others what A does not reach.
+        s: falling. Vᵀ: (n, n),
     its last n - r rows span the null space of A.
     """
     U, s, Vt = np.linalg.svd(np.asarray(A, dtype=np.float64))
@@ -36,6 +41,8 @@ def null_space(A: npt.ArrayLike, absolute: bool = False) -> Array:
 
 
 def row_norms(A: Array) -> Array:
-    """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare violations of rows in."""
+    """Euclidean length of each row, shape (m,), 1 for a row of zeros: the unit to compare
+    violations of rows in.
+    """
     norms = np.linalg.norm(A, axis=1)
     return np.where(norms > 0.0, norms, 1.0)

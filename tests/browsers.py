@@ -14,16 +14,22 @@ from typing import Any
 import pytest
 
 SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
 FLAGS = [
-    "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
+    "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--disable-quic",
     "--no-first-run", "--disable-background-networking", "--webgl-antialiasing-mode=none",
 ]  # fmt: skip
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: nothing was looked at in a browser")
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None, reason="no Chromium on this machine: nothing was looked at in a browser"
+)
 
 
 def launched(*flags: str) -> Iterator[Any]:
-    """A headless Chromium, closed when the caller has finished. Playwright keeps an event loop running in this thread.
+    """A headless Chromium, closed when the caller has finished. Playwright keeps an event loop
+    running in this thread.
 
     flags: more flags for Chromium.
     """

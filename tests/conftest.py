@@ -1,5 +1,6 @@
-"""What all tests share: a folder for all that they write, one BLAS thread, random numbers that can be drawn anew, the slow
-files first."""
+"""What all tests share: a folder for all that they write, one BLAS thread, random numbers that can
+be drawn anew, the slow files first.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +20,21 @@ import pytest
 # What takes longest is started first, so that no worker is left alone with it at the end:
 # each lesson by itself, and these files as a whole.
 LESSONS = "test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything"
-SLOWEST = ("test_site", "test_lab", "test_hub", "test_voila", "test_playground_page", "test_convert", "test_main")
+SLOWEST = (
+    "test_site",
+    "test_lab",
+    "test_hub",
+    "test_voila",
+    "test_playground_page",
+    "test_convert",
+    "test_main",
+)
 ENDING = 5.0  # s that a process may take to end after the tests have ended it
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices of 30 rows: more threads only wait for one another
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # matrices of 30 rows: more threads only wait for one another
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -32,7 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="draw all random numbers of the tests from other streams, one for each N; 0, the default, leaves them as they are",
+        help="draw all random numbers of the tests from other streams, one for each N; 0, the "
+        "default, leaves them as they are",
     )
 
 
@@ -43,7 +55,9 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.mkdtemp(prefix="floatbase-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder))
         os.environ["TMPDIR"] = tempfile.tempdir = folder
-    os.environ["FLOATBASE_HOME"] = tempfile.mkdtemp(prefix="home-")  # a learner's progress is not the tests' to write
+    os.environ["FLOATBASE_HOME"] = tempfile.mkdtemp(
+        prefix="home-"
+    )  # a learner's progress is not the tests' to write
     shift_seeds(config, config.getoption("--seed"))
 
 
@@ -62,24 +76,32 @@ def no_idle_workers() -> Iterator[None]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """End the processes that tests have left running, such as browsers and kernels, and fail if there are any."""
+    """End the processes that tests have left running, such as browsers and kernels, and fail if
+    there are any.
+    """
     if not is_no_worker(session.config):
         return
-    _, left = psutil.wait_procs([process for process in psutil.process_iter() if is_left(process)], timeout=ENDING)
+    _, left = psutil.wait_procs(
+        [process for process in psutil.process_iter() if is_left(process)], timeout=ENDING
+    )
     left = [process for process in left if is_left(process)]
     for process in left:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         with suppress(psutil.Error):
-            print(f"\nthe tests left process {process.pid} running: {' '.join(process.cmdline())[:200]}")
+            print(
+                f"\nthe tests left process {process.pid} running: "
+                f"{' '.join(process.cmdline())[:200]}"
+            )
             process.kill()
     psutil.wait_procs(left, timeout=10)
 
 
 def is_left(process: psutil.Process) -> bool:
-    """Whether a process, whoever is its parent now, has been started by these tests and runs on: it has their folder.
+    """Whether a process, whoever is its parent now, has been started by these tests and runs on: it
+    has their folder.
 
-    One that has ended is a zombie, or has no command line, until its parent knows. Python's own resource tracker of process
-    pools ends with the process that has it.
+    One that has ended is a zombie, or has no command line, until its parent knows. Python's own
+    resource tracker of process pools ends with the process that has it.
     """
     try:
         words = process.cmdline()
@@ -91,14 +113,18 @@ def is_left(process: psutil.Process) -> bool:
 
 def shift_seeds(config: pytest.Config, n: int) -> None:
     """Draw the numbers of every integer seed, and the examples of hypothesis, from the n-th stream."""
-    hypothesis.settings.register_profile("repeatable", derandomize=n == 0, deadline=None, database=None)
+    hypothesis.settings.register_profile(
+        "repeatable", derandomize=n == 0, deadline=None, database=None
+    )
     hypothesis.settings.load_profile("repeatable")
     if n:
         config.option.hypothesis_seed = n
         np.random.default_rng = shifted(np.random.default_rng, n)
 
 
-def shifted(default_rng: Callable[[Any], np.random.Generator], n: int) -> Callable[[Any], np.random.Generator]:
+def shifted(
+    default_rng: Callable[[Any], np.random.Generator], n: int
+) -> Callable[[Any], np.random.Generator]:
     def other_rng(seed: Any = None) -> np.random.Generator:
         return default_rng([seed, n] if isinstance(seed, int | np.integer) else seed)
 
@@ -111,7 +137,9 @@ def pytest_report_header(config: pytest.Config) -> str:
 
 @pytest.hookimpl(trylast=True)  # of what is selected
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deal what takes longest out to the workers. Each begins with an equal part of the list, and steals from the end."""
+    """Deal what takes longest out to the workers. Each begins with an equal part of the list, and
+    steals from the end.
+    """
     long: dict[str, list[pytest.Item]] = {}
     rest: list[pytest.Item] = []
     for item in items:

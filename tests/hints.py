@@ -18,8 +18,11 @@ MASS = 16.085  # kg, of go2
 LIFTED = (9.81 + 2.0) * MASS  # N: the right answer to 00.1
 # what a learner might give instead of an answer
 ODD = {
-    "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12, "ragged": [[1.0], [1.0, 2.0]],
+    "nothing": None, "Ellipsis": ..., "text": "a", "texts": ["a"] * 12, "nothings": [None] * 12,
+    "ragged": [[1.0], [1.0, 2.0]],
     "object": object(), "three": (1, 2, 3),
-    "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan), "endless": np.full((4, 3), np.inf),
-    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs, "pair": ("a", "b"),
+    "dictionary": {}, "not a number": np.nan, "not numbers": np.full(12, np.nan),
+    "endless": np.full((4, 3), np.inf),
+    "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs,
+    "pair": ("a", "b"),
 }  # fmt: skip

@@ -1,4 +1,5 @@
-"""Judges that share no code with the package: MuJoCo's dynamics in our coordinates, finite differences, brute force.
+"""Judges that share no code with the package: MuJoCo's dynamics in our coordinates, finite
+differences, brute force.
 
 Lists of robots are collected from the package, so a robot that joins the catalogue joins the tests.
 """
@@ -37,8 +38,12 @@ def load(name: str) -> Robot:
 
 
 FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
-FLAT = tuple(name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet))
-every_robot = pytest.fixture(params=ROBOTS)(lambda request: request.param)  # `name = judges.every_robot` runs a file on each
+FLAT = tuple(
+    name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet)
+)
+every_robot = pytest.fixture(params=ROBOTS)(
+    lambda request: request.param
+)  # `name = judges.every_robot` runs a file on each
 every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: request.param)
 # one of each kind: point feet with enough torques and with too few, flat feet, bolted down
 KINDS = ("go2", "solo8", "talos", "ur5")
@@ -51,7 +56,9 @@ def states(name: str, n: int, spread: float = 0.3) -> list[State]:
 
 
 def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
-    """The contacts a robot stands on: flat feet by their corners, balls by their lowest points, none for a fixed base."""
+    """The contacts a robot stands on: flat feet by their corners, balls by their lowest points,
+    none for a fixed base.
+    """
     if not robot.feet:
         return fb.Contacts.none()
     flat = all(foot.is_flat for foot in robot.feet)
@@ -61,7 +68,9 @@ def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
 def controller_of(name: str, **options: object) -> fb.WholeBodyController:
     """A controller that keeps a robot standing on all its feet."""
     robot = load(name)
-    return fb.WholeBodyController(robot, stance(robot), fb.standing_tasks(robot.standing()), **options)
+    return fb.WholeBodyController(
+        robot, stance(robot), fb.standing_tasks(robot.standing()), **options
+    )
 
 
 def pair(
@@ -70,18 +79,25 @@ def pair(
     """The compiled and the reference controller of one problem; without tasks, of standing."""
     tasks = list(fb.standing_tasks(robot.standing())) if tasks is None else tasks
     compiled, reference = (
-        fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options) for backend in ("compiled", "reference")
+        fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options)
+        for backend in ("compiled", "reference")
     )
     return compiled, reference
 
 
 def near_and_far(name: str, n: int) -> list[State]:
-    """n states near standing, n farther and n far away, where friction and torque limits hold most of them."""
+    """n states near standing, n farther and n far away, where friction and torque limits hold most
+    of them.
+    """
     return [state for spread in (0.02, 0.1, 0.3) for state in states(name, n, spread)]
 
 
-def difference(one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0) -> float:
-    """Largest torque between two controllers, N·m; where there is no answer, both must say so with the same rows."""
+def difference(
+    one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0
+) -> float:
+    """Largest torque between two controllers, N·m; where there is no answer, both must say so with
+    the same rows.
+    """
     try:
         expected = other(state.q, state.v, t)
     except InfeasibleError as error:
@@ -90,7 +106,9 @@ def difference(one: fb.WholeBodyController, other: fb.WholeBodyController, state
         assert caught.value.constraints == error.constraints
         return 0.0
     found = one(state.q, state.v, t)
-    assert found.backend == one.backend, "the compiled tick left this state to the reference backend"
+    assert found.backend == one.backend, (
+        "the compiled tick left this state to the reference backend"
+    )
     return float(np.max(np.abs(found.tau - expected.tau)))
 
 
@@ -102,7 +120,9 @@ def agreement(robot: Robot) -> float:
 def at_rest(name: str, seed: int | None = None, feet: int | None = None) -> EquationsOfMotion:
     """A robot at rest on its first feet, or on all, standing or at random."""
     robot, contacts = load(name), stance(load(name))
-    state = robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
+    state = (
+        robot.standing() if seed is None else robot.random_state(seed).replace(v=np.zeros(robot.nv))
+    )
     return fb.equations_of_motion(state, contacts.only(*contacts.names[:feet]))
 
 
@@ -160,7 +180,9 @@ def quaternion_rotation(xyzw: npt.ArrayLike) -> Array:
 
 
 def turn_between(R_to: Array, R_from: Array) -> Array:
-    """The world rotation vector that turns R_from into R_to, for small turns: log(R_to R_fromᵀ) to third order."""
+    """The world rotation vector that turns R_from into R_to, for small turns: log(R_to R_fromᵀ) to
+    third order.
+    """
     R = R_to @ R_from.T
     sine = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return sine * (1.0 + float(sine @ sine) / 6.0)
@@ -181,7 +203,9 @@ class Mujoco:
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
         self.state = state
-        self.T = np.column_stack([self.convert.to_mujoco(state.q, e)[1] for e in np.eye(self.model.nv)])
+        self.T = np.column_stack(
+            [self.convert.to_mujoco(state.q, e)[1] for e in np.eye(self.model.nv)]
+        )
         return self
 
     @property
@@ -195,7 +219,9 @@ class Mujoco:
         # a base velocity constant in the base frame turns in the world: Ṫ v = R (ω × v)
         turning = np.zeros(self.model.nv)
         if self.robot.is_floating:
-            turning[:3] = quaternion_rotation(self.state.q[3:7]) @ np.cross(self.state.v[3:6], self.state.v[:3])
+            turning[:3] = quaternion_rotation(self.state.q[3:7]) @ np.cross(
+                self.state.v[3:6], self.state.v[:3]
+            )
         full = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, full)
         return self.T.T @ (self.data.qfrc_bias + full @ turning)
@@ -211,7 +237,14 @@ class Mujoco:
     def jacobian(self, frame: str, point: npt.ArrayLike) -> tuple[Array, Array]:
         """Linear and angular Jacobian, each (3, nv), of a world point carried by a frame's body."""
         linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        mujoco.mj_jac(self.model, self.data, linear, angular, np.asarray(point, dtype=np.float64), self.body(frame))
+        mujoco.mj_jac(
+            self.model,
+            self.data,
+            linear,
+            angular,
+            np.asarray(point, dtype=np.float64),
+            self.body(frame),
+        )
         return linear @ self.T, angular @ self.T
 
 
@@ -226,7 +259,9 @@ def along(state: State, direction: npt.ArrayLike, step: float) -> State:
     return state.replace(q=state.integrate(step * np.asarray(direction, dtype=np.float64)))
 
 
-def derivative(f: Callable[[State], Array], state: State, direction: npt.ArrayLike, step: float = 1e-5) -> Array:
+def derivative(
+    f: Callable[[State], Array], state: State, direction: npt.ArrayLike, step: float = 1e-5
+) -> Array:
     """d/dt f along a velocity direction, by central differences."""
     return (f(along(state, direction, step)) - f(along(state, direction, -step))) / (2.0 * step)
 
@@ -242,54 +277,79 @@ def drift_of(J: Callable[[State], Array], state: State) -> Array:
 
 
 def moved(state: State, qdd: Array, t: float) -> State:
-    """The configuration a short time t away (either way) when the robot accelerates with q̈: right to third order in t."""
+    """The configuration a short time t away (either way) when the robot accelerates with q̈: right
+    to third order in t.
+    """
     return state.replace(q=state.integrate(t * state.v + 0.5 * t * t * qdd))
 
 
-def acceleration_of(f: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4) -> Array:
+def acceleration_of(
+    f: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4
+) -> Array:
     """d²/dt² f under the acceleration q̈, by central differences."""
     return (f(moved(state, qdd, step)) - 2.0 * f(state) + f(moved(state, qdd, -step))) / step**2
 
 
-def turning_acceleration_of(R: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4) -> Array:
-    """The angular acceleration in the world of a rotation matrix under q̈, by differences of small turns."""
+def turning_acceleration_of(
+    R: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4
+) -> Array:
+    """The angular acceleration in the world of a rotation matrix under q̈, by differences of small
+    turns.
+    """
     before, now, after = R(moved(state, qdd, -step)), R(state), R(moved(state, qdd, step))
     return (turn_between(after, now) - turn_between(now, before)) / step**2
 
 
 def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
-    """q̈ by Pinocchio's articulated-body algorithm, with contact forces as wrenches on the links that carry the points."""
+    """q̈ by Pinocchio's articulated-body algorithm, with contact forces as wrenches on the links
+    that carry the points.
+    """
     state, robot = eom.state, eom.robot
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, state.q)
     wrenches = [pin.Force.Zero() for _ in range(model.njoints)]
     owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
-    for frame, point, force in zip(owners, eom.contacts.positions(state), np.reshape(forces, (-1, 3)), strict=True):
+    for frame, point, force in zip(
+        owners, eom.contacts.positions(state), np.reshape(forces, (-1, 3)), strict=True
+    ):
         joint = model.frames[model.getFrameId(frame)].parentJoint
         wrenches[joint] += data.oMi[joint].actInv(pin.Force(force, np.cross(point, force)))
     return np.asarray(pin.aba(model, data, state.q, state.v, robot.S @ tau, wrenches))
 
 
 def constrained(eom: EquationsOfMotion, tau: Array, b: Array | None = None) -> tuple[Array, Array]:
-    """q̈ and the smallest λ of (7) for given τ by least squares of the whole system: no ζ, no η. b: of (5), eom.b by default."""
+    """q̈ and the smallest λ of (7) for given τ by least squares of the whole system: no ζ, no η. b:
+    of (5), eom.b by default.
+    """
     kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-    x = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b if b is None else b]), rcond=1e-11)[0]
+    x = np.linalg.lstsq(
+        kkt, np.concatenate([eom.S @ tau - eom.h, eom.b if b is None else b]), rcond=1e-11
+    )[0]
     return x[: eom.nv], x[eom.nv :]
 
 
 def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:
     """Largest difference, relative to the largest expected entry."""
     found, expected = np.asarray(found, dtype=np.float64), np.asarray(expected, dtype=np.float64)
-    return float(np.max(np.abs(found - expected), initial=0.0) / max(float(np.max(np.abs(expected), initial=0.0)), 1e-12))
+    return float(
+        np.max(np.abs(found - expected), initial=0.0)
+        / max(float(np.max(np.abs(expected), initial=0.0)), 1e-12)
+    )
 
 
 def is_feasible(qp: QP, rows: list[int]) -> bool:
-    """Whether a point satisfies the equalities and these inequality rows, by a linear program on the whole problem."""
-    found = linprog(np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs")
+    """Whether a point satisfies the equalities and these inequality rows, by a linear program on
+    the whole problem.
+    """
+    found = linprog(
+        np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs"
+    )
     return bool(found.status == 0)
 
 
 def is_smallest_conflict(qp: QP, names: Iterable[str]) -> bool:
     """Whether these inequality rows are impossible together, and possible without any one of them."""
     rows = [qp.inequality_names.index(name) for name in names]
-    return not is_feasible(qp, rows) and all(is_feasible(qp, [i for i in rows if i != row]) for row in rows)
+    return not is_feasible(qp, rows) and all(
+        is_feasible(qp, [i for i in rows if i != row]) for row in rows
+    )

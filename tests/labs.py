@@ -13,11 +13,16 @@ from typing import Any
 from browsers import SCREENSHOTS
 
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
-WINDOW: dict[str, Any] = {"viewport": {"width": 1100, "height": 800}, "device_scale_factor": 0.5}  # a processor draws it
+WINDOW: dict[str, Any] = {
+    "viewport": {"width": 1100, "height": 800},
+    "device_scale_factor": 0.5,
+}  # a processor draws it
 LONG = 90.0  # s that a busy machine may take for anything; nothing is taken for absent earlier
 
 NOTEBOOK = "jupyterapp.shell.currentWidget"
-KERNEL_CONNECTED = f"() => {NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
+KERNEL_CONNECTED = (
+    f"() => {NOTEBOOK}?.sessionContext?.session?.kernel?.connectionStatus === 'connected'"
+)
 KERNEL = f"{NOTEBOOK}.sessionContext.session.kernel"
 # longer than anything here waits
 WORK = f"""() => {{
@@ -27,8 +32,12 @@ WORK = f"""() => {{
 CELLS = f"{NOTEBOOK}.content.widgets.map(w => w.model).filter(m => m.type === 'code')"
 FIRST_RAN = f"() => {CELLS}[0].executionCount !== null"
 ALL_RAN = f"() => {CELLS}.every(m => m.executionCount !== null && m.executionState !== 'running')"
-ERRORS = f"() => {CELLS}.flatMap(m => m.outputs.toJSON()).filter(o => o.output_type === 'error').map(o => o.evalue)"
-# marks every slider with the number of its cell and its own, and every such cell; the names of the sliders, cell by cell
+ERRORS = (
+    f"() => {CELLS}.flatMap(m => m.outputs.toJSON()).filter(o => o.output_type === "
+    f"'error').map(o => o.evalue)"
+)
+# marks every slider with the number of its cell and its own, and every such cell; the names of the
+# sliders, cell by cell
 SLIDERS = f"""() => {{
   const found = {{}};
   {NOTEBOOK}.content.widgets.forEach((cell, i) => cell.node.querySelectorAll(".widget-slider").forEach((slider, j) => {{
@@ -85,7 +94,9 @@ def lesson_opened(page: Any) -> None:
 
 
 def run_all(page: Any) -> None:
-    """Run all cells; a kernel that is still starting drops the wish, so it is said again until the first cell ran."""
+    """Run all cells; a kernel that is still starting drops the wish, so it is said again until the
+    first cell ran.
+    """
     for _ in range(6):
         page.evaluate("() => { window.jupyterapp.commands.execute('notebook:run-all-cells'); }")
         for _ in range(30):
@@ -102,20 +113,29 @@ def ran_without_error(page: Any) -> None:
 
 
 def answers_to_sliders(page: Any, name: str, most: int | None = None) -> set[str]:
-    """Move the sliders of a lesson: each must change its picture or what its panel says, and each picture must move.
+    """Move the sliders of a lesson: each must change its picture or what its panel says, and each
+    picture must move.
 
     most: how many sliders of each panel to move, from the first on; None for all.
     Returns what moved in the pictures, such as "robot", "ghost" and "planned".
     """
     panels, moved = page.evaluate(SLIDERS), set[str]()
     assert panels
-    idle = {slider for cell, sliders in panels.items() for slider in _idle_sliders(page, name, cell, sliders[:most], moved)}
+    idle = {
+        slider
+        for cell, sliders in panels.items()
+        for slider in _idle_sliders(page, name, cell, sliders[:most], moved)
+    }
     assert not idle, f"{name}: these sliders change nothing: {sorted(idle)}"
     return moved
 
 
-def _idle_sliders(page: Any, name: str, number: str, sliders: list[str], moved: set[str]) -> list[str]:
-    """Names of the sliders of a cell that change neither its picture nor what it says; what moves is added to `moved`."""
+def _idle_sliders(
+    page: Any, name: str, number: str, sliders: list[str], moved: set[str]
+) -> list[str]:
+    """Names of the sliders of a cell that change neither its picture nor what it says; what moves
+    is added to `moved`.
+    """
     cell = page.locator(f'[data-cell="{number}"]')
     page.evaluate(f"(number) => {NOTEBOOK}.content.scrollToItem(number, 'smart')", int(number))
     frame = picture_in(cell)
@@ -127,7 +147,9 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str], moved: 
         _move(page, page.locator(f'[data-slider="{number}-{i}"]'))
         after = once_new(lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)), before)
         idle += [slider] if after == before else []
-    end = once_new(lambda: frame.evaluate(SCENE), start)  # what the panel says may be there before the picture
+    end = once_new(
+        lambda: frame.evaluate(SCENE), start
+    )  # what the panel says may be there before the picture
     cell.locator("iframe").first.evaluate("(frame) => frame.scrollIntoView()")
     screenshot(page, f"{name.split('_')[0]}_panel_{number}")
     assert end != start, f"{name}, cell {number}: no slider moves the picture"
@@ -138,7 +160,9 @@ def _idle_sliders(page: Any, name: str, number: str, sliders: list[str], moved: 
 def _changed(before: str, after: str) -> set[str]:
     """The parts of the picture that are not where they were."""
     lines = set(before.splitlines()) ^ set(after.splitlines())
-    return {found.group(1) for line in lines if (found := re.match(r"[^ ]*/meshcat/([^/ ]+)", line))}
+    return {
+        found.group(1) for line in lines if (found := re.match(r"[^ ]*/meshcat/([^/ ]+)", line))
+    }
 
 
 def picture_in(cell: Any) -> Any:
@@ -169,7 +193,9 @@ def push_until_it_falls(page: Any, panel: Any, name: str) -> None:
     page.keyboard.press("End")
     fallen, until = f"({HEIGHT})() < {0.6 * standing}", time.monotonic() + LONG
     while not frame.evaluate(fallen):
-        assert time.monotonic() < until, f"it does not fall: {frame.evaluate(HEIGHT)} m, {panel.inner_text()}"
+        assert time.monotonic() < until, (
+            f"it does not fall: {frame.evaluate(HEIGHT)} m, {panel.inner_text()}"
+        )
         with suppress(Error):  # it stood that push
             frame.wait_for_function(fallen, timeout=8000)
             break

@@ -1,4 +1,6 @@
-"""Checks of errors and warnings: of their type, and of the names and numbers in their message, not of its sentences."""
+"""Checks of errors and warnings: of their type, and of the names and numbers in their message, not
+of its sentences.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,12 @@ NUMBER = re.compile(r"(?<![\w.])-?(?:\d+\.?\d*(?:e[-+]?\d+)?|nan\b|inf\b)(?!\w)"
 
 
 @contextmanager
-def raises(kind: type[BaseException], *wanted: str | float) -> Iterator[pytest.ExceptionInfo[BaseException]]:
-    """Check that an error of exactly this type is raised, and that its message has these names and numbers."""
+def raises(
+    kind: type[BaseException], *wanted: str | float
+) -> Iterator[pytest.ExceptionInfo[BaseException]]:
+    """Check that an error of exactly this type is raised, and that its message has these names and
+    numbers.
+    """
     with pytest.raises(kind) as caught:
         yield caught
     assert caught.type is kind, f"a {caught.type.__name__}, not a {kind.__name__}: {caught.value}"
@@ -30,18 +36,24 @@ def warns(kind: type[Warning], *wanted: str | float) -> Iterator[None]:
 
 
 def refused(call: Callable[[], object], kind: type[BaseException], *wanted: str | float) -> None:
-    """Check that a call raises an error of exactly this type, with these names and numbers in its message."""
+    """Check that a call raises an error of exactly this type, with these names and numbers in its
+    message.
+    """
     with raises(kind, *wanted):
         call()
 
 
 def missing(message: str, *wanted: str | float) -> list[str | float]:
-    """Of these words and numbers, those that are not in the message: a word is there as a whole, a number by its value."""
+    """Of these words and numbers, those that are not in the message: a word is there as a whole, a
+    number by its value.
+    """
     numbers = {str(float(number)) for number in NUMBER.findall(message)}
     return [
         each
         for each in wanted
         if not (
-            re.search(rf"(?<!\w){re.escape(each)}(?!\w)", message) if isinstance(each, str) else str(float(each)) in numbers
+            re.search(rf"(?<!\w){re.escape(each)}(?!\w)", message)
+            if isinstance(each, str)
+            else str(float(each)) in numbers
         )
     ]

@@ -13,7 +13,9 @@ _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
 
 def assert_every_slider_answers(panel: SliderPanel) -> None:
-    """Moved to its ends and its middle, each slider changes the picture or the note; one of them the picture, if any."""
+    """Moved to its ends and its middle, each slider changes the picture or the note; one of them
+    the picture, if any.
+    """
     moves = []
     for name, slider in panel.sliders.items():
         first, seen = slider.value, []
@@ -23,24 +25,37 @@ def assert_every_slider_answers(panel: SliderPanel) -> None:
         slider.value = first
         assert any(other != seen[0] for other in seen), f"the slider {name} changes nothing"
         moves += [any(picture != seen[0][0] for picture, _ in seen)]
-    assert any(moves) or panel.view is None, f"none of the sliders {list(panel.sliders)} changes the picture"
+    assert any(moves) or panel.view is None, (
+        f"none of the sliders {list(panel.sliders)} changes the picture"
+    )
 
 
 def assert_every_slider_has_samples(panel: SliderPanel) -> None:
-    """A site has samples of each slider, from end to end through where it begins, few enough to be computed."""
+    """A site has samples of each slider, from end to end through where it begins, few enough to be
+    computed.
+    """
     found = slider_samples.panel_samples(panel)
     for name, slider in panel.sliders.items():
-        assert {slider.min, slider.value, slider.max} <= set(found[name]), f"the samples of {name} are {found[name]}"
+        assert {slider.min, slider.value, slider.max} <= set(found[name]), (
+            f"the samples of {name} are {found[name]}"
+        )
         assert 5 <= len(found[name]) <= 25, f"{len(found[name])} samples of {name}"
-    where, together = slider_samples.combinations([len(values) for values in found.values()], [0] * len(found))
+    where, together = slider_samples.combinations(
+        [len(values) for values in found.values()], [0] * len(found)
+    )
     assert len(where) <= slider_samples.MAX_COMBINATIONS and (together or len(found) > 2)
 
 
 def moved_sliders(notebook: Any) -> str:
-    """The source of a cell that asks this of all panels of a notebook, after it ran, and raises where one does not."""
+    """The source of a cell that asks this of all panels of a notebook, after it ran, and raises
+    where one does not.
+    """
     code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
     count = sum(len(_MADE.findall(source)) for source in code)
-    return f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\nimport panels\npanels.judge_all({count})"
+    return (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\nimport panels\n"
+        f"panels.judge_all({count})"
+    )
 
 
 def judge_all(count: int) -> None:

@@ -28,7 +28,9 @@ def quadratic(rng: np.random.Generator, n: int) -> fb.Quadratic:
 
 
 @given(seeds, sizes, sizes, sizes, sizes)
-def test_composition_is_one_map_after_the_other_and_associative(seed: int, a: int, b: int, c: int, d: int) -> None:
+def test_composition_is_one_map_after_the_other_and_associative(
+    seed: int, a: int, b: int, c: int, d: int
+) -> None:
     rng = np.random.default_rng(seed)
     f, g, h, x = affine(rng, a, b), affine(rng, b, c), affine(rng, c, d), rng.normal(size=d)
     assert np.allclose((f @ g @ h)(x), f(g(h(x))))
@@ -38,7 +40,9 @@ def test_composition_is_one_map_after_the_other_and_associative(seed: int, a: in
 
 
 @given(seeds, sizes, sizes)
-def test_the_identity_changes_nothing_and_a_constant_forgets_its_input(seed: int, m: int, n: int) -> None:
+def test_the_identity_changes_nothing_and_a_constant_forgets_its_input(
+    seed: int, m: int, n: int
+) -> None:
     rng = np.random.default_rng(seed)
     f, x = affine(rng, m, n), rng.normal(size=n)
     assert np.allclose((fb.Affine.identity(m) @ f)(x), f(x))
@@ -71,7 +75,9 @@ def test_any_real_number_scales_maps_and_costs(scale: float) -> None:
 
 
 @given(seeds, sizes, sizes, sizes)
-def test_stacked_maps_keep_their_blocks_under_composition_and_sums(seed: int, a: int, b: int, n: int) -> None:
+def test_stacked_maps_keep_their_blocks_under_composition_and_sums(
+    seed: int, a: int, b: int, n: int
+) -> None:
     rng = np.random.default_rng(seed)
     f, g, inner = affine(rng, a, n), affine(rng, b, n), affine(rng, n, 2)
     both, x, y = fb.Affine.stack(tau=f, forces=g), rng.normal(size=n), rng.normal(size=2)
@@ -128,12 +134,16 @@ def test_no_point_costs_less_than_the_minimiser(seed: int, n: int) -> None:
 def test_among_many_minimisers_the_smallest_is_given(seed: int, m: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     A, r = rng.normal(size=(m, n)), rng.normal(size=m)
-    assert np.allclose(fb.Quadratic.from_residual(A, r).minimiser(), np.linalg.lstsq(A, r)[0], atol=1e-6)
+    assert np.allclose(
+        fb.Quadratic.from_residual(A, r).minimiser(), np.linalg.lstsq(A, r)[0], atol=1e-6
+    )
 
 
 @pytest.mark.parametrize(("curvature", "counts"), [(1e-10, True), (1e-13, False)])
 def test_what_counts_as_curvature_is_decided_in_one_place(curvature: float, counts: bool) -> None:
-    """A direction with a 1e-12th of the largest curvature or less is flat, for the minimiser and for a partial one."""
+    """A direction with a 1e-12th of the largest curvature or less is flat, for the minimiser and
+    for a partial one.
+    """
     cost = fb.Quadratic(np.diag([1.0, curvature]), np.array([0.0, -curvature]))
     over = cost.argmin_over(np.array([[0.0], [1.0]]))
     assert np.allclose(cost.minimiser(), [0.0, float(counts)])
@@ -224,7 +234,14 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
         (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), InputError, 3, 2),
         (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), InputError, 2, 3),
         (lambda: fb.Affine.identity(2) + np.ones(1), InputError, 1, 2),
-        (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), InputError, "a", 2, "b", 3),
+        (
+            lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)),
+            InputError,
+            "a",
+            2,
+            "b",
+            3,
+        ),
         (lambda: fb.Affine.stack(), InputError),
         (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], InputError, "toe", "tau"),
         (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), InputError, "H", 2, 3),

@@ -1,8 +1,10 @@
-"""Every public function, constructor and method of the packages, called with wrong arguments, one at a time.
+"""Every public function, constructor and method of the packages, called with wrong arguments, one
+at a time.
 
-Only an error of the package is right: not another exception, a warning, or an argument of a wrong kind that nobody noticed.
-What is new in a package is in here by itself; right arguments come from `values`, by annotation and by name. What each kind of
-check refuses is tested once, with all of `WRONG`.
+Only an error of the package is right: not another exception, a warning, or an argument of a wrong
+kind that nobody noticed. What is new in a package is in here by itself; right arguments come from
+`values`, by annotation and by name. What each kind of check refuses is tested once, with all of
+`WRONG`.
 """
 
 from __future__ import annotations
@@ -35,10 +37,15 @@ from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
 
 PACKAGES = (
-    "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp", "robots", "simulation",
+    "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp",
+    "robots", "simulation",
     "viewer",
 )  # fmt: skip
-MODULES = (run_plots, qp_plots, recording)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
+MODULES = (
+    run_plots,
+    qp_plots,
+    recording,
+)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 ZERO = np.zeros(12)
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
 FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
@@ -47,12 +54,16 @@ ACCEPTED = {"about(x=NaN)", "Problem(robot=of another robot)", "Problem(contacts
 
 # for every kind of check
 WRONG: dict[str, Any] = {
-    **FEW, "None": None, "inf": np.inf, "x": "x", "1": "1", "bytes": b"1", "empty": [], "deep": np.zeros((2, 2, 2, 2)),
-    "objects": np.array([None, 1.0, "x"], dtype=object), "complex": 1.0 + 2.0j, "True": True, "-1": -1.0, "0": 0,
+    **FEW, "None": None, "inf": np.inf, "x": "x", "1": "1", "bytes": b"1", "empty": [],
+    "deep": np.zeros((2, 2, 2, 2)),
+    "objects": np.array([None, 1.0, "x"], dtype=object), "complex": 1.0 + 2.0j, "True": True,
+    "-1": -1.0, "0": 0,
     "1e300": 1e300, "1e308": 1e308, "10**400": 10**400, "10**7": 10**7,
     "date": datetime(2020, 1, 1), "dict": {"a": 1.0}, "class": fb.State,
-    "generator": (entry for entry in (1.0, 2.0, 3.0)), "complex array": UP + 0.5j, "masked array": np.ma.masked_less(UP, 1.0),
-    "texts": UP.astype(str), "truths": UP > 0.0, "NaN inside": UP * np.nan, "one too many": np.ones(4), "column": UP[:, None],
+    "generator": (entry for entry in (1.0, 2.0, 3.0)), "complex array": UP + 0.5j,
+    "masked array": np.ma.masked_less(UP, 1.0),
+    "texts": UP.astype(str), "truths": UP > 0.0, "NaN inside": UP * np.nan,
+    "one too many": np.ones(4), "column": UP[:, None],
 }  # fmt: skip
 # a call for each kind of check, and what it takes
 CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
@@ -67,7 +78,10 @@ CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
     "matrix": (lambda x: fb.Quadratic(x, UP), set()),
     "direction": (lambda x: FrictionCone(x, 0.7), set()),
     "forces": (lambda x: values()["Contacts"].force_of(x, "FL_foot"), set()),
-    "function": (lambda x: LiveSimulation(fb.Simulation(judges.load("go2")), controller(), x), set()),
+    "function": (
+        lambda x: LiveSimulation(fb.Simulation(judges.load("go2")), controller(), x),
+        set(),
+    ),
     "value": (lambda x: fb.State(x, values()["State"].q), set()),
 }
 
@@ -82,7 +96,9 @@ def test_each_kind_of_check_refuses_what_is_no_such_thing(check: str) -> None:
 
 @cache
 def right() -> dict[str, Any]:
-    """Right arguments, by annotation or by name, and what methods are called of, by the names of their classes."""
+    """Right arguments, by annotation or by name, and what methods are called of, by the names of
+    their classes.
+    """
     robot, state, contacts = values()["Robot"], values()["State"], values()["Contacts"]
     talos, oil, space = judges.load("talos"), HydraulicActuators(robot), values()["FeasibleSpace"]
     sim, gait = fb.Simulation(robot), Gait.trot(robot, start=0.0)
@@ -91,41 +107,63 @@ def right() -> dict[str, Any]:
     view, qp = fb.Viewer(robot), values()["QP"]
     forces = 30.0 * np.tile(UP, 4)
     return values() | {
-        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view, "WholeBodyController":
+        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view,
+        "WholeBodyController":
         controller(),
-        "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None), "HydraulicActuators": oil,
+        "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None),
+        "HydraulicActuators": oil,
         "Cylinders": oil.cylinders,
-        "AnalyticController": AnalyticController(robot, contacts, state), "Delay": Delay(robot, 0.01), "Walk": walk,
-        "FirstOrderLag": FirstOrderLag(robot, 10.0), "Stand": Stand(robot, fb.Contacts.feet(robot)), "Gait": gait,
-        "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}), "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
-        "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(), "StepPlan": walk.history[0],
-        "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None, "Array": UP,
+        "AnalyticController": AnalyticController(robot, contacts, state),
+        "Delay": Delay(robot, 0.01), "Walk": walk,
+        "FirstOrderLag": FirstOrderLag(robot, 10.0), "Stand": Stand(robot, fb.Contacts.feet(robot)),
+        "Gait": gait,
+        "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}),
+        "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
+        "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(),
+        "StepPlan": walk.history[0],
+        "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
+        "Array": UP,
         "npt.ArrayLike": UP, "Target": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
-        "Sequence[Task]": controller().tasks, "Sequence[Contact]": tuple(contacts), "Sequence[str]": ["a", "b"],
+        "Sequence[Task]": controller().tasks, "Sequence[Contact]": tuple(contacts),
+        "Sequence[str]": ["a", "b"],
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
-        "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO, "x": ZERO, "r": ZERO,
-        "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:], "v_joints": ZERO,
-        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q, "v": state.v, "dv":
+        "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO,
+        "x": ZERO, "r": ZERO,
+        "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:],
+        "v_joints": ZERO,
+        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
+        "v": state.v, "dv":
         np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
         "points": contacts.positions(state), "max_normal_force": np.full(4, 200.0), "a": 10.0,
-        "torque_limits": np.full(12, 20.0), "corners": talos.feet[0].corners, "flat_feet.robot": talos,
-        "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"), "force": np.array([0.1, 0.0, 1.0]),
+        "torque_limits": np.full(12, 20.0), "corners": talos.feet[0].corners,
+        "flat_feet.robot": talos,
+        "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"),
+        "force": np.array([0.1, 0.0, 1.0]),
         "cost": fb.Quadratic.zero(space.dimension), "cost_on_qdd": fb.Quadratic.zero(18),
-        "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO), "parts": fb.Affine(np.eye(12), ZERO),
-        "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind, "qp_plots.feasible_polygon.qp": table_top(),
-        "qp_plots.plot.qp": table_top(), "block": "tau", "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
-        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2), "neutral_point.velocity": np.zeros(2), "dcm_error":
+        "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO),
+        "parts": fb.Affine(np.eye(12), ZERO),
+        "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind,
+        "qp_plots.feasible_polygon.qp": table_top(),
+        "qp_plots.plot.qp": table_top(), "block": "tau",
+        "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
+        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2),
+        "neutral_point.velocity": np.zeros(2), "dcm_error":
         np.zeros(2),
-        "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)), "time": (0.0, 0.1),
+        "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)),
+        "time": (0.0, 0.1),
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
-        "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3, "alpha": 0.1, "rate": 30.0,
+        "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3,
+        "alpha": 0.1, "rate": 30.0,
         "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
-        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP, "LinearInequality.coefficients":
+        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP,
+        "LinearInequality.coefficients":
         (np.eye(18), np.ones(18)),
-        "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2", "solver": "daqp",
-        "column": "force", "status": "inside", "root": "/robot", "lesson": "07", "path": "floatbase-view.html",
+        "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",
+        "solver": "daqp",
+        "column": "force", "status": "inside", "root": "/robot", "lesson": "07",
+        "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
     }  # fmt: skip
 
@@ -143,14 +181,18 @@ LEFT_OUT = {
     "packages call these among themselves, with what they have checked": (
         "Simulation.advance", "PerturbedSimulation.advance",
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
-        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian", "raibert_foothold",
+        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
+        "raibert_foothold",
         "target_shapes", "targets_at",
         "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
-        "LinearInequality.labels", "LinearInequality.at", "Limits.check_names", "Limits.normal_forces",
+        "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
+        "Limits.normal_forces",
         "Limits.bounded_points", "Problem.check",
-        "recording.swing_feet_at", "Cylinders.force", "Cylinders.line_pressures", "Cylinders.orifice_flow",
+        "recording.swing_feet_at", "Cylinders.force", "Cylinders.line_pressures",
+        "Cylinders.orifice_flow",
         "Cylinders.valve_flows",
-        "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates", "Cylinders.pressure_decay",
+        "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates",
+        "Cylinders.pressure_decay",
         "Cylinders.opening_for",
         "recording.as_rollout", "Ground.clearances", "with_thumbnail", "receive_during_cells",
     ),
@@ -188,7 +230,9 @@ def callees() -> Iterator[Callee]:
         found = [(name, getattr(home, name)) for name in home.__all__]
         if package == "viewer":
             found += [
-                (f"{module.__name__.split('.')[-1]}.{name}", value) for module in MODULES for name, value in made_in(module)
+                (f"{module.__name__.split('.')[-1]}.{name}", value)
+                for module in MODULES
+                for name, value in made_in(module)
             ]
         for name, value in found:
             if id(value) in seen or name in ALONE:
@@ -196,25 +240,39 @@ def callees() -> Iterator[Callee]:
             seen.add(id(value))
             if inspect.isfunction(value):
                 yield Callee(package or "floatbase", name, value, parameters_of(value))
-            elif inspect.isclass(value) and not issubclass(value, Exception) and not getattr(value, "_is_protocol", False):
+            elif (
+                inspect.isclass(value)
+                and not issubclass(value, Exception)
+                and not getattr(value, "_is_protocol", False)
+            ):
                 if name not in RESULTS.split():
                     yield Callee(package or "floatbase", name, value, parameters_of(value))
                 yield from methods_of(package or "floatbase", name, value)
 
 
 def made_in(module: Any) -> list[tuple[str, Any]]:
-    mine = inspect.getmembers(module, lambda value: getattr(value, "__module__", "") == module.__name__)
+    mine = inspect.getmembers(
+        module, lambda value: getattr(value, "__module__", "") == module.__name__
+    )
     return [(name, value) for name, value in mine if not name.startswith("_") and callable(value)]
 
 
 def methods_of(package: str, name: str, kind: type) -> Iterator[Callee]:
     for method, value in inspect.getmembers(kind, inspect.isfunction):
-        if (not method.startswith("_") or method in ("__call__", "__getitem__")) and f"{name}.{method}" not in ALONE:
+        if (
+            not method.startswith("_") or method in ("__call__", "__getitem__")
+        ) and f"{name}.{method}" not in ALONE:
             if isinstance(inspect.getattr_static(kind, method), staticmethod):
                 yield Callee(package, f"{name}.{method}", value, parameters_of(value))
             else:
                 one = right().get(name)
-                yield Callee(package, f"{name}.{method}", partial(value, one), parameters_of(value)[1:], (one,))
+                yield Callee(
+                    package,
+                    f"{name}.{method}",
+                    partial(value, one),
+                    parameters_of(value)[1:],
+                    (one,),
+                )
 
 
 def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
@@ -223,10 +281,19 @@ def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
 
 
 def found_for(callee: Callee, parameter: inspect.Parameter) -> Any:
-    """The right argument for a parameter: under callee and parameter, the parameter's name, or its annotation."""
+    """The right argument for a parameter: under callee and parameter, the parameter's name, or its
+    annotation.
+    """
     first, *_, last = callee.name.split(".") * 2
     name, kind = parameter.name, str(parameter.annotation).split(" | ")[0]
-    keys = (f"{callee.name}.{name}", f"{last}.{name}", f"{first}.{name}", name, kind, kind.split("[")[0])
+    keys = (
+        f"{callee.name}.{name}",
+        f"{last}.{name}",
+        f"{first}.{name}",
+        name,
+        kind,
+        kind.split("[")[0],
+    )
     return next((right()[key] for key in keys if key in right()), ...)
 
 
@@ -240,30 +307,47 @@ def others() -> dict[str, Any]:
     """Things of another robot."""
     robot = judges.load("solo12")
     state, contacts = robot.standing(), judges.stance(robot)
-    return {"Robot": robot, "State": state, "Contacts": contacts, "EquationsOfMotion": fb.equations_of_motion(state, contacts)}
+    return {
+        "Robot": robot,
+        "State": state,
+        "Contacts": contacts,
+        "EquationsOfMotion": fb.equations_of_motion(state, contacts),
+    }
 
 
 def of_a_robot(value: Any) -> bool:
     """Whether a value belongs to one robot, and to no other."""
-    return isinstance(value, fb.Robot | fb.Contacts) or isinstance(getattr(value, "robot", None), fb.Robot)
+    return isinstance(value, fb.Robot | fb.Contacts) or isinstance(
+        getattr(value, "robot", None), fb.Robot
+    )
 
 
 def wrongs(callee: Callee, name: str) -> dict[str, Any]:
     """Wrong arguments for a parameter."""
     rights = rights_of(callee)
     kind = type(rights.pop(name, None)).__name__
-    alone = not any(map(of_a_robot, (*callee.self, *rights.values())))  # then another robot's is as good as any
+    alone = not any(
+        map(of_a_robot, (*callee.self, *rights.values()))
+    )  # then another robot's is as good as any
     if alone or kind not in others():
         return FEW
-    return {label: wrong for label, wrong in FEW.items() if label != "ragged"} | {"of another robot": others()[kind]}
+    return {label: wrong for label, wrong in FEW.items() if label != "ragged"} | {
+        "of another robot": others()[kind]
+    }
 
 
 def called(callee: Callee, arguments: dict[str, Any]) -> Any:
     right()["Simulation"].reset()
-    by_name = {p.name for p in callee.parameters if p.kind is p.KEYWORD_ONLY or p.default is not p.empty}
+    by_name = {
+        p.name for p in callee.parameters if p.kind is p.KEYWORD_ONLY or p.default is not p.empty
+    }
     starred = [p.name for p in callee.parameters if p.kind is p.VAR_KEYWORD]
-    positional = [value for name, value in arguments.items() if name not in by_name and name not in starred]
-    keyword = {name: value for name, value in arguments.items() if name in by_name or name in starred}
+    positional = [
+        value for name, value in arguments.items() if name not in by_name and name not in starred
+    ]
+    keyword = {
+        name: value for name, value in arguments.items() if name in by_name or name in starred
+    }
     return callee.call(*positional, **keyword)
 
 
@@ -281,12 +365,23 @@ def answer(call: Callable[[], object]) -> str | None:
 
 
 @pytest.mark.parametrize("package", [package or "floatbase" for package in PACKAGES])
-def test_wrong_arguments_are_told(package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_arguments_are_told(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     here = [callee for callee in callees() if callee.package == package]
-    missing = [f"{callee.name}: {name}" for callee in here for name, value in rights_of(callee).items() if value is ...]
+    missing = [
+        f"{callee.name}: {name}"
+        for callee in here
+        for name, value in rights_of(callee).items()
+        if value is ...
+    ]
     assert missing == [], "`right` needs an argument for each of these"
-    refused = {c.name: found for c in here if (found := answer(partial(called, c, rights_of(c)))) != "accepted"}
+    refused = {
+        c.name: found
+        for c in here
+        if (found := answer(partial(called, c, rights_of(c)))) != "accepted"
+    }
     assert refused == {}, "`right` needs other arguments for these"
     faults = {
         f"{callee.name}({p.name}={label})": found

@@ -1,4 +1,6 @@
-"""`jupyter nbconvert --to html` of a lesson that was run: every picture is there, without any other host."""
+"""`jupyter nbconvert --to html` of a lesson that was run: every picture is there, without any other
+host.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from browsers import browser_of_a_file, needs_chromium
 from floatbase.lessons.publish import NOTEBOOKS
 
 NAME = "03_feasible_space"
-# as README says: nbconvert stores the widgets' state, and a page that has it loads their code from another host
+# as README says: nbconvert stores the widgets' state, and a page that has it loads their code from
+# another host
 WITHOUT_STATE = "--ClearMetadataPreprocessor.enabled=True"
 WIDTHS = "() => [...document.images].map((image) => image.complete ? image.naturalWidth : 0)"
 

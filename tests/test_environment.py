@@ -14,20 +14,42 @@ IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
 def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
-    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(tmp_path), str(ROOT)]
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        str(tmp_path),
+        str(ROOT),
+    ]
     subprocess.run(pip, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("floatbase-*.whl")
     packed = set(zipfile.ZipFile(wheel).namelist())
-    meshes = {f"floatbase/_assets/meshes/{path.name}" for path in (ROOT / "assets" / "meshes").glob("*.npz")}
+    meshes = {
+        f"floatbase/_assets/meshes/{path.name}"
+        for path in (ROOT / "assets" / "meshes").glob("*.npz")
+    }
     assert meshes
     assert meshes | {"floatbase/__init__.py", "floatbase/_assets/LICENSES.md"} <= packed
-    assert {name.split("/")[0] for name in packed} == {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
+    assert {name.split("/")[0] for name in packed} == {
+        "floatbase",
+        wheel.name.rsplit("-", 3)[0] + ".dist-info",
+    }
 
 
 def test_importing_floatbase_is_light_and_quick() -> None:
-    code = "import json, sys, time; start = time.process_time(); import floatbase; took = time.process_time() - start; "
+    code = (
+        "import json, sys, time; start = time.process_time(); import floatbase; took = "
+        "time.process_time() - start; "
+    )
     code += "print(json.dumps([took, list(sys.modules)]))"
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     took, loaded = json.loads(answer.stdout)
     assert not set(HEAVY) & set(loaded)
     assert took < IMPORT_LIMIT, f"{took:.2f} s"

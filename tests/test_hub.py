@@ -1,8 +1,10 @@
-"""A class's JupyterHub in a real browser: two students at once, each with an own live picture, and nothing of the other's.
+"""A class's JupyterHub in a real browser: two students at once, each with an own live picture, and
+nothing of the other's.
 
-The hub is configured by the file that the course has for teachers, .binder/jupyterhub_config.py; only its accounts are those of
-a test. A student's browser reaches the hub's address and nothing else. All servers run as one user of this machine, so what
-keeps students from each other here is the hub; on a class's machine their accounts do, too.
+The hub is configured by the file that the course has for teachers, .binder/jupyterhub_config.py;
+only its accounts are those of a test. A student's browser reaches the hub's address and nothing
+else. All servers run as one user of this machine, so what keeps students from each other here is
+the hub; on a class's machine their accounts do, too.
 """
 
 from __future__ import annotations
@@ -45,7 +47,9 @@ from floatbase.lessons.publish import NOTEBOOKS
 CONFIGURATION = NOTEBOOKS.parent / ".binder" / "jupyterhub_config.py"
 PROXY = os.environ.get("CONFIGURABLE_HTTP_PROXY") or shutil.which("configurable-http-proxy")
 STUDENTS = ("ada", "bob")
-STANDS = 1e-3  # m: a robot that nobody pushes sways by less, one that falls goes down by 0.1 m and more
+STANDS = (
+    1e-3  # m: a robot that nobody pushes sways by less, one that falls goes down by 0.1 m and more
+)
 START, SPACE = "00_start_here", "03_feasible_space"
 
 pytestmark = [
@@ -53,7 +57,8 @@ pytestmark = [
     needs_chromium,
     pytest.mark.skipif(
         PROXY is None,
-        reason="no configurable-http-proxy on the path or in CONFIGURABLE_HTTP_PROXY: no JupyterHub was started",
+        reason="no configurable-http-proxy on the path or in CONFIGURABLE_HTTP_PROXY: no "
+        "JupyterHub was started",
     ),
     pytest.mark.timeout(600),
 ]
@@ -84,7 +89,9 @@ OPENS = """(path) => new Promise((done) => {
 
 
 class Hub(NamedTuple):
-    """A JupyterHub. address: the one that browsers know. folder: of its files, with the students' homes in it."""
+    """A JupyterHub. address: the one that browsers know. folder: of its files, with the students'
+    homes in it.
+    """
 
     address: str
     folder: Path
@@ -94,20 +101,28 @@ class Hub(NamedTuple):
         """The kernels of a student."""
         home = str(self.folder / student)
         started = [
-            child for child in self.process.children(recursive=True) if "ipykernel_launcher" in " ".join(child.cmdline())
+            child
+            for child in self.process.children(recursive=True)
+            if "ipykernel_launcher" in " ".join(child.cmdline())
         ]
         return [kernel for kernel in started if kernel.environ().get("HOME") == home]
 
     def ports(self, student: str) -> list[int]:
         """The ports that the processes of a student listen on, without those of kernels."""
         home = str(self.folder / student)
-        servers = [child for child in self.process.children() if child.environ().get("HOME") == home]
+        servers = [
+            child for child in self.process.children() if child.environ().get("HOME") == home
+        ]
         return [port for server in servers for port in listening(server)]
 
 
 def listening(process: psutil.Process) -> list[int]:
     """The ports that a process listens on."""
-    return [found.laddr.port for found in process.net_connections("inet") if found.status == psutil.CONN_LISTEN]
+    return [
+        found.laddr.port
+        for found in process.net_connections("inet")
+        if found.status == psutil.CONN_LISTEN
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -116,11 +131,15 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hub]:
     folder = tmp_path_factory.mktemp("hub")
     address, *others = free_ports(3)
     configuration = folder / "jupyterhub_config.py"
-    configuration.write_text(TEST.format(address, *others, configuration=str(CONFIGURATION), folder=folder, proxy=PROXY))
+    configuration.write_text(
+        TEST.format(address, *others, configuration=str(CONFIGURATION), folder=folder, proxy=PROXY)
+    )
     log = folder / "hub.log"
     with log.open("w") as sink:
         command = [sys.executable, "-m", "jupyterhub", "--config", str(configuration)]
-        started = subprocess.Popen(command, cwd=folder, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True)
+        started = subprocess.Popen(
+            command, cwd=folder, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True
+        )
     try:
         until(lambda: answers(address) or started.poll() is not None)
         assert started.poll() is None, log.read_text()
@@ -132,7 +151,9 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hub]:
 
 
 class Student(NamedTuple):
-    """A student whose server has started with lesson 00. context: of the browser. strangers: what else the page asked for."""
+    """A student whose server has started with lesson 00. context: of the browser. strangers: what
+    else the page asked for.
+    """
 
     name: str
     context: Any
@@ -170,7 +191,9 @@ def _log_in(page: Any, address: str, name: str) -> None:
     page.click("#login_submit", no_wait_after=True)
 
 
-def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(class_: list[Student]) -> None:
+def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(
+    class_: list[Student],
+) -> None:
     frames = [picture_in(push_panel_of(student.page)) for student in class_]
     first, second = (frame.evaluate(HEIGHT) for frame in frames)
     for student in class_:
@@ -185,7 +208,9 @@ def test_no_port_of_a_students_kernel_tells_anything(hub: Hub, class_: list[Stud
     for student in class_:
         (kernel,) = hub.kernels(student.name)
         ports = listening(kernel)
-        assert len(ports) <= 1  # ipykernel's own, which only receives: what processes print that cells have started
+        assert (
+            len(ports) <= 1
+        )  # ipykernel's own, which only receives: what processes print that cells have started
         for port in ports:
             with pytest.raises((OSError, HTTPException)):
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2.0)
@@ -203,7 +228,12 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
     page = ada.context.new_page()
     assert page.goto(f"{hub.address}/user/{bob.name}/lab").status == 403
     assert page.locator(".jp-Notebook").count() == 0
-    for address in (kernels, f"{kernels}/{kernel['id']}", lesson, f"{hub.address}/hub/api/users/{bob.name}"):
+    for address in (
+        kernels,
+        f"{kernels}/{kernel['id']}",
+        lesson,
+        f"{hub.address}/hub/api/users/{bob.name}",
+    ):
         assert ada.context.request.get(address).status in (403, 404), address
     page.close()
 
@@ -213,7 +243,9 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
     assert bob.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
     assert not ada.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
 
-    assert (hub.folder / bob.name / "floatbase").stat().st_mode & 0o077 == 0  # no other account of the machine reads it
+    assert (
+        hub.folder / bob.name / "floatbase"
+    ).stat().st_mode & 0o077 == 0  # no other account of the machine reads it
 
     assert hub.ports(bob.name)
     for port in hub.ports(bob.name):  # past the hub, at the server itself

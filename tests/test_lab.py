@@ -1,9 +1,12 @@
-"""JupyterLab in a real browser: two lessons run without an error, and each of their pictures answers to its sliders.
+"""JupyterLab in a real browser: two lessons run without an error, and each of their pictures
+answers to its sliders.
 
-The browser reaches JupyterLab's own address and nothing else, as that of a reader whose kernel is on another machine.
-What JupyterLab saves of a lesson that was only run and looked at does not count as a learner's writing.
+The browser reaches JupyterLab's own address and nothing else, as that of a reader whose kernel is
+on another machine. What JupyterLab saves of a lesson that was only run and looked at does not count
+as a learner's writing.
 
-What the lessons compute is test_notebooks' business, what all other sliders do is tests/lessons': both need no browser.
+What the lessons compute is test_notebooks' business, what all other sliders do is tests/lessons':
+both need no browser.
 """
 
 from __future__ import annotations
@@ -39,14 +42,21 @@ from labs import (
 
 from floatbase.lessons.publish import MY_FOLDER, NOTEBOOKS, prepare_workspace, read_notebook
 
-LESSONS = ("00_start_here", "03_feasible_space")  # a robot that is simulated under the page; panels of many sliders
-MOVES = {LESSONS[0]: {"robot"}, LESSONS[1]: {"robot", "ghost", "planned"}}  # in their pictures; the ghost is the veil
+LESSONS = (
+    "00_start_here",
+    "03_feasible_space",
+)  # a robot that is simulated under the page; panels of many sliders
+MOVES = {
+    LESSONS[0]: {"robot"},
+    LESSONS[1]: {"robot", "ghost", "planned"},
+}  # in their pictures; the ghost is the veil
 
 pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 
 # what a reader may press; none of it is writing
 LOOKS = (
-    "notebook:hide-all-cell-code", "notebook:hide-all-cell-outputs", "notebook:enable-output-scrolling",
+    "notebook:hide-all-cell-code", "notebook:hide-all-cell-outputs",
+    "notebook:enable-output-scrolling",
     "notebook:collapse-all-headings", "notebook:insert-cell-below",
 )  # fmt: skip
 SAVE = f"""async () => {{
@@ -62,7 +72,9 @@ SETTINGS = {
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A course of these lessons, prepared for a learner: without outputs, so that what is seen was made here."""
+    """A course of these lessons, prepared for a learner: without outputs, so that what is seen was
+    made here.
+    """
     folder = tmp_path_factory.mktemp("course")
     for name in LESSONS:
         shutil.copy(NOTEBOOKS / f"{name}.ipynb", folder)
@@ -78,13 +90,30 @@ def lab(course: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]
         place = home / "lab" / "user-settings" / f"{name}.jupyterlab-settings"
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(json.dumps(setting))
-    environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(home), "JUPYTER_DATA_DIR": str(home), "HOME": str(home)}
+    environment = {
+        **os.environ,
+        "JUPYTER_CONFIG_DIR": str(home),
+        "JUPYTER_DATA_DIR": str(home),
+        "HOME": str(home),
+    }
     log = home / "server.log"
     with log.open("w") as sink:
         server = subprocess.Popen(
             [
-                *(sys.executable, "-m", "jupyterlab", "--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"),
-                *("--IdentityProvider.token=a-test", "--LabApp.expose_app_in_browser=True", "--LabApp.news_url=None"),
+                *(
+                    sys.executable,
+                    "-m",
+                    "jupyterlab",
+                    "--no-browser",
+                    "--ip=127.0.0.1",
+                    "--port=0",
+                    "--allow-root",
+                ),
+                *(
+                    "--IdentityProvider.token=a-test",
+                    "--LabApp.expose_app_in_browser=True",
+                    "--LabApp.news_url=None",
+                ),
                 str(course),
             ],
             env=environment,

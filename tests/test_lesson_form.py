@@ -1,4 +1,6 @@
-"""The form of the lessons: a question, a prediction, a cell that does not know the answer, why, and then the claims."""
+"""The form of the lessons: a question, a prediction, a cell that does not know the answer, why, and
+then the claims.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
 
 LONGEST = 88  # characters of a line that JupyterLab shows whole in a window of 1100 px
 CLAIMS = "# claims of the text above"
-LESSONS = pytest.mark.parametrize("path", sorted(NOTEBOOKS.glob("*.ipynb")), ids=lambda path: path.stem)
+LESSONS = pytest.mark.parametrize(
+    "path", sorted(NOTEBOOKS.glob("*.ipynb")), ids=lambda path: path.stem
+)
 QUESTION = re.compile(r"\*\*Predict( [^*]*)?\*\*:")
 
 
@@ -33,16 +37,24 @@ def tagged(cell: Any, tag: str) -> bool:
 def calls(cell: Any, function: str) -> list[ast.Call]:
     """The calls of that function in a cell of code."""
     nodes = ast.walk(ast.parse(cell.source)) if cell.cell_type == "code" else ()
-    return [node for node in nodes if isinstance(node, ast.Call) and ast.unparse(node.func) == function]
+    return [
+        node for node in nodes if isinstance(node, ast.Call) and ast.unparse(node.func) == function
+    ]
 
 
 def named(path: Path, function: str) -> list[tuple[int, str]]:
     """Where a lesson calls `predict` or `compare`, and the names it gives."""
-    return [(i, ast.literal_eval(call.args[0])) for i, cell in enumerate(cells(path)) for call in calls(cell, function)]
+    return [
+        (i, ast.literal_eval(call.args[0]))
+        for i, cell in enumerate(cells(path))
+        for call in calls(cell, function)
+    ]
 
 
 def asserts(cell: Any) -> bool:
-    return cell.cell_type == "code" and any(isinstance(node, ast.Assert) for node in ast.walk(ast.parse(cell.source)))
+    return cell.cell_type == "code" and any(
+        isinstance(node, ast.Assert) for node in ast.walk(ast.parse(cell.source))
+    )
 
 
 def is_typed(value: ast.expr) -> bool:
@@ -51,17 +63,29 @@ def is_typed(value: ast.expr) -> bool:
 
 
 def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
-    """For every text of a lesson, the equations that it says it teaches and those that it writes out with their number."""
+    """For every text of a lesson, the equations that it says it teaches and those that it writes
+    out with their number.
+    """
     for cell in cells(path):
         if cell.cell_type == "markdown":
-            yield set(cell.metadata.get("teaches", [])), {f"({n})" for n in re.findall(r"\\tag\{(.*?)\}", cell.source)}
+            yield (
+                set(cell.metadata.get("teaches", [])),
+                {f"({n})" for n in re.findall(r"\\tag\{(.*?)\}", cell.source)},
+            )
 
 
 @LESSONS
 def test_predictions_are_named_in_order(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    asked = [found for cell in cells(path) if cell.cell_type == "markdown" for found in QUESTION.findall(cell.source)]
-    assert [name.strip() for name in asked] == [f"{lesson}.{letter}" for letter in ascii_lowercase[: len(asked)]]
+    asked = [
+        found
+        for cell in cells(path)
+        if cell.cell_type == "markdown"
+        for found in QUESTION.findall(cell.source)
+    ]
+    assert [name.strip() for name in asked] == [
+        f"{lesson}.{letter}" for letter in ascii_lowercase[: len(asked)]
+    ]
     assert [name for _, name in named(path, "predict")] == [name.strip() for name in asked]
     assert asked, "a lesson without a question"
 
@@ -70,13 +94,21 @@ def test_predictions_are_named_in_order(path: Path) -> None:
 def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: Path) -> None:
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
-        asked = [name.strip() for name in QUESTION.findall(before.source)] if before.cell_type == "markdown" else []
+        asked = (
+            [name.strip() for name in QUESTION.findall(before.source)]
+            if before.cell_type == "markdown"
+            else []
+        )
         predicted = calls(cell, "predict")
         if asked and not predicted:
             wrong.append(f"{asked}: no predict(…) right below")
         for call in predicted:
             name = ast.literal_eval(call.args[0])
-            rest = [line for line in ast.parse(cell.source).body if not isinstance(line, ast.Import | ast.ImportFrom)]
+            rest = [
+                line
+                for line in ast.parse(cell.source).body
+                if not isinstance(line, ast.Import | ast.ImportFrom)
+            ]
             fits = {
                 "the question right above": asked == [name],
                 "a cell of its own": len(rest) == 1,
@@ -87,16 +119,28 @@ def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: P
             wrong += [f"{name}: it needs {what}" for what, fit in fits.items() if not fit]
     assert wrong == []
     for cell in cells(path):
-        assert bool(calls(cell, "predict")) == tagged(cell, "predict") == ("prediction" in cell.metadata), cell.source
+        assert (
+            bool(calls(cell, "predict"))
+            == tagged(cell, "predict")
+            == ("prediction" in cell.metadata)
+        ), cell.source
 
 
 @LESSONS
 def test_every_prediction_is_compared_once_with_what_a_later_cell_computes(path: Path) -> None:
-    predicted, compared = dict(map(reversed, named(path, "predict"))), dict(map(reversed, named(path, "compare")))
+    predicted, compared = (
+        dict(map(reversed, named(path, "predict"))),
+        dict(map(reversed, named(path, "compare"))),
+    )
     assert len(compared) == len(named(path, "compare"))
     assert sorted(compared) == sorted(predicted)
     assert [name for name, i in compared.items() if i <= predicted[name]] == []
-    typed = [call.args[0] for cell in cells(path) for call in calls(cell, "compare") if is_typed(call.args[1])]
+    typed = [
+        call.args[0]
+        for cell in cells(path)
+        for call in calls(cell, "compare")
+        if is_typed(call.args[1])
+    ]
     assert [ast.unparse(name) for name in typed] == []
 
 
@@ -121,14 +165,17 @@ def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: P
             continue
         body = ast.parse(cell.source).body
         fits = {
-            "asserts outside of its claims": not asserts(cell) or any(tagged(cell, t) for t in ("claims", "exercise", "check")),
+            "asserts outside of its claims": not asserts(cell)
+            or any(tagged(cell, t) for t in ("claims", "exercise", "check")),
         }
         if tagged(cell, "claims"):
             fits |= {
                 "claims nothing": asserts(cell),
                 f"does not begin with {CLAIMS}": cell.source.startswith(CLAIMS),
                 "is not folded": cell.metadata.get("jupyter", {}).get("source_hidden") is True,
-                "prints": cell.outputs == [] and not calls(cell, "print") and not isinstance(body[-1], ast.Expr),
+                "prints": cell.outputs == []
+                and not calls(cell, "print")
+                and not isinstance(body[-1], ast.Expr),
             }
         wrong += [f"this cell {what}:\n{cell.source}" for what, fit in fits.items() if not fit]
     assert wrong == [], "\n\n".join(wrong)
@@ -136,9 +183,19 @@ def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: P
 
 @LESSONS
 def test_code_fits_the_window_and_hides_no_minus_by_a_sum(path: Path) -> None:
-    lines = [line for cell in cells(path) if cell.cell_type == "code" for line in cell.source.splitlines()]
+    lines = [
+        line
+        for cell in cells(path)
+        if cell.cell_type == "code"
+        for line in cell.source.splitlines()
+    ]
     lesson = path.stem.split("_")[0]
-    lines += [line for name, e in all_exercises().items() if name.startswith(f"{lesson}.") for line in e.solution.splitlines()]
+    lines += [
+        line
+        for name, e in all_exercises().items()
+        if name.startswith(f"{lesson}.")
+        for line in e.solution.splitlines()
+    ]
     assert [line for line in lines if len(line) > LONGEST] == []
     assert [line for line in lines if re.search(r"\+ 0\.0\b(?!\d)", line)] == []
 
@@ -147,7 +204,11 @@ def test_code_fits_the_window_and_hides_no_minus_by_a_sum(path: Path) -> None:
 def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
     lesson = path.stem.split("_")[0]
     reviewed = [i for i, cell in enumerate(cells(path)) for call in calls(cell, "review")]
-    texts = [[ast.unparse(part) for part in call.args] for cell in cells(path) for call in calls(cell, "review")]
+    texts = [
+        [ast.unparse(part) for part in call.args]
+        for cell in cells(path)
+        for call in calls(cell, "review")
+    ]
     assert texts == [[] if lesson == "00" else [repr(lesson)]]
     assert reviewed[0] > max(i for i, _ in named(path, "compare"))
 
@@ -164,7 +225,10 @@ def test_an_equation_is_taught_where_it_is_written_out_with_its_number(path: Pat
         assert teaches <= set(equations.TITLES), "the map has no such equation"
     parts = re.split(r"^#+ (?=\(|App)", the_map(), flags=re.MULTILINE)
     here = {
-        equation for equation in equations.TITLES for part in parts if part.startswith(f"{equation} ") and path.name in part
+        equation
+        for equation in equations.TITLES
+        for part in parts
+        if part.startswith(f"{equation} ") and path.name in part
     }
     missing = {equation for teaches, _ in taught(path) for equation in teaches} - here
     assert missing == set(), "run `python -m floatbase.lessons.publish map`"

@@ -1,4 +1,6 @@
-"""The lessons as files: they run, print what is stored, leave nothing behind, and their exercises can be solved."""
+"""The lessons as files: they run, print what is stored, leave nothing behind, and their exercises
+can be solved.
+"""
 
 from __future__ import annotations
 
@@ -21,18 +23,28 @@ from panels import moved_sliders
 
 import floatbase as fb
 from floatbase.lessons import all_exercises, check, hand_in, progress
-from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, run_and_store, with_solutions
+from floatbase.lessons.publish import (
+    NOTEBOOKS,
+    grades,
+    read_notebook,
+    run_and_store,
+    with_solutions,
+)
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 HOME = 'os.environ["FLOATBASE_HOME"]'
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
-LIMIT = 60.0  # s of one core: a lesson with all its answers takes up to 25, and longer where two threads share a core
+# s of one core: a lesson with all its answers takes up to 25, and longer where two threads share a
+# core
+LIMIT = 60.0
 TOOK: dict[str, float] = {}  # what each run of a lesson took
 
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    """The controller is compiled before a lesson is measured or compared: where it was not yet, that takes long and is told."""
+    """The controller is compiled before a lesson is measured or compared: where it was not yet,
+    that takes long and is told.
+    """
     robot = fb.load("go2")
     fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
 
@@ -45,16 +57,25 @@ def nbval(path: Path, home: Path) -> str:
     """Run a lesson by nbval, for a learner whose home is `home`; what it printed."""
     # pytest's other plugins take as long to load as a lesson takes to run
     options = ["-p", "nbval.plugin", "--nbval", "-q", "-p", "no:cacheprovider", "-c", os.devnull]
-    environment = {**os.environ, MARK: str(os.getpid()), "FLOATBASE_HOME": str(home), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    environment = {
+        **os.environ,
+        MARK: str(os.getpid()),
+        "FLOATBASE_HOME": str(home),
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+    }
     command = [sys.executable, "-m", "pytest", *options, str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment)
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment
+    )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     return done.stdout
 
 
 @contextlib.contextmanager
 def timed(run: str) -> Iterator[None]:
-    """Note the processor time of the processes that are started and ended here, and hold it to the limit."""
+    """Note the processor time of the processes that are started and ended here, and hold it to the
+    limit.
+    """
 
     def used() -> float:
         times = os.times()
@@ -68,7 +89,9 @@ def timed(run: str) -> Iterator[None]:
 
 
 def left_behind() -> list[str]:
-    """Processes that a lesson started and that outlive it, whoever their parent is now: they carry the mark."""
+    """Processes that a lesson started and that outlive it, whoever their parent is now: they carry
+    the mark.
+    """
     found: list[str] = []
     for _ in range(50):  # those about to end may take 5 s to do so
         found = []
@@ -94,19 +117,27 @@ __lessons.compare = __watched
 
 
 def followed_by_its_learner(path: Path) -> Any:
-    """A lesson, and after it what a learner would have done: said something at each prediction, and solved all exercises."""
+    """A lesson, and after it what a learner would have done: said something at each prediction, and
+    solved all exercises.
+    """
     notebook, answers = read_notebook(path), with_solutions(read_notebook(path)).cells
     after = [
         f"import os; assert os.listdir({HOME}) == []  # no exercise was tried, no prediction made",
         moved_sliders(notebook),
     ]
-    after += [with_an_answer(cell.source) for cell in notebook.cells if "prediction" in cell.metadata]
+    after += [
+        with_an_answer(cell.source) for cell in notebook.cells if "prediction" in cell.metadata
+    ]
     after += ["for __name, __value in __compared.items(): __compare(__name, __value)"]
     after += [cell.source for cell in answers if "exercise" in cell.metadata]
     after += [
-        re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M) for cell in checks(answers)
+        re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M)
+        for cell in checks(answers)
     ]
-    cells = [new_code_cell(source, metadata={"tags": ["nbval-ignore-output"]}) for source in [WATCH, *after]]
+    cells = [
+        new_code_cell(source, metadata={"tags": ["nbval-ignore-output"]})
+        for source in [WATCH, *after]
+    ]
     notebook.cells = [cells[0], *notebook.cells, *cells[1:]]
     return notebook
 
@@ -119,7 +150,13 @@ def with_an_answer(source: str) -> str:
     """A prediction's cell with some answer in place of its ...."""
     call = next(node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
     given = {part.arg: ast.literal_eval(part.value) for part in call.keywords}
-    answer = given["choices"][0] if "choices" in given else [1.0] * given["count"] if "count" in given else 1.0
+    answer = (
+        given["choices"][0]
+        if "choices" in given
+        else [1.0] * given["count"]
+        if "count" in given
+        else 1.0
+    )
     return source.replace("...", repr(answer), 1)
 
 
@@ -135,14 +172,20 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
         assert "passed" in nbval(tmp_path / path.name, home)
     assert left_behind() == []
     monkeypatch.setenv("FLOATBASE_HOME", str(home))
-    names = [cell.metadata["prediction"] for cell in notebook.cells if "prediction" in cell.metadata]
+    names = [
+        cell.metadata["prediction"] for cell in notebook.cells if "prediction" in cell.metadata
+    ]
     kept = progress.predictions()
-    assert sorted(kept) == sorted(names) and all({"said", "is"} <= set(entry) for entry in kept.values())
+    assert sorted(kept) == sorted(names) and all(
+        {"said", "is"} <= set(entry) for entry in kept.values()
+    )
     number = path.stem.split("_")[0]
     solved_now = {name for name, entry in progress.load().items() if entry["right"]}
     assert solved_now == {name for name in all_exercises() if name.startswith(f"{number}.")}
     marks = grades.grade_file(hand_in("Ada", tmp_path)).results
-    assert {mark.exercise for mark in marks if mark.result in ("right", "to be read")} == solved_now, marks
+    assert {
+        mark.exercise for mark in marks if mark.result in ("right", "to be read")
+    } == solved_now, marks
 
 
 def test_all_lessons_together_take_less_than_half_of_the_five_minutes() -> None:
@@ -160,14 +203,20 @@ def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Pat
     for cell in notebook.cells:
         if cell.cell_type == "code":
             assert len(cell.source.splitlines()) <= 15, cell.source
-            assert not any("text/html" in output.get("data", {}) for output in cell.outputs), cell.source
+            assert not any("text/html" in output.get("data", {}) for output in cell.outputs), (
+                cell.source
+            )
             assert not any(output.output_type == "error" for output in cell.outputs)
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
     known = all_exercises()
-    cells = {c.metadata["exercise"]: c.source for c in read_notebook(path).cells if "exercise" in c.metadata}
+    cells = {
+        c.metadata["exercise"]: c.source
+        for c in read_notebook(path).cells
+        if "exercise" in c.metadata
+    }
     number = path.stem.split("_")[0]
     assert set(cells) == {name for name in known if name.startswith(f"{number}.")}
     for name, source in cells.items():
@@ -176,7 +225,11 @@ def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
 
 def test_exercises_have_no_answer_at_first_and_say_so() -> None:
     verdicts = {name: check(name, None) for name in all_exercises()}
-    assert [name for name, verdict in verdicts.items() if verdict.right or "no answer yet" not in verdict.text] == []
+    assert [
+        name
+        for name, verdict in verdicts.items()
+        if verdict.right or "no answer yet" not in verdict.text
+    ] == []
 
 
 def test_a_run_stores_what_a_lesson_prints_and_counts_no_try_of_a_learner(tmp_path: Path) -> None:
@@ -184,7 +237,9 @@ def test_a_run_stores_what_a_lesson_prints_and_counts_no_try_of_a_learner(tmp_pa
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"
     lesson = tmp_path / "lesson.ipynb"
-    nbformat.write(new_notebook(cells=[new_code_cell(source) for source in (spoken, tried, shown)]), lesson)
+    nbformat.write(
+        new_notebook(cells=[new_code_cell(source) for source in (spoken, tried, shown)]), lesson
+    )
     check("00.1", 2.0)
     before = progress.load()
     run_and_store(lesson)

@@ -1,4 +1,6 @@
-"""The web site: built without a warning, whole in itself, small, readable without network, and found by its search."""
+"""The web site: built without a warning, whole in itself, small, readable without network, and
+found by its search.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,13 @@ from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
-from floatbase.lessons.publish.site import add_links, docstrings, mathml, prepare_lesson, run_lessons
+from floatbase.lessons.publish.site import (
+    add_links,
+    docstrings,
+    mathml,
+    prepare_lesson,
+    run_lessons,
+)
 
 pytestmark = [pytest.mark.front_end, pytest.mark.timeout(600)]
 SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
@@ -28,21 +36,40 @@ browser = browser_of_a_file
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site of two lessons, as stored; the picture of its first page is run. Faults of Sphinx end it with an error."""
+    """A site of two lessons, as stored; the picture of its first page is run. Faults of Sphinx end
+    it with an error.
+    """
     folder = tmp_path_factory.mktemp("built") / "site"
-    command = [sys.executable, "-m", "floatbase.lessons.publish", "site", "--stored", "--to", str(folder)]
-    done = subprocess.run([*command, *(str(NOTEBOOKS / name) for name in SHOWN)], capture_output=True, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "floatbase.lessons.publish",
+        "site",
+        "--stored",
+        "--to",
+        str(folder),
+    ]
+    done = subprocess.run(
+        [*command, *(str(NOTEBOOKS / name) for name in SHOWN)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     return folder
 
 
 class Page(HTMLParser):
-    """What a page links to, loads and is linked by. links: what a reader may click. loaded: what a browser fetches."""
+    """What a page links to, loads and is linked by. links: what a reader may click. loaded: what a
+    browser fetches.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self.links, self.loaded, self.names, self.alts = set[str](), set[str](), set[str](), list[str]()
+        self.links, self.loaded, self.names, self.alts = (
+            set[str](),
+            set[str](),
+            set[str](),
+            list[str](),
+        )
         self.described = False
         self.feed(path.read_text(encoding="utf-8"))
 
@@ -50,7 +77,9 @@ class Page(HTMLParser):
         given = dict(attributes)
         self.names.add(given.get("id") or "")
         self.described |= tag == "meta" and given.get("name") == "description"
-        if tag == "a" or (tag == "link" and given.get("rel") in ("next", "prev", "search", "index")):
+        if tag == "a" or (
+            tag == "link" and given.get("rel") in ("next", "prev", "search", "index")
+        ):
             self.links.add(given.get("href") or "")
         elif tag in ("link", "script", "img", "iframe"):
             self.loaded.add(given.get("href" if tag == "link" else "src") or "")
@@ -77,7 +106,11 @@ def test_every_link_within_the_site_leads_somewhere(built: Path) -> None:
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if not target.is_file():
                 wrong.append(f"{path.relative_to(built)}: {link}")
-            elif parts.fragment and target.suffix == ".html" and unquote(parts.fragment) not in page_at(target).names:
+            elif (
+                parts.fragment
+                and target.suffix == ".html"
+                and unquote(parts.fragment) not in page_at(target).names
+            ):
                 wrong.append(f"{path.relative_to(built)}: {link} has no such place")
     assert not wrong, "\n".join(wrong)
 
@@ -86,7 +119,11 @@ def test_no_page_loads_anything_from_elsewhere_or_is_large(built: Path) -> None:
     wrong = []
     for path in pages(built):
         loaded = page_at(path).loaded
-        wrong += [f"{path.name} loads {link}" for link in loaded if urlsplit(link).scheme not in ("", "data")]
+        wrong += [
+            f"{path.name} loads {link}"
+            for link in loaded
+            if urlsplit(link).scheme not in ("", "data")
+        ]
         own = [path, *(path.parent / link for link in loaded if "_images" in link)]
         size = sum(file.stat().st_size for file in own)
         wrong += [f"{path.name} has {size / 1e6:.1f} MB"] if size > MOST else []
@@ -138,7 +175,9 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
     page.goto((built / "lessons" / "equations.html").as_uri() + "#eq-13")
     page.evaluate("document.fonts.ready")
     formula = page.locator(".equation:has-text('(13)') math")
-    bracket, letter = (formula.locator(what).first.bounding_box() for what in ("mo:text-is('[')", "mtd"))
+    bracket, letter = (
+        formula.locator(what).first.bounding_box() for what in ("mo:text-is('[')", "mtd")
+    )
     assert bracket["height"] > 2.5 * letter["height"]  # it grows around three rows
     assert page.evaluate("document.fonts.check('16px Formulas')")
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
@@ -150,7 +189,9 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
 def test_search_finds_friction_cones(built: Path, browser: Any) -> None:
     page = browser.new_page()
     page.goto((built / "search.html").as_uri() + "?q=friction+cone")
-    page.locator("#search-results li a", has_text="06 · Friction cones").first.wait_for(timeout=20_000)
+    page.locator("#search-results li a", has_text="06 · Friction cones").first.wait_for(
+        timeout=20_000
+    )
     page.locator("#search-results li a", has_text="FrictionCone").first.wait_for(timeout=20_000)
     page.close()
 
@@ -166,11 +207,16 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
         new_output("stream", name="stderr", text="compiling"),
         new_output("stream", name="stdout", text="\x1b[1mfound\x1b[0m"),
         new_output("display_data", {"scene": "…", widget: {}}),
-        new_output("display_data", {widget: {}, "image/png": "…"}, metadata={"image/png": {"width": 300}}),
+        new_output(
+            "display_data", {widget: {}, "image/png": "…"}, metadata={"image/png": {"width": 300}}
+        ),
         new_output("display_data", {widget: {}, "text/plain": "Widget()"}),
     ]
     cells = [
-        new_markdown_cell("# 07 · A page\n\nIt *says* what (7) is, as lesson 06 and [lesson 08](08.ipynb) do.\n\n## Curve"),
+        new_markdown_cell(
+            "# 07 · A page\n\nIt *says* what (7) is, as lesson 06 and [lesson 08](08.ipynb) do.\n\n"
+            "## Curve"
+        ),
         new_code_cell("draw()", outputs=outputs),
         new_code_cell('predict("07.a", ..., choices=["a", "b"])', metadata={"tags": ["predict"]}),
         new_code_cell("assert found", metadata={"tags": ["claims"]}),
@@ -203,15 +249,28 @@ def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
 
 
 def test_links_leave_code_formulas_and_links_as_they_are() -> None:
-    for text in ("`f(7)`", "$h (7)$", "$$x (7)\n(8)$$", "[as (7)](x.md)", "```\n(7)\n```", "## On (7)", "f(7)", "(99)"):
+    for text in (
+        "`f(7)`",
+        "$h (7)$",
+        "$$x (7)\n(8)$$",
+        "[as (7)](x.md)",
+        "```\n(7)\n```",
+        "## On (7)",
+        "f(7)",
+        "(99)",
+    ):
         assert add_links(text, {}) == text
     assert add_links("(26)(27), §4.1, App. A, note 12", {}) == (
-        "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note 12](#notes-of-the-document)"
+        "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note "
+        "12](#notes-of-the-document)"
     )
 
 
 def test_a_docstring_becomes_text_lists_and_links() -> None:
-    text = "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no parameter.\n\n    code = 1\n"
+    text = (
+        "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no "
+        "parameter.\n\n    code = 1\n"
+    )
     made = docstrings.to_restructured_text(text, ["mu", "a", "b"])
     assert ":ref:`(9) <eq-9>`" in made
     assert r"A \* b\_i" in made and ":py:obj:`Contacts <floatbase.dynamics.Contacts>`" in made
@@ -220,7 +279,12 @@ def test_a_docstring_becomes_text_lists_and_links() -> None:
 
 
 def test_every_formula_of_the_course_becomes_mathml() -> None:
-    texts = [cell.source for path in NOTEBOOKS.glob("*.ipynb") for cell in read_notebook(path).cells if cell.cell_type == "markdown"]
+    texts = [
+        cell.source
+        for path in NOTEBOOKS.glob("*.ipynb")
+        for cell in read_notebook(path).cells
+        if cell.cell_type == "markdown"
+    ]
     plain = "\n\n".join(re.sub(r"`[^`\n]*`", "", text) for text in [*texts, equations.table()])
     found = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", plain, re.DOTALL)
     assert len(found) > 300
@@ -230,6 +294,14 @@ def test_every_formula_of_the_course_becomes_mathml() -> None:
 
 
 def test_a_lesson_that_is_not_there_is_told(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "floatbase.lessons.publish", "site", str(tmp_path / "no.ipynb"), "--to", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "floatbase.lessons.publish",
+        "site",
+        str(tmp_path / "no.ipynb"),
+        "--to",
+        str(tmp_path),
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and "no.ipynb" in done.stderr

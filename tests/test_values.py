@@ -1,4 +1,6 @@
-"""Values cannot be written to, neither their arrays nor their attributes, and copies and pickles of them are as good."""
+"""Values cannot be written to, neither their arrays nor their attributes, and copies and pickles of
+them are as good.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ WITHOUT_ARRAYS = (
 )
 NO_VALUES = {
     "physics that changes": "PerturbedSimulation",
-    "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators Simulation WholeBodyController",
+    "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
+    "Simulation WholeBodyController",
     "a text": "ConstraintLabel",
     "memory of a thread or a window": "LiveSimulation SliderPanel Viewer Window",
     "an answer that rollout copies": "Torques",
@@ -48,7 +51,10 @@ NO_VALUES = {
 
 
 def packages() -> list[Any]:
-    names = "actuators behaviours control dynamics friction lessons lessons.lesson04 objectives qp robots simulation viewer"
+    names = (
+        "actuators behaviours control dynamics friction lessons lessons.lesson04 objectives "
+        "qp robots simulation viewer"
+    )
     return [fb, *(import_module(f"floatbase.{name}") for name in names.split())]
 
 
@@ -63,10 +69,16 @@ def same(a: Any, b: Any) -> bool:
         return np.array_equal(a, b, equal_nan=True)
     if isinstance(a, (tuple, list)):
         return len(a) == len(b) and all(map(same, a, b))
-    if isinstance(a, fb.Robot) or not type(a).__module__.startswith("floatbase") or not hasattr(a, "__dict__"):
+    if (
+        isinstance(a, fb.Robot)
+        or not type(a).__module__.startswith("floatbase")
+        or not hasattr(a, "__dict__")
+    ):
         return callable(a) or a == b
     names = [name for name in dir(a) if not name.startswith("_") and not callable(getattr(a, name))]
-    return type(a) is type(b) and all(same(getattr(a, name), getattr(b, name)) for name in names if name != "reduced")
+    return type(a) is type(b) and all(
+        same(getattr(a, name), getattr(b, name)) for name in names if name != "reduced"
+    )
 
 
 def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
@@ -78,13 +90,22 @@ def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
     }
     protocols = {name for name, found in classes.items() if getattr(found, "_is_protocol", False)}
     excused = " ".join(NO_VALUES.values()).split()
-    assert sorted(set(classes) - protocols) == sorted({*excused, *(name for name in values() if name in classes)})
-    assert [name for name, found in classes.items() if name in values() and type(values()[name]) is not found] == []
+    assert sorted(set(classes) - protocols) == sorted(
+        {*excused, *(name for name in values() if name in classes)}
+    )
+    assert [
+        name
+        for name, found in classes.items()
+        if name in values() and type(values()[name]) is not found
+    ] == []
 
 
 def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
     robot, state, contacts = values()["Robot"], values()["State"], values()["Contacts"]
-    own = {"AnalyticController": AnalyticController(robot, contacts, state), "Cylinders": HydraulicActuators(robot).cylinders}
+    own = {
+        "AnalyticController": AnalyticController(robot, contacts, state),
+        "Cylinders": HydraulicActuators(robot).cylinders,
+    }
     for kind, value in (values() | own).items():
         arrays = arrays_of(value)
         assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
@@ -100,13 +121,17 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
                 pytest.fail(f"{kind}.{name} was deleted")
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))]
+)
 def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> None:
     robot = values()["Robot"]
     for kind, value in values().items():
         other = copied(value)
         assert same(value, other), kind
-        assert [name for name, array in arrays_of(other).items() if array.flags.writeable] == [], kind
+        assert [name for name, array in arrays_of(other).items() if array.flags.writeable] == [], (
+            kind
+        )
     mapped = copied(values()["Affine"])
     with pytest.raises(TypeError):
         mapped.blocks["top"] = slice(0, 2)
@@ -116,18 +141,30 @@ def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> No
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
-    robot, state, contacts, control = values()["Robot"], values()["State"], values()["Contacts"], controller()
+    robot, state, contacts, control = (
+        values()["Robot"],
+        values()["State"],
+        values()["Contacts"],
+        controller(),
+    )
     push = fb.Push([0.0, 60.0, 0.0], start=0.005)
     sim, oil = fb.Simulation(robot), HydraulicActuators(robot)
     fb.rollout(sim, control, 0.01, [push], actuators=oil)
     others, alone = copied((sim, control, oil)), copied(control)
-    runs = [fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, control, oil), others)]
+    runs = [
+        fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, control, oil), others)
+    ]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
     assert np.ptp(runs[0].q, axis=0).max() > 1e-4
-    assert not others[2].state.pressures.flags.writeable and not others[2].cylinders.areas.flags.writeable
+    assert (
+        not others[2].state.pressures.flags.writeable
+        and not others[2].cylinders.areas.flags.writeable
+    )
     fb.rollout(sim, alone, 0.001)  # the controller of a robot that was copied, and not the robot
     analytic = AnalyticController(robot, contacts, state)
-    np.testing.assert_array_equal(copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau)
+    np.testing.assert_array_equal(
+        copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau
+    )
     assert not copied(analytic).com.flags.writeable
 
 
@@ -179,14 +216,20 @@ def test_what_a_value_returns_cannot_be_written_to() -> None:
     state, contacts, command = values()["State"], values()["Contacts"], values()["Command"]
     wrenches = values()["WrenchSet"]
     answers = {
-        "frame_jacobian": state.frame_jacobian("base"), "frame_drift": state.frame_drift("base"), "point": state.point("base"),
-        "positions": contacts.positions(state), "jacobian": contacts.jacobian(state), "A": contacts.constraint(state)[0],
+        "frame_jacobian": state.frame_jacobian("base"), "frame_drift": state.frame_drift("base"),
+        "point": state.point("base"),
+        "positions": contacts.positions(state), "jacobian": contacts.jacobian(state),
+        "A": contacts.constraint(state)[0],
         "torques": wrenches.moment_vertices(), "support_region": wrenches.support_region(),
         "solution block": command.solution["tau"],
-        "slip": record().slip(), "final q": record().final.q, "command force": command.force("FL_foot"),
+        "slip": record().slip(), "final q": record().final.q,
+        "command force": command.force("FL_foot"),
     }  # fmt: skip
     for shape in (values()["FrictionCone"], values()["FrictionPolyhedron"]):
-        answers |= {f"projection of {force} to {shape}": shape.project(force) for force in ([5.0, 0.0, 1.0], UP, -UP)}
+        answers |= {
+            f"projection of {force} to {shape}": shape.project(force)
+            for force in ([5.0, 0.0, 1.0], UP, -UP)
+        }
     assert [name for name, array in answers.items() if array.flags.writeable] == []
     with pytest.raises(TypeError):
         command.solution.qp.blocks["tau"] = slice(0, 1)

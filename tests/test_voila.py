@@ -1,6 +1,7 @@
 """Voilà in a real browser: lesson 00 and a playground as a page without code, whose pictures move.
 
-The browser reaches Voilà's own address and nothing else. Its own template asks for icons elsewhere, and does without them.
+The browser reaches Voilà's own address and nothing else. Its own template asks for icons elsewhere,
+and does without them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,18 @@ from typing import Any
 import nbformat
 import pytest
 from browsers import browser_of_a_file, needs_chromium
-from labs import HEIGHT, LONG, WINDOW, answers, free_ports, only, picture_in, push_panel_of, push_until_it_falls, screenshot
+from labs import (
+    HEIGHT,
+    LONG,
+    WINDOW,
+    answers,
+    free_ports,
+    only,
+    picture_in,
+    push_panel_of,
+    push_until_it_falls,
+    screenshot,
+)
 from waiting import until
 
 from floatbase.lessons.publish import NOTEBOOKS, read_notebook
@@ -41,13 +53,31 @@ def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     lesson = read_notebook(NOTEBOOKS / "00_start_here.ipynb")
     lesson.cells.append(nbformat.v4.new_code_cell(PLAYGROUND))
     nbformat.write(lesson, home / "lesson.ipynb")
-    environment = {**os.environ, "JUPYTER_CONFIG_DIR": str(home), "JUPYTER_DATA_DIR": str(home), "HOME": str(home)}
+    environment = {
+        **os.environ,
+        "JUPYTER_CONFIG_DIR": str(home),
+        "JUPYTER_DATA_DIR": str(home),
+        "HOME": str(home),
+    }
     (port,) = free_ports(1)
-    command = [sys.executable, "-m", "voila", "lesson.ipynb", "--no-browser", f"--port={port}", "--Voila.ip=127.0.0.1"]
+    command = [
+        sys.executable,
+        "-m",
+        "voila",
+        "lesson.ipynb",
+        "--no-browser",
+        f"--port={port}",
+        "--Voila.ip=127.0.0.1",
+    ]
     log = home / "voila.log"
     with log.open("w") as sink:
         server = subprocess.Popen(
-            command, env=environment, cwd=home, stdout=sink, stderr=subprocess.STDOUT, start_new_session=True
+            command,
+            env=environment,
+            cwd=home,
+            stdout=sink,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
         )
     try:
         until(lambda: answers(port) or server.poll() is not None)

@@ -12,7 +12,14 @@ import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
 from floatbase.control import AnalyticController, LinearInequality, ModelMismatch
-from floatbase.dynamics import RollingWheel, bias_forces, contact_space, fixed_frame, moving_frame, view_from_rotating_frame
+from floatbase.dynamics import (
+    RollingWheel,
+    bias_forces,
+    contact_space,
+    fixed_frame,
+    moving_frame,
+    view_from_rotating_frame,
+)
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torques_from_forces
 from floatbase.qp import active_set, table_top
@@ -43,26 +50,37 @@ def values() -> dict[str, Any]:
     return {
         "Robot": robot, "Foot": talos.feet[0], "State": state, "Contacts": contacts,
         "PointContact": contacts["FL_foot"],
-        "FlatFootContact": next(iter(judges.stance(talos))), "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
-        "LinearConstraint": fixed_frame("base"), "EquationsOfMotion": eom, "FeasibleSpace": fb.feasible_space(eom),
+        "FlatFootContact": next(iter(judges.stance(talos))),
+        "RollingWheel": RollingWheel("base", [0, 1, 0], 0.2),
+        "LinearConstraint": fixed_frame("base"), "EquationsOfMotion": eom,
+        "FeasibleSpace": fb.feasible_space(eom),
         "Affine": fb.Affine(np.eye(2), np.ones(2), {"top": slice(0, 1)}),
-        "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": control.qp(state), "Solution": command.solution,
-        "ActiveSetRun": run, "Iteration": run.iterations[0], "Residuals": command.solution.residuals,
-        "CoMTask": fb.CoMTask(state.com), "FrameTask": fb.FrameTask("FL_foot", UP), "OrientationTask": fb.OrientationTask(),
+        "Quadratic": fb.Quadratic(np.eye(2), np.ones(2)), "QP": control.qp(state),
+        "Solution": command.solution,
+        "ActiveSetRun": run, "Iteration": run.iterations[0],
+        "Residuals": command.solution.residuals,
+        "CoMTask": fb.CoMTask(state.com), "FrameTask": fb.FrameTask("FL_foot", UP),
+        "OrientationTask": fb.OrientationTask(),
         "PostureTask": fb.PostureTask(state.q), "ForceTask": fb.ForceTask(np.ones(12)),
         "TorqueTask": fb.TorqueTask(np.ones(12)),
-        "TorquesFromForces": torques_from_forces(eom), "Limits": control.limits, "Problem": control.problem,
+        "TorquesFromForces": torques_from_forces(eom), "Limits": control.limits,
+        "Problem": control.problem,
         "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
         "Decomposition": decompose([5.0, 0.0, 1.0], UP), "WrenchSet": wrench_set(state, contacts),
-        "Command": command, "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
+        "Command": command,
+        "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
         "Rollout": record(),
-        "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(), "Hydraulics": hydraulic.cylinders.hydraulics,
+        "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(),
+        "Hydraulics": hydraulic.cylinders.hydraulics,
         "HydraulicState": hydraulic.state, "CylinderGeometry": pose,
         "PowerBalance": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
-        "bias forces": bias_forces(state), "contact space": contact_space(eom), "drive": moving_frame("base", np.zeros_like),
-        "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))), "Table": Table(({"force": 1.0, "error": None},)),
+        "bias forces": bias_forces(state), "contact space": contact_space(eom),
+        "drive": moving_frame("base", np.zeros_like),
+        "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))),
+        "Table": Table(({"force": 1.0, "error": None},)),
         "PushRecovery": PushRecovery(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
-        "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan, "Gains": Gains(),
+        "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan,
+        "Gains": Gains(),
         "ModelMismatch": ModelMismatch(mass=1.2), "Perturbation": Perturbation(mass=1.2),
         "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),
     }  # fmt: skip

@@ -1,4 +1,6 @@
-"""Hydraulic actuators between the torque that a controller desires and the one that a joint gets (App. B of the course text)."""
+"""Hydraulic actuators between the torque that a controller desires and the one that a joint gets
+(App. B of the course text).
+"""
 
 from floatbase.actuators.hydraulic_actuators import VACUUM, HydraulicActuators, HydraulicState
 from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydraulics, PowerBalance

@@ -1,4 +1,6 @@
-"""App. B: a hydraulic cylinder with its valve, its oil, and the lever to the joint, as equations without memory."""
+"""App. B: a hydraulic cylinder with its valve, its oil, and the lever to the joint, as equations
+without memory.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,12 @@ import numpy.typing as npt
 from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.errors import InputError
 
-_LAMINAR_DROP = 1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
-_MIN_GAIN = 1e-9  # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the valve's all
+_LAMINAR_DROP = (
+    1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
+)
+# N/s: least change of force by an open valve. Chambers at line pressure have none; they get the
+# valve's all
+_MIN_GAIN = 1e-9
 _CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
@@ -25,15 +31,17 @@ class Hydraulics:
     supply_pressure, tank_pressure: Pa over the air outside.
     bulk_modulus: Pa, β_e.
     leakage: m³/(s Pa), past the piston.
-    rated_flow, rated_pressure_drop: m³/s through the valve, all open, when its two edges together take that drop, Pa.
+    rated_flow, rated_pressure_drop: m³/s through the valve, all open, when its two edges together
+        take that drop, Pa.
     valve_bandwidth: Hz, where the spool's amplitude has fallen by 3 dB.
     loop_bandwidth: Hz, of the force loop: turn it down to make the actuator slow.
 
-    Sources: bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz: Semini et al., Design of HyQ, a
-    hydraulically and electrically actuated quadruped robot, Proc. IMechE Part I 225, 2011. The crank follows from them:
-    160 bar on the bore gives 3217 N, and 145 N·m need 45 mm. The others are nominal, not measured on HyQ: a dead volume of
-    0.4 m of hose of 5 mm, leakage of 0.02 l/min at 160 bar, flow of 7.5 l/min at 70 bar, a loop of a fifth of the valve's.
-    Raises `InputError` for values that make no cylinder.
+    Sources: bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz: Semini et
+    al., Design of HyQ, a hydraulically and electrically actuated quadruped robot, Proc. IMechE Part
+    I 225, 2011. The crank follows from them: 160 bar on the bore gives 3217 N, and 145 N·m need 45
+    mm. The others are nominal, not measured on HyQ: a dead volume of 0.4 m of hose of 5 mm, leakage
+    of 0.02 l/min at 160 bar, flow of 7.5 l/min at 70 bar, a loop of a fifth of the valve's. Raises
+    `InputError` for values that make no cylinder.
     """
 
     bore: float = 0.016
@@ -53,13 +61,23 @@ class Hydraulics:
     def __post_init__(self) -> None:
         values = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
         for name, value in values.items():
-            as_positive(f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage"))
-        for small, large in (("rod", "bore"), ("crank", "base"), ("tank pressure", "supply pressure")):
+            as_positive(
+                f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage")
+            )
+        for small, large in (
+            ("rod", "bore"),
+            ("crank", "base"),
+            ("tank pressure", "supply pressure"),
+        ):
             if values[small] >= values[large]:
                 size, bound = values[small], values[large]
-                raise InputError(f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}.")
+                raise InputError(
+                    f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}."
+                )
         if self.weakest_torque <= 0.0:
-            raise InputError("the tank pressure on the bore holds off the supply on the ring: it must be lower.")
+            raise InputError(
+                "the tank pressure on the bore holds off the supply on the ring: it must be lower."
+            )
 
     @property
     def areas(self) -> Array:
@@ -68,12 +86,16 @@ class Hydraulics:
 
     @property
     def valve_gain(self) -> float:
-        """C_d w x_max √(2/ρ), m³/(s √Pa): flow per root of drop through one edge, all open; it takes half the rated drop."""
+        """C_d w x_max √(2/ρ), m³/(s √Pa): flow per root of drop through one edge, all open; it
+        takes half the rated drop.
+        """
         return self.rated_flow / float(np.sqrt(0.5 * self.rated_pressure_drop))
 
     @property
     def weakest_torque(self) -> float:
-        """N·m that the supply gives at the best angle when the rod is pulled in, the weaker way: only the ring pulls."""
+        """N·m that the supply gives at the best angle when the rod is pulled in, the weaker way:
+        only the ring pulls.
+        """
         bore, ring = self.areas
         return float(ring * self.supply_pressure - bore * self.tank_pressure) * self.crank
 
@@ -116,26 +138,33 @@ class PowerBalance(Value):
 class Cylinders(Value):
     """App. B: d double-acting cylinders, each on a crank, as equations without memory.
 
-    For a joint angle q, with γ the angle at the joint between the crank b and the cylinder's foot at distance a:
+    For a joint angle q, with γ the angle at the joint between the crank b and the cylinder's foot
+    at distance a:
 
         ℓ² = a² + b² - 2 a b cos γ                       the triangle: length of the cylinder
         L = dℓ/dq = a b sin γ / ℓ,   τ = L F             the same power on both sides: τ q̇ = F ℓ̇
         F = p_A A_A - p_B A_B                            force of the oil, N, pushing the rod out
-        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber; its volume V grows or shrinks with ℓ
-        Q = C_d w x √(2 Δp / ρ)                          one edge of the valve, from or to the line it opens to
-        ẋ = 2π f_valve (u - x)                           the spool; u in [-1, 1] is what the valve is told
+        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber; its volume V grows or
+                                                          shrinks with ℓ
+        Q = C_d w x √(2 Δp / ρ)                          one edge of the valve, from or to the line
+                                                         it opens to
+        ẋ = 2π f_valve (u - x)                           the spool; u in [-1, 1] is what the valve
+                                                         is told
 
-    x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow turns round.
+    x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow
+    turns round.
     Source: Merritt, Hydraulic Control Systems, 1967; the triangle is HyQ's.
 
     hydraulics: the cylinder of scale 1.
-    scale: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by scale^(1/3), hence volumes, flow,
-        leakage and torque by scale.
-    max_lever_angle: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and cylinder stand square. L is zero
-        where they line up. The stroke 2 b lets a joint turn full circle.
+    scale: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by
+        scale^(1/3), hence volumes, flow, leakage and torque by scale.
+    max_lever_angle: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and
+        cylinder stand square. L is zero where they line up. The stroke 2 b lets a joint turn full
+        circle.
 
-    In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A and B, shape (2, d), Pa;
-    geometry from `geometry(q)`; v the joints' velocities, shape (d,), rad/s.
+    In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A
+    and B, shape (2, d), Pa; geometry from `geometry(q)`; v the joints' velocities, shape (d,),
+    rad/s.
     """
 
     hydraulics: Hydraulics
@@ -148,7 +177,9 @@ class Cylinders(Value):
     _leakage: Array
     _best_gamma: float
 
-    def __init__(self, hydraulics: Hydraulics, scale: npt.ArrayLike, max_lever_angle: npt.ArrayLike):
+    def __init__(
+        self, hydraulics: Hydraulics, scale: npt.ArrayLike, max_lever_angle: npt.ArrayLike
+    ):
         as_instance("hydraulics", hydraulics, Hydraulics)
         scale = as_array("scale", scale, (None,))
         if np.any(scale <= 0.0):
@@ -162,7 +193,9 @@ class Cylinders(Value):
             _dead_volume=hydraulics.dead_volume * scale,
             _valve_gain=hydraulics.valve_gain * scale,
             _leakage=hydraulics.leakage * scale,
-            _best_gamma=float(np.arccos(hydraulics.crank / hydraulics.base)),  # γ with crank and cylinder square
+            _best_gamma=float(
+                np.arccos(hydraulics.crank / hydraulics.base)
+            ),  # γ with crank and cylinder square
         )
 
     @property
@@ -173,11 +206,18 @@ class Cylinders(Value):
     def geometry(self, q: npt.ArrayLike) -> CylinderGeometry:
         """Lengths, levers and chambers at joint angles q, shape (d,), rad."""
         gamma = self._best_gamma + as_array("q", q, (self.d,), "rad") - self.max_lever_angle
-        length = np.sqrt(self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma))
+        length = np.sqrt(
+            self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma)
+        )
         extension = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
-        volumes = self._dead_volume + self.areas * np.array([extension, 2.0 * self.crank - extension])
+        volumes = self._dead_volume + self.areas * np.array(
+            [extension, 2.0 * self.crank - extension]
+        )
         compliance = volumes / self.hydraulics.bulk_modulus
-        lever, stiffness = self.base * self.crank * np.sin(gamma) / length, np.sum(self.areas**2 / compliance, axis=0)
+        lever, stiffness = (
+            self.base * self.crank * np.sin(gamma) / length,
+            np.sum(self.areas**2 / compliance, axis=0),
+        )
         return CylinderGeometry(*map(read_only, (length, lever, volumes, compliance, stiffness)))
 
     def force(self, pressures: Array) -> Array:
@@ -190,11 +230,17 @@ class Cylinders(Value):
         return np.array([self.force(lines), self.force(lines[::-1])])
 
     def line_pressures(self, x: Array) -> Array:
-        """Pressure of the line that each chamber is open to, shape (2, d), Pa, when the valve opens towards x."""
-        return np.where(_CHAMBER_SIGN * x >= 0.0, self.hydraulics.supply_pressure, self.hydraulics.tank_pressure)
+        """Pressure of the line that each chamber is open to, shape (2, d), Pa, when the valve opens
+        towards x.
+        """
+        return np.where(
+            _CHAMBER_SIGN * x >= 0.0, self.hydraulics.supply_pressure, self.hydraulics.tank_pressure
+        )
 
     def orifice_flow(self, drop: Array) -> Array:
-        """Flow through an edge, all open, for a drop of pressure, shape (2, d), m³/s: √Δp, but smooth through zero."""
+        """Flow through an edge, all open, for a drop of pressure, shape (2, d), m³/s: √Δp, but
+        smooth through zero.
+        """
         return self._valve_gain * drop / np.sqrt(np.hypot(drop, _LAMINAR_DROP))
 
     def valve_flows(self, x: Array, pressures: Array) -> Array:
@@ -205,33 +251,61 @@ class Cylinders(Value):
         """Flow past the piston out of the chambers A and B, shape (2, d), m³/s."""
         return self._leakage * (pressures - pressures[::-1])
 
-    def pressure_rates(self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> Array:
+    def pressure_rates(
+        self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array
+    ) -> Array:
         """ṗ of the chambers A and B, shape (2, d), Pa/s."""
         inflow = (
-            self.valve_flows(x, pressures) - self.leakage_flow(pressures) - _CHAMBER_SIGN * self.areas * (geometry.lever * v)
+            self.valve_flows(x, pressures)
+            - self.leakage_flow(pressures)
+            - _CHAMBER_SIGN * self.areas * (geometry.lever * v)
         )
         return inflow / geometry.compliance
 
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
-        """-∂ṗ/∂p of each chamber by itself, shape (2, d), 1/s, never negative: how stiff the oil's equations are."""
+        """-∂ṗ/∂p of each chamber by itself, shape (2, d), 1/s, never negative: how stiff the oil's
+        equations are.
+        """
         drop = self.line_pressures(x) - pressures
-        slope = self._valve_gain * (0.5 * drop**2 + _LAMINAR_DROP**2) / np.hypot(drop, _LAMINAR_DROP) ** 2.5
+        slope = (
+            self._valve_gain
+            * (0.5 * drop**2 + _LAMINAR_DROP**2)
+            / np.hypot(drop, _LAMINAR_DROP) ** 2.5
+        )
         return (np.abs(x) * slope + self._leakage) / geometry.compliance
 
-    def opening_for(self, force_rate: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> Array:
-        """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the joints move with v.
+    def opening_for(
+        self, force_rate: Array, pressures: Array, geometry: CylinderGeometry, v: Array
+    ) -> Array:
+        """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the
+        joints move with v.
 
-        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open, so x = (Ḟ + k ℓ̇) / g: it
-        feeds the piston's velocity forward. Leakage is left to the loop's integral. x may be beyond -1 to 1.
+        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open,
+        so x = (Ḟ + k ℓ̇) / g: it feeds the piston's velocity forward. Leakage is left to the loop's
+        integral. x may be beyond -1 to 1.
         """
         valve_force_rate = force_rate + geometry.stiffness * geometry.lever * v
-        full_opening_rate = self.orifice_flow(self.line_pressures(valve_force_rate) - pressures) / geometry.compliance
-        return valve_force_rate / np.maximum(np.sign(valve_force_rate) * self.force(full_opening_rate), _MIN_GAIN)
+        full_opening_rate = (
+            self.orifice_flow(self.line_pressures(valve_force_rate) - pressures)
+            / geometry.compliance
+        )
+        return valve_force_rate / np.maximum(
+            np.sign(valve_force_rate) * self.force(full_opening_rate), _MIN_GAIN
+        )
 
-    def power(self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array) -> PowerBalance:
+    def power(
+        self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array
+    ) -> PowerBalance:
         """Where the power goes at an instant: see `PowerBalance`."""
         flows, line = self.valve_flows(x, pressures), self.line_pressures(x)
         stored = geometry.compliance * pressures * self.pressure_rates(x, pressures, geometry, v)
         leaked = pressures * self.leakage_flow(pressures)
-        pump, valve, leakage, stored = (np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, leaked, stored))
-        return PowerBalance(*map(read_only, (pump, self.force(pressures) * geometry.lever * v, valve, leakage, stored)))
+        pump, valve, leakage, stored = (
+            np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, leaked, stored)
+        )
+        return PowerBalance(
+            *map(
+                read_only,
+                (pump, self.force(pressures) * geometry.lever * v, valve, leakage, stored),
+            )
+        )

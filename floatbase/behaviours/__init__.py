@@ -1,6 +1,13 @@
-"""Behaviours: controllers that step. Gaits, swings, plans of the centre of mass, footholds, `Walk` and `Stand`."""
+"""Behaviours: controllers that step. Gaits, swings, plans of the centre of mass, footholds, `Walk`
+and `Stand`.
+"""
 
-from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment, support_margin
+from floatbase.behaviours.footholds import (
+    capture_point,
+    neutral_point,
+    step_adjustment,
+    support_margin,
+)
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains

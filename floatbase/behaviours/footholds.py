@@ -11,8 +11,11 @@ from floatbase.errors import InputError
 _MAX_EXPONENT = 50.0  # ω times a time: what grows by e^{50} is out of reach of any robot
 
 
-def neutral_point(nominal_foothold: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: float) -> Array:
-    """Raibert's neutral point: the foothold, (2,), m, that the body passes in the middle of the coming stance.
+def neutral_point(
+    nominal_foothold: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: float
+) -> Array:
+    """Raibert's neutral point: the foothold, (2,), m, that the body passes in the middle of the
+    coming stance.
 
     nominal_foothold: (2,), m, world, of the foot below the body at touch-down, as it stands.
     velocity: (2,), m/s, world, of the body.
@@ -20,8 +23,14 @@ def neutral_point(nominal_foothold: npt.ArrayLike, velocity: npt.ArrayLike, stan
 
     Source: Raibert, Legged robots that balance, 1986.
     """
-    nominal_foothold, velocity = as_array("nominal_foothold", nominal_foothold, (2,), "m"), as_array("velocity", velocity, (2,), "m/s")
-    return read_only(nominal_foothold + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0)
+    nominal_foothold, velocity = (
+        as_array("nominal_foothold", nominal_foothold, (2,), "m"),
+        as_array("velocity", velocity, (2,), "m/s"),
+    )
+    return read_only(
+        nominal_foothold
+        + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0
+    )
 
 
 def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> Array:
@@ -30,8 +39,8 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
     com, velocity: (2,) or (3,), m and m/s, world, of the centre of mass; heights do not count.
     omega: 1/s, √(g / height).
 
-    It is the divergent component of motion, too: ξ̇ = ω (ξ - p), so it runs away from the ZMP p. Sources: Pratt et al., Capture
-    point, 2006; Englsberger, Ott, Albu-Schäffer, 2015.
+    It is the divergent component of motion, too: ξ̇ = ω (ξ - p), so it runs away from the ZMP p.
+    Sources: Pratt et al., Capture point, 2006; Englsberger, Ott, Albu-Schäffer, 2015.
     """
     c, v = _horizontal_part("com", com, "m"), _horizontal_part("velocity", velocity, "m/s")
     return read_only(c + v / as_positive("omega", omega, "1/s"))
@@ -41,61 +50,81 @@ def _horizontal_part(name: str, vector: npt.ArrayLike, unit: str) -> Array:
     """x and y of a vector of two or three."""
     array = as_array(name, vector, (None,), unit)
     if len(array) not in (2, 3):
-        raise InputError(f"{name} has shape {array.shape}; it must have shape (2,) or (3,) ({unit}).")
+        raise InputError(
+            f"{name} has shape {array.shape}; it must have shape (2,) or (3,) ({unit})."
+        )
     return array[:2]
 
 
 def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
-    """How far a point is inside the convex hull of the feet, m; negative: how far outside. Level ground, seen from above.
+    """How far a point is inside the convex hull of the feet, m; negative: how far outside. Level
+    ground, seen from above.
 
-    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all points that touch. Both may have
-        heights, which do not count.
-    On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`, whose corners fit, too.
+    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all
+        points that touch. Both may have heights, which do not count.
+    On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`,
+    whose corners fit, too.
     """
     point, feet = _horizontal_part("point", point, "m"), as_array("feet", feet, (None, None), "m")
     if feet.shape[1] not in (2, 3):
         raise InputError(f"feet has shape {feet.shape}; it must have shape (n, 2) or (n, 3) (m).")
     feet = feet[:, :2]
     if not len(feet):
-        raise InputError("a robot in the air has no support region: feet must hold one point at least.")
+        raise InputError(
+            "a robot in the air has no support region: feet must hold one point at least."
+        )
     corners = _convex_hull(feet)
     ends = np.roll(corners, -1, axis=0)
     edges = ends - corners
     lengths = np.linalg.norm(edges, axis=1)
     from_corners = point - corners
-    distances = (edges[:, 0] * from_corners[:, 1] - edges[:, 1] * from_corners[:, 0]) / np.where(lengths > 0.0, lengths, 1.0)
+    distances = (edges[:, 0] * from_corners[:, 1] - edges[:, 1] * from_corners[:, 0]) / np.where(
+        lengths > 0.0, lengths, 1.0
+    )
     if len(corners) > 2 and distances.min() >= 0.0:
         return float(distances.min())
-    fractions = np.clip(np.sum(from_corners * edges, axis=1) / np.where(lengths > 0.0, lengths, 1.0) ** 2, 0.0, 1.0)
+    fractions = np.clip(
+        np.sum(from_corners * edges, axis=1) / np.where(lengths > 0.0, lengths, 1.0) ** 2, 0.0, 1.0
+    )
     return -float(np.linalg.norm(from_corners - fractions[:, None] * edges, axis=1).min())
 
 
 def _convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points, (n, 2), counter-clockwise. Source: Andrew, Another efficient algorithm, 1979."""
+    """Corners of the convex hull of points, (n, 2), counter-clockwise. Source: Andrew, Another
+    efficient algorithm, 1979.
+    """
     ordered = sorted(set(map(tuple, points.tolist())))
     halves: list[list[tuple[float, ...]]] = []
     for line in (ordered, ordered[::-1]):
         half: list[tuple[float, ...]] = []
         for x, y in line:
-            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (half[-1][1] - half[-2][1]) * (
-                x - half[-2][0]
-            ):
+            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (
+                half[-1][1] - half[-2][1]
+            ) * (x - half[-2][0]):
                 half.pop()
             half.append((x, y))
         halves.append(half[:-1])
     return np.array(halves[0] + halves[1] or ordered)
 
 
-def step_adjustment(dcm_error: npt.ArrayLike, time_to_touchdown: float, omega: float, dead_zone: float = 0.0) -> Array:
-    """e^{ω (land - t)} (ξ - ξ_planned): how far to shift a foothold, (2,), m, so that an error now is caught at touch-down.
+def step_adjustment(
+    dcm_error: npt.ArrayLike, time_to_touchdown: float, omega: float, dead_zone: float = 0.0
+) -> Array:
+    """e^{ω (land - t)} (ξ - ξ_planned): how far to shift a foothold, (2,), m, so that an error now
+    is caught at touch-down.
 
     dcm_error: ξ - ξ_planned, (2,), m, world, now.
-    time_to_touchdown: s, until the foot lands; the error grows by e^{ω time_to_touchdown} until then.
+    time_to_touchdown: s, until the foot lands; the error grows by e^{ω time_to_touchdown} until
+        then.
     omega: 1/s, √(g / height).
     dead_zone: m; an error below it counts as none, and a larger one by what is beyond.
     """
     error = as_array("dcm_error", dcm_error, (2,), "m")
     size = float(np.linalg.norm(error))
-    scale = max(0.0, size - as_positive("dead_zone", dead_zone, "m", allow_zero=True)) / (size or 1.0)
-    exponent = as_positive("omega", omega, "1/s") * max(0.0, as_number("time_to_touchdown", time_to_touchdown, "s"))
+    scale = max(0.0, size - as_positive("dead_zone", dead_zone, "m", allow_zero=True)) / (
+        size or 1.0
+    )
+    exponent = as_positive("omega", omega, "1/s") * max(
+        0.0, as_number("time_to_touchdown", time_to_touchdown, "s")
+    )
     return read_only(scale * np.exp(min(exponent, _MAX_EXPONENT)) * error)

@@ -25,14 +25,19 @@ class Gains(Value):
     def __post_init__(self) -> None:
         for name in ("com", "base", "swing", "posture"):
             kp, weight = as_array(f"gains of {name}", getattr(self, name), (2,)).tolist()
-            gains = as_positive(f"kp of {name}", kp, "1/s²"), as_positive(f"weight of {name}", weight, allow_zero=True)
+            gains = (
+                as_positive(f"kp of {name}", kp, "1/s²"),
+                as_positive(f"weight of {name}", weight, allow_zero=True),
+            )
             object.__setattr__(self, name, gains)
 
     @staticmethod
     def for_contacts(contacts: Contacts) -> Gains:
         """Gains that go with point feet or with flat feet."""
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
-        return Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
+        return (
+            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
+        )
 
 
 def flat_foot_names(contacts: Contacts) -> set[str]:
@@ -41,12 +46,19 @@ def flat_foot_names(contacts: Contacts) -> set[str]:
 
 
 def check_options(behaviour: str, options: Iterable[str]) -> None:
-    """Raise `InputError` for an option that `WholeBodyController` does not have. behaviour: name of the class."""
-    known = [name for name in inspect.signature(WholeBodyController).parameters if name not in ("robot", "contacts", "tasks")]
+    """Raise `InputError` for an option that `WholeBodyController` does not have. behaviour: name of
+    the class.
+    """
+    known = [
+        name
+        for name in inspect.signature(WholeBodyController).parameters
+        if name not in ("robot", "contacts", "tasks")
+    ]
     for name in options:
         if name not in known:
             raise InputError(
-                f"{behaviour} has no option {name!r}; beside its own, it takes those of the controller: {', '.join(known)}."
+                f"{behaviour} has no option {name!r}; beside its own, it takes those of the "
+                f"controller: {', '.join(known)}."
             )
 
 
@@ -56,5 +68,6 @@ def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
         if foot not in contacts.names:
             names = ", ".join(contacts.names) or "there are none"
             raise InputError(
-                f"the gait lifts {foot}, which is no contact ({names}); Contacts.feet(robot) gives a robot's feet."
+                f"the gait lifts {foot}, which is no contact ({names}); Contacts.feet(robot) gives "
+                f"a robot's feet."
             )

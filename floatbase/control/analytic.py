@@ -12,7 +12,13 @@ from floatbase._validation import Array, Value, as_array, as_instance, as_positi
 from floatbase.affine import Quadratic
 from floatbase.dynamics import Contacts, EquationsOfMotion, equations_of_motion, feasible_space
 from floatbase.errors import InputError
-from floatbase.objectives import centroidal_inertia, cost_on_space, desired_wrench, force_bias, wrench_objective
+from floatbase.objectives import (
+    centroidal_inertia,
+    cost_on_space,
+    desired_wrench,
+    force_bias,
+    wrench_objective,
+)
 from floatbase.robots import Robot, State
 
 
@@ -28,21 +34,27 @@ class AnalyticCommand(Value):
     qdd: Array
 
     def __repr__(self) -> str:
-        return f"AnalyticCommand(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N)"
+        return (
+            f"AnalyticCommand(|tau|={np.linalg.norm(self.tau):.3g} N·m, "
+            f"|forces|={np.linalg.norm(self.forces):.3g} N)"
+        )
 
 
 class AnalyticController(Value):
-    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every tick.
+    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every
+    tick.
 
-    The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the centre of mass; τ̃_c does the
-    same for the base's rotation, with the robot's inertia about its centre of mass. Nothing keeps
-    forces in their cones or torques within limits. Source: [FBR], §3.1.
+    The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the
+    centre of mass; τ̃_c does the same for the base's rotation, with the robot's inertia about its
+    centre of mass. Nothing keeps forces in their cones or torques within limits. Source: [FBR],
+    §3.1.
 
     robot: the robot to control.
     contacts: its contacts with the ground.
     state: the posture to return to, with its base orientation.
     com: (3,) m, world, desired centre of mass; that of `state` by default.
-    alpha: ≥ 0, weight of the normal forces' distance from `a`, beside that of the tangential forces, in (23).
+    alpha: ≥ 0, weight of the normal forces' distance from `a`, beside that of the tangential
+        forces, in (23).
     a: N, the normal force that (23) prefers at each point; the weight's even share by default.
     kp: 1/s², stiffness.
     kd: 1/s, damping.
@@ -50,8 +62,9 @@ class AnalyticController(Value):
     posture_weight: per (rad/s²)², weight of the joints' return to `state`.
     torque_weight: per (N·m)², weight of ‖τ‖².
 
-    `posture_weight` and `torque_weight` settle what (22)(23) leave open (d > k). Where nothing is left open they compete with the desired
-    wrench; a light robot feels the weight of the posture more. Raises `InputError` for values that do not fit.
+    `posture_weight` and `torque_weight` settle what (22)(23) leave open (d > k). Where nothing is
+    left open they compete with the desired wrench; a light robot feels the weight of the posture
+    more. Raises `InputError` for values that do not fit.
     """
 
     robot: Robot
@@ -91,7 +104,8 @@ class AnalyticController(Value):
             contacts=contacts,
             com=as_array("com", state.com if com is None else com, (3,), "m"),
             _desired_state=state,
-            _force_bias=as_positive("bias_weight", bias_weight) * force_bias(contacts, alpha, weight_share if a is None else a),
+            _force_bias=as_positive("bias_weight", bias_weight)
+            * force_bias(contacts, alpha, weight_share if a is None else a),
             _kp=as_positive("kp", kp, "1/s²"),
             _kd=as_positive("kd", kd, "1/s"),
             _posture_weight=as_positive("posture_weight", posture_weight),
@@ -102,15 +116,29 @@ class AnalyticController(Value):
         """The costs on q̈, τ and λ whose sum is minimised."""
         state = as_instance("eom", eom, EquationsOfMotion).state
         if state.robot != self.robot:
-            raise InputError(f"the equations are of {state.robot.name}, the controller of another robot, {self.robot.name}.")
+            raise InputError(
+                f"the equations are of {state.robot.name}, the controller of another robot, "
+                f"{self.robot.name}."
+            )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
-        R, R_desired = state.frame_pose("base").rotation, self._desired_state.frame_pose("base").rotation
-        angular_acceleration = -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
+        R, R_desired = (
+            state.frame_pose("base").rotation,
+            self._desired_state.frame_pose("base").rotation,
+        )
+        angular_acceleration = (
+            -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
+        )
         wrench = desired_wrench(state, a, centroidal_inertia(state) @ angular_acceleration)
         force_cost = wrench_objective(state, eom.contacts, *wrench) + self._force_bias
-        joint_acceleration = (-self._kp * state.difference(self._desired_state.q) - self._kd * state.v)[eom.nv - eom.d :]
+        joint_acceleration = (
+            -self._kp * state.difference(self._desired_state.q) - self._kd * state.v
+        )[eom.nv - eom.d :]
         qdd_cost = Quadratic.from_residual(eom.S.T, joint_acceleration, self._posture_weight)
-        return qdd_cost, Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque_weight), force_cost
+        return (
+            qdd_cost,
+            Quadratic.from_residual(np.eye(eom.d), np.zeros(eom.d), self._torque_weight),
+            force_cost,
+        )
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
         """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""

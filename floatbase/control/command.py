@@ -16,7 +16,8 @@ class Command(Value):
     """One answer of `WholeBodyController`.
 
     tau: (d,) N·m, joint torques to apply.
-    qdd: (nv,), the acceleration planned with them: base linear m/s² and angular rad/s² in the base frame, then joints.
+    qdd: (nv,), the acceleration planned with them: base linear m/s² and angular rad/s² in the base
+        frame, then joints.
     forces: (k,) N, world, the contact forces planned with them, stacked as in `contacts`.
     contacts: the contacts that the forces act at.
     backend: which backend answered, "compiled" or "reference".
@@ -41,7 +42,9 @@ class Command(Value):
         backend: str,
         solution: Solution | Callable[[], Solution],
     ) -> None:
-        values = self.__dict__  # written to directly: a frozen dataclass takes 0.4 µs more at every tick, this 0.1 µs
+        values = (
+            self.__dict__
+        )  # written to directly: a frozen dataclass takes 0.4 µs more at every tick, this 0.1 µs
         values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
         values["contacts"], values["backend"], values["_solution"] = contacts, backend, solution
 
@@ -51,15 +54,21 @@ class Command(Value):
         return self._solution if isinstance(self._solution, Solution) else self._solution()
 
     def __getstate__(self) -> dict[str, Any]:
-        return super().__getstate__() | {"_solution": self.solution}  # the function that makes it holds the compiled tick
+        return super().__getstate__() | {
+            "_solution": self.solution
+        }  # the function that makes it holds the compiled tick
 
     def force(self, name: str) -> Array:
-        """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its corners."""
+        """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its
+        corners.
+        """
         return self.contacts.force_of(self.forces, name)
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequalities, such as "FL_foot facet 2": `ConstraintLabel`s, which also know kind and owner."""
+        """Names of the active inequalities, such as "FL_foot facet 2": `ConstraintLabel`s, which
+        also know kind and owner.
+        """
         return self.solution.active
 
     @property
@@ -69,6 +78,7 @@ class Command(Value):
 
     def __repr__(self) -> str:
         return (
-            f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, |forces|={np.linalg.norm(self.forces):.3g} N, "
+            f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, "
+            f"|forces|={np.linalg.norm(self.forces):.3g} N, "
             f"{len(self.active)} rows active, {self.backend})"
         )

@@ -1,4 +1,6 @@
-"""The inequalities of (27) without a state: friction, normal forces, torque limits, and user-defined rows."""
+"""The inequalities of (27) without a state: friction, normal forces, torque limits, and
+user-defined rows.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,11 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, as_torque_limits
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
-SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of each block: its name among the equations of motion
+SIZES = {
+    "qdd": "nv",
+    "tau": "d",
+    "forces": "k",
+}  # of each block: its name among the equations of motion
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -43,14 +49,16 @@ class LinearInequality(Value):
 
     name: in messages; of the row, where there is one, else of "name 0", "name 1", …
     block: "qdd", "tau" or "forces".
-    coefficients: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives them; n is the size of the block, which
-        for forces goes with the contacts. The unit is that of the rows: N for forces, m/s² or rad/s² for accelerations.
+    coefficients: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives
+        them; n is the size of the block, which for forces goes with the contacts. The unit is that
+        of the rows: N for forces, m/s² or rad/s² for accelerations.
     row_names: one text for each row instead of its number, such as the names of joints.
 
-    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]: `LinearInequality("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`.
-    At most 500 N from all feet, however many stand:
-    `LinearInequality("total", "forces", lambda eom, t: (np.tile([0.0, 0.0, 1.0], (1, eom.k // 3)), [500.0]))`.
-    Raises `InputError` for another block; `at` does so for shapes that do not fit.
+    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]:
+    `LinearInequality("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`. At most 500 N from all
+    feet, however many stand: `LinearInequality("total", "forces", lambda eom, t: (np.tile([0.0,
+    0.0, 1.0], (1, eom.k // 3)), [500.0]))`. Raises `InputError` for another block;
+    `at` does so for shapes that do not fit.
     """
 
     name: str
@@ -62,9 +70,12 @@ class LinearInequality(Value):
         as_string("name of the inequality", self.name)
         if as_string("block of the inequality", self.block) not in BLOCKS:
             raise InputError(
-                f'inequality {self.name!r} has block {short_repr(self.block)}; it must be "qdd", "tau" or "forces".'
+                f'inequality {self.name!r} has block {short_repr(self.block)}; it must be "qdd", '
+                f'"tau" or "forces".'
             )
-        object.__setattr__(self, "row_names", as_strings(f"row_names of {self.name}", self.row_names))
+        object.__setattr__(
+            self, "row_names", as_strings(f"row_names of {self.name}", self.row_names)
+        )
         if callable(self.coefficients) and not isinstance(self.coefficients, type):
             as_callable(f"coefficients of {self.name}", self.coefficients, "coefficients(eom, t)")
         else:
@@ -77,25 +88,43 @@ class LinearInequality(Value):
             not callable(self.coefficients) and np.shape(self.coefficients[0])[1] == n
         ):  # checked when they were made, but for that
             return cast("tuple[Array, Array]", self.coefficients)
-        return self._checked(self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n)
+        return self._checked(
+            self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n
+        )
 
     def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
-        """A label for each of m rows. Raises `InputError` where there is another number of row names."""
+        """A label for each of m rows. Raises `InputError` where there is another number of row
+        names.
+        """
         if self.row_names and len(self.row_names) != m:
             raise InputError(
-                f"inequality {self.name!r} has {len(self.row_names)} row names and {m} rows; give one for each row."
+                f"inequality {self.name!r} has {len(self.row_names)} row names and {m} rows; give "
+                f"one for each row."
             )
         if self.row_names:
-            return tuple(ConstraintLabel(f"{self.name} {row_name}", self.name, row_name) for row_name in self.row_names)
-        return tuple(ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "inequality", self.name, i) for i in range(m))
+            return tuple(
+                ConstraintLabel(f"{self.name} {row_name}", self.name, row_name)
+                for row_name in self.row_names
+            )
+        return tuple(
+            ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "inequality", self.name, i)
+            for i in range(m)
+        )
 
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         if not isinstance(given, tuple | list) or len(given) != 2:
-            raise InputError(f"inequality {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}.")
+            raise InputError(
+                f"inequality {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}."
+            )
         G = as_array(f"G of {self.name}", given[0], (None, None))
         if n is not None and G.shape[1] != n:
-            follows = "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
-            raise InputError(f"inequality {self.name!r} takes {G.shape[1]} numbers; its block {self.block!r} has {n}{follows}.")
+            follows = (
+                "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
+            )
+            raise InputError(
+                f"inequality {self.name!r} takes {G.shape[1]} numbers; its block {self.block!r} "
+                f"has {n}{follows}."
+            )
         return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
 
@@ -105,12 +134,13 @@ class Limits(Value):
 
     torque_limits: shape (d,), N·m, +inf where there is none.
     facets: number of facets of the friction polyhedron (28) of every contact point.
-    inner_approximation: whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    inner_approximation: whether the polyhedron lies inside the friction cone (safe) or outside it
+        (optimistic).
     facet_rotation: rad, by which its facets are turned about the normal.
-    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point, so at each corner of a flat foot: one
-        number for all, or a mapping from the name of a contact to a number or a function of the time t in s; 0 and none where
-        it has none. The bound of a name that is not among the contacts waits until it is: a foot that has lifted will stand
-        again.
+    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point, so at each
+        corner of a flat foot: one number for all, or a mapping from the name of a contact to a
+        number or a function of the time t in s; 0 and none where it has none. The bound of a name
+        that is not among the contacts waits until it is: a foot that has lifted will stand again.
     inequalities: user-defined inequality rows.
 
     Raises `InputError` for values that do not fit.
@@ -126,23 +156,39 @@ class Limits(Value):
 
     def __post_init__(self) -> None:
         limits = numeric_copy(self.torque_limits)
-        object.__setattr__(self, "torque_limits", as_torque_limits(1 if limits is None else limits.size, self.torque_limits))
-        object.__setattr__(self, "min_normal_force", _checked_bounds("min_normal_force", self.min_normal_force))
+        object.__setattr__(
+            self,
+            "torque_limits",
+            as_torque_limits(1 if limits is None else limits.size, self.torque_limits),
+        )
+        object.__setattr__(
+            self, "min_normal_force", _checked_bounds("min_normal_force", self.min_normal_force)
+        )
         object.__setattr__(
             self,
             "max_normal_force",
-            _checked_bounds("max_normal_force", {} if self.max_normal_force is None else self.max_normal_force),
+            _checked_bounds(
+                "max_normal_force", {} if self.max_normal_force is None else self.max_normal_force
+            ),
         )
         polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, *self.polyhedron_options)
         for name in ("facets", "inner_approximation", "facet_rotation"):
             object.__setattr__(self, name, getattr(polyhedron, name))
-        if isinstance(self.inequalities, LinearInequality) or not isinstance(self.inequalities, Sequence):
-            raise InputError(f"inequalities must be a list of LinearInequality, not {short_repr(self.inequalities)}.")
+        if isinstance(self.inequalities, LinearInequality) or not isinstance(
+            self.inequalities, Sequence
+        ):
+            raise InputError(
+                f"inequalities must be a list of LinearInequality, not "
+                f"{short_repr(self.inequalities)}."
+            )
         example = "floatbase.control.LinearInequality(name, block, (G, h))"
         object.__setattr__(
             self,
             "inequalities",
-            tuple(as_instance("each of inequalities", each, LinearInequality, example) for each in self.inequalities),
+            tuple(
+                as_instance("each of inequalities", each, LinearInequality, example)
+                for each in self.inequalities
+            ),
         )
 
     @property
@@ -153,30 +199,44 @@ class Limits(Value):
     @cached_property
     def time_varying(self) -> bool:
         """Whether a normal force is bounded by a function of time."""
-        return any(callable(value) for bound in self._bounds_by_name.values() for value in bound.values())
+        return any(
+            callable(value) for bound in self._bounds_by_name.values() for value in bound.values()
+        )
 
     @property
     def _bounds_by_name(self) -> dict[str, Mapping[str, Any]]:
         """The bounds of normal forces that are mappings, by the name of the argument."""
-        both = {"min_normal_force": self.min_normal_force, "max_normal_force": self.max_normal_force}
+        both = {
+            "min_normal_force": self.min_normal_force,
+            "max_normal_force": self.max_normal_force,
+        }
         return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
 
     def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
-        """Raise `UnknownNameError` where a normal force is bounded by a name that is neither known nor in the limits before."""
-        names = {name for some in (*known, *(before._bounds_by_name.values() if before else ())) for name in some}
+        """Raise `UnknownNameError` where a normal force is bounded by a name that is neither known
+        nor in the limits before.
+        """
+        names = {
+            name
+            for some in (*known, *(before._bounds_by_name.values() if before else ()))
+            for name in some
+        }
         for argument, bound in self._bounds_by_name.items():
             for name in bound:
                 if name not in names:
                     raise unknown_name(f"contact in {argument}", name, names)
 
     def normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
-        """Least and largest normal force, N, of each point at time t in s, shapes (P,); inf where none is the largest.
+        """Least and largest normal force, N, of each point at time t in s, shapes (P,); inf where
+        none is the largest.
 
         Raises `InputError` for a function's value that is no force.
         """
         if not self.time_varying:
             return _constant_normal_forces(contacts, self)
-        return _bounds_at("min_normal_force", self.min_normal_force, contacts, t, 0.0), self._max_normal_forces(contacts, t)
+        return _bounds_at(
+            "min_normal_force", self.min_normal_force, contacts, t, 0.0
+        ), self._max_normal_forces(contacts, t)
 
     def _max_normal_forces(self, contacts: Contacts, t: float) -> Array:
         assert self.max_normal_force is not None  # as it was made
@@ -186,7 +246,10 @@ class Limits(Value):
         """Which points have a largest normal force, shape (P,)."""
         given = self.max_normal_force
         names = given if isinstance(given, Mapping) else contacts.names
-        return np.array([contact.name in names for contact in contacts for _ in contact.point_names], dtype=np.bool_)
+        return np.array(
+            [contact.name in names for contact in contacts for _ in contact.point_names],
+            dtype=np.bool_,
+        )
 
 
 def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
@@ -194,7 +257,10 @@ def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
     if not isinstance(given, Mapping):
         one = numeric_copy(given)
         if one is None or one.ndim:
-            by_name = 'or a mapping from the name of a contact to one or to a function, as {"FL_foot": lambda t: …}'
+            by_name = (
+                "or a mapping from the name of a contact to one or to a function, as "
+                '{"FL_foot": lambda t: …}'
+            )
             raise InputError(f"{name} must be one number (N), {by_name}, not {short_repr(given)}.")
         return as_positive(name, given, "N", allow_zero=True)
     return MappingProxyType(
@@ -207,7 +273,9 @@ def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
     )
 
 
-def _bounds_at(name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float) -> Array:
+def _bounds_at(
+    name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float
+) -> Array:
     """Bounds of normal forces at time t, (P,)."""
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
@@ -220,7 +288,8 @@ def _bounds_at(name: str, given: NormalForces, contacts: Contacts, t: float, oth
     return np.array(found, dtype=np.float64)
 
 
-# what does not depend on the state is built once for each contacts, robot and limits (all immutable)
+# what does not depend on the state is built once for each contacts, robot and limits (all
+# immutable)
 @lru_cache(maxsize=64)
 def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
     least = _bounds_at("min_normal_force", limits.min_normal_force, contacts, 0.0, 0.0)
@@ -229,20 +298,29 @@ def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, 
 
 @lru_cache(maxsize=64)
 def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[ConstraintLabel, ...]]:
-    """G of friction facets and least normal force of every point, then of the largest normal forces, and the rows' names."""
+    """G of friction facets and least normal force of every point, then of the largest normal
+    forces, and the rows' names.
+    """
     per_point = limits.facets + 1
     names: list[ConstraintLabel] = []
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.polyhedron_options)
-        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = np.vstack(
-            [cone.face_matrix, -cone.normal]
+        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = (
+            np.vstack([cone.face_matrix, -cone.normal])
         )
-        names += [ConstraintLabel(f"{point} facet {facet}", "friction", point, facet) for facet in range(limits.facets)]
+        names += [
+            ConstraintLabel(f"{point} facet {facet}", "friction", point, facet)
+            for facet in range(limits.facets)
+        ]
         names.append(ConstraintLabel(f"{point} normal force", "normal force", point))
     bounded = np.flatnonzero(limits.bounded_points(contacts))
     names += [
-        ConstraintLabel(f"{contacts.point_names[i]} largest normal force", "largest normal force", contacts.point_names[i])
+        ConstraintLabel(
+            f"{contacts.point_names[i]} largest normal force",
+            "largest normal force",
+            contacts.point_names[i],
+        )
         for i in bounded
     ]
     return read_only(np.vstack([G, -G[limits.facets :: per_point][bounded]])), tuple(names)
@@ -261,5 +339,8 @@ def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[Const
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
     sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]
-    names = tuple(ConstraintLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint) for side, joint in sides)
+    names = tuple(
+        ConstraintLabel(f"torque limit {joint} {side}", f"{side} torque limit", joint)
+        for side, joint in sides
+    )
     return read_only(np.vstack([rows, -rows])), read_only(np.tile(bound, 2)), names

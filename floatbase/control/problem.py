@@ -14,7 +14,14 @@ from floatbase._validation import Array, Value, as_callable, as_instance, as_pos
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
-from floatbase.dynamics import CONSTRAINT_NOISE, Block, Contacts, EquationsOfMotion, equations_of_motion, resolved_constraint
+from floatbase.dynamics import (
+    CONSTRAINT_NOISE,
+    Block,
+    Contacts,
+    EquationsOfMotion,
+    equations_of_motion,
+    resolved_constraint,
+)
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
 from floatbase.qp import QP, ConstraintLabel
@@ -22,14 +29,18 @@ from floatbase.robots import Robot, State, as_torque_limits
 
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
-INCONSISTENCY_TOLERANCE = 1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+INCONSISTENCY_TOLERANCE = (
+    1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Value):
-    """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning there.
+    """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning
+    there.
 
-    Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not fit.
+    Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not
+    fit.
     """
 
     robot: Robot
@@ -39,7 +50,12 @@ class Problem(Value):
     mismatch: ModelMismatch = NO_MISMATCH
 
     def __post_init__(self) -> None:
-        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits), ("mismatch", ModelMismatch)):
+        for name, kind in (
+            ("robot", Robot),
+            ("contacts", Contacts),
+            ("limits", Limits),
+            ("mismatch", ModelMismatch),
+        ):
             as_instance(name, getattr(self, name), kind)
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
@@ -47,11 +63,17 @@ class Problem(Value):
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""
         if isinstance(state, State) and state.robot != self.robot:
-            raise InputError(f"the state belongs to another robot, {state.robot!r}, than the problem, {self.robot!r}.")
-        return build_qp(equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.mismatch)
+            raise InputError(
+                f"the state belongs to another robot, {state.robot!r}, than the problem, "
+                f"{self.robot!r}."
+            )
+        return build_qp(
+            equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.mismatch
+        )
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
-        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and make no QP.
+        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and
+        make no QP.
 
         tasks: those to check, all by default.
         """
@@ -65,31 +87,48 @@ class Problem(Value):
 
 
 def build_qp(
-    eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0, mismatch: ModelMismatch = NO_MISMATCH
+    eom: EquationsOfMotion,
+    tasks: Sequence[Task],
+    limits: Limits,
+    t: float = 0.0,
+    mismatch: ModelMismatch = NO_MISMATCH,
 ) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
-    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion (7). Inequalities: those of
+    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion
+        (7). Inequalities: those of
     `Limits`. Source: [FBR], §4.1.
 
     eom: the equations of motion (7) at a state.
-    tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is missing).
+    tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is
+        missing).
     limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
     mismatch: what is taken for (7) instead of eom; tasks and user-defined rows see eom.
 
-    Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a measured velocity that the
-    contacts do not quite allow makes them inconsistent. The rows therefore count along the directions that A resolves well
-    (`floatbase.dynamics.resolved_constraint`). Raises `InfeasibleError` where they are inconsistent beyond that.
+    Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a
+    measured velocity that the contacts do not quite allow makes them inconsistent. The rows
+    therefore count along the directions that A resolves well
+    (`floatbase.dynamics.resolved_constraint`). Raises `InfeasibleError` where they are inconsistent
+    beyond that.
     """
     as_instance("eom", eom, EquationsOfMotion)
     as_instance("limits", limits, Limits)
     as_instance("mismatch", mismatch, ModelMismatch)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
-        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
+        raise InputError(
+            f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not "
+            f"{short_repr(tasks)}."
+        )
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     inequalities = [each.at(eom, t) for each in limits.inequalities]
-    qp = assemble_qp(mismatch.assumed_equations(eom), costs, limits, limits.normal_forces(eom.contacts, t), inequalities)
+    qp = assemble_qp(
+        mismatch.assumed_equations(eom),
+        costs,
+        limits,
+        limits.normal_forces(eom.contacts, t),
+        inequalities,
+    )
     return mismatch.assumed_qp(qp, eom)
 
 
@@ -115,7 +154,9 @@ def assemble_qp(
         H[block, block] += weight * residual.A.T @ residual.A
         g[block] += weight * residual.A.T @ residual.b
     motion, b = _resolved_motion_rows(eom)
-    A = np.vstack([np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])])
+    A = np.vstack(
+        [np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])]
+    )
     G_force, names = force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
     blocks_of_G: list[tuple[Block, Array, Array]] = [
@@ -130,7 +171,17 @@ def assemble_qp(
     for each, G_part, _ in blocks_of_G:
         G[row : row + len(G_part), blocks[each]] = G_part
         row += len(G_part)
-    return QP(H, g, A, np.concatenate([-eom.h, b]), G, h, _equality_names(eom.robot, eom.contacts), names, blocks)
+    return QP(
+        H,
+        g,
+        A,
+        np.concatenate([-eom.h, b]),
+        G,
+        h,
+        _equality_names(eom.robot, eom.contacts),
+        names,
+        blocks,
+    )
 
 
 @contextmanager
@@ -141,7 +192,10 @@ def dry_run() -> Iterator[None]:
     except FloatbaseError:
         raise
     except Exception as error:
-        error.add_note("Raised while a controller was made: it tries what it is given once, at t = 0, where the robot stands.")
+        error.add_note(
+            "Raised while a controller was made: it tries what it is given once, at t = 0, where "
+            "the robot stands."
+        )
         raise
 
 
@@ -152,21 +206,40 @@ def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
-    """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or torques."""
+    """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or
+    torques.
+    """
     if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
-        raise InputError(f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not {short_repr(tasks)}.")
+        raise InputError(
+            f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not "
+            f"{short_repr(tasks)}."
+        )
     tasks = tuple(tasks)
     for task in tasks:
         lacks = [part for part in _TASK_ATTRIBUTES if not hasattr(task, part)]
         if 0 < len(lacks) < len(_TASK_ATTRIBUTES):
-            has = "a task has block, name, weight and residual(eom, t), as floatbase.objectives.Task says"
-            raise InputError(f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; {has}.")
+            has = (
+                "a task has block, name, weight and residual(eom, t), as "
+                "floatbase.objectives.Task says"
+            )
+            raise InputError(
+                f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; "
+                f"{has}."
+            )
         if lacks or isinstance(task, type) or not callable(task.residual):
-            raise InputError(f"tasks must hold tasks, such as fb.CoMTask(state.com); {short_repr(task)} is none.")
+            raise InputError(
+                f"tasks must hold tasks, such as fb.CoMTask(state.com); {short_repr(task)} is none."
+            )
         if task.block not in BLOCKS:
-            raise InputError(f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".')
+            raise InputError(
+                f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".'
+            )
         as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
-    missing = [kind() for kind in (ForceTask, TorqueTask) if not any(task.block == kind.block for task in tasks)]
+    missing = [
+        kind()
+        for kind in (ForceTask, TorqueTask)
+        if not any(task.block == kind.block for task in tasks)
+    ]
     return tasks + tuple(cast("list[Task]", missing))
 
 
@@ -175,7 +248,9 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     try:
         residual = task.residual(eom, t)
     except InputError as error:  # such as an `Affine` that holds NaN: say whose it is
-        raise error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}") from None
+        raise (
+            error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}")
+        ) from None
     except TypeError:
         as_callable(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
         raise
@@ -184,22 +259,31 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         raise InputError(f"the residual of {task.name!r} must be {form}.")
     size = getattr(eom, SIZES[task.block])
     if residual.n_in != size:
-        raise InputError(f"the residual of {task.name!r} takes {residual.n_in} numbers; its block {task.block!r} has {size}.")
+        raise InputError(
+            f"the residual of {task.name!r} takes {residual.n_in} numbers; its block "
+            f"{task.block!r} has {size}."
+        )
     return residual
 
 
 def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """(5) A (m, nv) and b (m,) along the directions that A resolves.
 
-    Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts' own motion explains.
+    Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts'
+    own motion explains.
     """
     A, b = resolved_constraint(eom)
     gap = np.abs(eom.b - b)
     velocity = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
     if np.max(gap, initial=0.0) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * velocity:
-        names = [_equality_names(eom.robot, eom.contacts)[eom.nv + i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
+        names = [
+            _equality_names(eom.robot, eom.contacts)[eom.nv + i]
+            for i in np.flatnonzero(gap > 0.1 * gap.max())
+        ]
         raise InfeasibleError(
-            f"these motions are inconsistent: {', '.join(names)}. At least one of their constraints has to go.", names
+            f"these motions are inconsistent: {', '.join(names)}. At least one of their "
+            f"constraints has to go.",
+            names,
         )
     return A, b
 
@@ -207,7 +291,18 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 @lru_cache(maxsize=64)
 def _equality_names(robot: Robot, contacts: Contacts) -> tuple[ConstraintLabel, ...]:
     """Names of the rows of (7)."""
-    axes = [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"] if robot.is_floating else []
-    dynamics = [ConstraintLabel(f"dynamics {owner}", "dynamics", owner) for owner in (*axes, *robot.joint_names)]
-    motion = [(contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)]
-    return *dynamics, *(ConstraintLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion)
+    axes = (
+        [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
+        if robot.is_floating
+        else []
+    )
+    dynamics = [
+        ConstraintLabel(f"dynamics {owner}", "dynamics", owner)
+        for owner in (*axes, *robot.joint_names)
+    ]
+    motion = [
+        (contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)
+    ]
+    return *dynamics, *(
+        ConstraintLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion
+    )

@@ -17,7 +17,8 @@ from floatbase.robots import State
 
 @dataclass(frozen=True, eq=False)
 class SoftContact(Value):
-    """A contact that holds no motion: forces act at its points, inside their cones, and `ContactMotionTask` asks it to stand still.
+    """A contact that holds no motion: forces act at its points, inside their cones, and
+    `ContactMotionTask` asks it to stand still.
 
     contact: the rigid contact.
     """
@@ -81,9 +82,15 @@ class ContactMotionTask(Value):
         return Affine(A, -b)
 
 
-def with_soft_contacts(contacts: Contacts, tasks: Sequence[Task], weight: float) -> tuple[Contacts, tuple[Task, ...]]:
-    """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this weight."""
-    rigid = Contacts([contact.contact if isinstance(contact, SoftContact) else contact for contact in contacts])
+def with_soft_contacts(
+    contacts: Contacts, tasks: Sequence[Task], weight: float
+) -> tuple[Contacts, tuple[Task, ...]]:
+    """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this
+    weight.
+    """
+    rigid = Contacts(
+        [contact.contact if isinstance(contact, SoftContact) else contact for contact in contacts]
+    )
     other_tasks = [task for task in tasks if not isinstance(task, ContactMotionTask)]
     motion_task = ContactMotionTask(rigid, as_positive("contact_weight", weight))
     return Contacts([SoftContact(contact) for contact in rigid]), (*other_tasks, motion_task)

@@ -1,6 +1,13 @@
-"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the course text)."""
+"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the course
+text).
+"""
 
-from floatbase.dynamics.constraint_rank import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE, contact_space, resolved_constraint
+from floatbase.dynamics.constraint_rank import (
+    CONSTRAINT_NOISE,
+    CONSTRAINT_RANK_TOLERANCE,
+    contact_space,
+    resolved_constraint,
+)
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
 from floatbase.dynamics.contact import UP, Contact, FlatFootContact, PointContact, grasp_matrix
 from floatbase.dynamics.contacts import Contacts, constraint_and_jacobian
@@ -29,10 +36,15 @@ from floatbase.dynamics.subspace import (
 
 # fmt: off
 __all__ = [
-    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contact", "Contacts", "EquationsOfMotion", "FeasibleSpace",
-    "FlatFootContact", "LinearConstraint", "PointContact", "RollingWheel", "accelerations_from_torques", "bias_forces",
-    "centripetal_acceleration", "constraint_and_jacobian", "contact_space", "coriolis_matrix", "delassus_matrix", "dimensions",
-    "equations_of_motion", "feasible_space", "fixed_frame", "forces_from_torques", "grasp_matrix", "inertia_rate",
-    "internal_forces", "motion_matrix", "moving_frame", "power_identity", "resolved_constraint", "torque_force_matrix",
+    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contact", "Contacts",
+    "EquationsOfMotion", "FeasibleSpace",
+    "FlatFootContact", "LinearConstraint", "PointContact", "RollingWheel",
+    "accelerations_from_torques", "bias_forces",
+    "centripetal_acceleration", "constraint_and_jacobian", "contact_space", "coriolis_matrix",
+    "delassus_matrix", "dimensions",
+    "equations_of_motion", "feasible_space", "fixed_frame", "forces_from_torques", "grasp_matrix",
+    "inertia_rate",
+    "internal_forces", "motion_matrix", "moving_frame", "power_identity", "resolved_constraint",
+    "torque_force_matrix",
     "torque_force_space", "undetermined_forces", "view_from_rotating_frame",
 ]

@@ -8,7 +8,16 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_array, as_positive, as_string, cross, read_only, unit_vector
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_positive,
+    as_string,
+    cross,
+    read_only,
+    unit_vector,
+)
 from floatbase.robots import State, as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
@@ -17,14 +26,17 @@ DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry c
 
 @runtime_checkable
 class Contact(Protocol):
-    """What every contact offers: rows A q̈ = b of the motion it holds, points where its forces act, a friction cone for each.
+    """What every contact offers: rows A q̈ = b of the motion it holds, points where its forces act,
+    a friction cone for each.
 
-    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in order.
+    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in
+    order.
 
     name: in messages, active rows and pictures.
     mu: coefficient of friction.
     normal: unit normal out of the ground, shape (3,), world.
-    point_names: one for each point that carries a force; empty for a constraint whose forces have no friction cone.
+    point_names: one for each point that carries a force; empty for a constraint whose forces have
+        no friction cone.
     k: number of force components.
     row_names: one for each row of (5).
     """
@@ -54,7 +66,9 @@ class Contact(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SinglePointContact(Value):
-    """What contacts at one point of a frame's body share; `_arm` says where the point is and how it moves on the body."""
+    """What contacts at one point of a frame's body share; `_arm` says where the point is and how it
+    moves on the body.
+    """
 
     frame: str
     k: ClassVar[int] = 3
@@ -90,7 +104,9 @@ class SinglePointContact(Value):
         return read_only(J[:3] - pin.skew(arm) @ J[3:])
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,), world."""
+        """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,),
+        world.
+        """
         raise NotImplementedError
 
 
@@ -98,8 +114,8 @@ class SinglePointContact(Value):
 class PointContact(SinglePointContact):
     """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
 
-    The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls, that point moves on the
-    ball, which b takes into account.
+    The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls,
+    that point moves on the ball, which b takes into account.
 
     frame: name of the frame that carries the point.
     normal: shape (3,), world, out of the ground; it is scaled to unit length.
@@ -115,21 +131,30 @@ class PointContact(SinglePointContact):
 
     def __post_init__(self) -> None:
         check_contact(self)
-        object.__setattr__(self, "radius", as_positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True))
-        object.__setattr__(self, "centre", as_array(f"centre of {self.frame}", self.centre, (3,), "m"))
+        object.__setattr__(
+            self,
+            "radius",
+            as_positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True),
+        )
+        object.__setattr__(
+            self, "centre", as_array(f"centre of {self.frame}", self.centre, (3,), "m")
+        )
 
     def _arm(self, state: State) -> tuple[Array, Array]:
         """R c - r n. Only R c turns with the foot, the contact point stays below the centre."""
         to_centre = state.frame_pose(self.frame).rotation @ self.centre
-        return to_centre - self.radius * self.normal, cross(state.frame_velocity(self.frame)[3:], to_centre)
+        return to_centre - self.radius * self.normal, cross(
+            state.frame_velocity(self.frame)[3:], to_centre
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class FlatFootContact(Value):
-    """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note 9 of the course text).
+    """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note
+    9 of the course text).
 
-    The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the motion of the corners would
-    have rank 6, and would be inconsistent when the foot turns.
+    The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the
+    motion of the corners would have rank 6, and would be inconsistent when the foot turns.
 
     frame: name of the foot's frame.
     corners: shape (n, 3), m, in the frame.
@@ -141,7 +166,14 @@ class FlatFootContact(Value):
     corners: Array
     normal: Array = field(default_factory=lambda: UP)
     mu: float = DEFAULT_MU
-    row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z", "angular x", "angular y", "angular z")  # world-aligned
+    row_names: ClassVar[tuple[str, ...]] = (
+        "x",
+        "y",
+        "z",
+        "angular x",
+        "angular y",
+        "angular z",
+    )  # world-aligned
 
     def __post_init__(self) -> None:
         check_contact(self)
@@ -167,7 +199,9 @@ class FlatFootContact(Value):
         return read_only([state.point(self.frame, corner) for corner in self.corners])
 
     def force_generator_matrix(self, state: State) -> Array:
-        """Corner forces to their wrench at the frame's origin, (6, k), N, N·m, world axes: J = force_generator_matrixᵀ A."""
+        """Corner forces to their wrench at the frame's origin, (6, k), N, N·m, world axes: J =
+        force_generator_matrixᵀ A.
+        """
         return grasp_matrix(self.corners @ state.frame_pose(self.frame).rotation.T, np.zeros(3))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
@@ -180,7 +214,8 @@ class FlatFootContact(Value):
 
 
 def grasp_matrix(points: Array, reference_point: Array) -> Array:
-    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench about a point, shape (3,).
+    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench
+    about a point, shape (3,).
 
     Known as the grasp matrix in manipulation. N and N·m, world.
     """
@@ -196,4 +231,6 @@ def check_contact(contact: Contact) -> None:
     """Check a new contact's friction coefficient and normal, and scale the normal to unit length."""
     as_string("frame of a contact", contact.name)
     object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
-    object.__setattr__(contact, "mu", as_positive(f"friction coefficient mu of {contact.name}", contact.mu))
+    object.__setattr__(
+        contact, "mu", as_positive(f"friction coefficient mu of {contact.name}", contact.mu)
+    )

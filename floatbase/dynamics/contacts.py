@@ -22,7 +22,14 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.dynamics.constraints import LinearConstraint
-from floatbase.dynamics.contact import DEFAULT_MU, UP, Contact, FlatFootContact, PointContact, SinglePointContact
+from floatbase.dynamics.contact import (
+    DEFAULT_MU,
+    UP,
+    Contact,
+    FlatFootContact,
+    PointContact,
+    SinglePointContact,
+)
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
@@ -33,7 +40,8 @@ Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Value):
-    """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new ones.
+    """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new
+    ones.
 
     Raises `InputError` for a name that stands twice.
     """
@@ -42,14 +50,18 @@ class Contacts(Value):
 
     def __post_init__(self) -> None:
         if not isinstance(self.items, Sequence) or isinstance(self.items, str):
-            raise InputError(f"Contacts takes a list of contacts, not {short_repr(self.items)}; {_HINT}.")
+            raise InputError(
+                f"Contacts takes a list of contacts, not {short_repr(self.items)}; {_HINT}."
+            )
         object.__setattr__(self, "items", tuple(self.items))
         for contact in self.items:
             if isinstance(contact, type) or not isinstance(contact, Contact):
                 raise InputError(f"{short_repr(contact)} is no contact; {_HINT}.")
         duplicates = sorted({name for name in self.names if self.names.count(name) > 1})
         if duplicates:
-            raise InputError(f"contact {duplicates[0]!r} stands twice in the list; each name may stand once.")
+            raise InputError(
+                f"contact {duplicates[0]!r} stands twice in the list; each name may stand once."
+            )
 
     @staticmethod
     def none() -> Contacts:
@@ -58,34 +70,50 @@ class Contacts(Value):
 
     @staticmethod
     def points(
-        robot: Robot, mu: PerFoot = DEFAULT_MU, frames: Sequence[str] | None = None, normals: Normals = None
+        robot: Robot,
+        mu: PerFoot = DEFAULT_MU,
+        frames: Sequence[str] | None = None,
+        normals: Normals = None,
     ) -> Contacts:
-        """Point contacts at the robot's feet. A flat foot touches at the middle of its corners; `flat_feet` uses its area.
+        """Point contacts at the robot's feet. A flat foot touches at the middle of its corners;
+        `flat_feet` uses its area.
 
         robot: as from `fb.load`.
-        mu: coefficient of friction: one number for all, (n,) in the order of the frames, or a mapping from frame to number,
-            0.7 where it has none.
+        mu: coefficient of friction: one number for all, (n,) in the order of the frames, or a
+            mapping from frame to number, 0.7 where it has none.
         frames: names of the frames that touch; all feet by default.
-        normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a mapping from frame to (3,);
-            straight up by default.
+        normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a
+            mapping from frame to (3,); straight up by default.
         """
-        return Contacts([_make_contact(*foot_data, flat=False) for foot_data in _selected_feet(robot, frames, mu, normals)])
+        return Contacts(
+            [
+                _make_contact(*foot_data, flat=False)
+                for foot_data in _selected_feet(robot, frames, mu, normals)
+            ]
+        )
 
     @staticmethod
     def flat_feet(
-        robot: Robot, mu: PerFoot = DEFAULT_MU, frames: Sequence[str] | None = None, normals: Normals = None
+        robot: Robot,
+        mu: PerFoot = DEFAULT_MU,
+        frames: Sequence[str] | None = None,
+        normals: Normals = None,
     ) -> Contacts:
         """Flat-foot contacts at the robot's feet with area; arguments as for `points`."""
         feet = _selected_feet(robot, frames, mu, normals)
         for foot, *_ in feet:
             if not foot.is_flat:
-                hint = "use fb.Contacts.points, or load the robot with feet=[floatbase.robots.Foot(frame, corners=…)]"
+                hint = (
+                    "use fb.Contacts.points, or load the robot with "
+                    "feet=[floatbase.robots.Foot(frame, corners=…)]"
+                )
                 raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {hint}.")
         return Contacts([_make_contact(*foot_data) for foot_data in feet])
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """All feet of the robot as they are, flat ones with their corners, the others as points; none where it has none.
+        """All feet of the robot as they are, flat ones with their corners, the others as points;
+        none where it has none.
 
         mu, normals: as for `points`.
         """
@@ -127,21 +155,31 @@ class Contacts(Value):
 
     @cached_property
     def point_force_indices(self) -> npt.NDArray[np.intp]:
-        """Which entries of λ are forces at points, shape (3 n,): all but those of a `LinearConstraint`."""
-        entries = np.flatnonzero([bool(contact.point_names) for contact in self.items for _ in range(contact.k)])
+        """Which entries of λ are forces at points, shape (3 n,): all but those of a
+        `LinearConstraint`.
+        """
+        entries = np.flatnonzero(
+            [bool(contact.point_names) for contact in self.items for _ in range(contact.k)]
+        )
         entries.flags.writeable = False
         return entries
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one radius below its centre."""
+        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one
+        radius below its centre.
+        """
         as_instance("state", state, State)
-        return read_only(np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)]))
+        return read_only(
+            np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)])
+        )
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4), shape (k, nv), at time t, s."""
         as_instance("state", state, State)
         t = as_number("t", t, "s")
-        return self._stacked(state, [read_only(contact.jacobian(state, t)) for contact in self.items])
+        return self._stacked(
+            state, [read_only(contact.jacobian(state, t)) for contact in self.items]
+        )
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
@@ -156,8 +194,17 @@ class Contacts(Value):
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
-        A, b = self._stacked(state, [part[0] for part in parts]), np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-        return A if all(J is A for A, _, J in parts) else self._stacked(state, [part[2] for part in parts]), A, read_only(b)
+        A, b = (
+            self._stacked(state, [part[0] for part in parts]),
+            np.concatenate([np.zeros(0), *(part[1] for part in parts)]),
+        )
+        return (
+            A
+            if all(J is A for A, _, J in parts)
+            else self._stacked(state, [part[2] for part in parts]),
+            A,
+            read_only(b),
+        )
 
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
@@ -169,14 +216,19 @@ class Contacts(Value):
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
-        """The force of one contact among λ, shape (3,), N, world: for a flat foot the resultant of its corners.
+        """The force of one contact among λ, shape (3,), N, world: for a flat foot the resultant of
+        its corners.
 
-        forces: λ, shape (k,), or (n, k) for n of them, which gives (n, 3). Raises `UnknownNameError` for a name that is no
+        forces: λ, shape (k,), or (n, k) for n of them, which gives (n, 3). Raises
+            `UnknownNameError` for a name that is no
         contact's, `InputError` for a contact whose forces do not act at points.
         """
         part, contact = self.force_slice(name), self[name]
         if contact.k != 3 * len(contact.point_names):
-            raise InputError(f"the forces of {name} do not act at points, so they add up to no force; see force_slice.")
+            raise InputError(
+                f"the forces of {name} do not act at points, so they add up to no force; see "
+                f"force_slice."
+            )
         stacked = numeric_copy(forces)
         if stacked is None or stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
             got = f"is {short_repr(forces)}" if stacked is None else f"has shape {stacked.shape}"
@@ -200,7 +252,12 @@ class Contacts(Value):
 
     def __add__(self, other: Contacts) -> Contacts:
         return Contacts(
-            [*self.items, *as_instance("what is added to Contacts", other, Contacts, "fb.Contacts([contact])").items]
+            [
+                *self.items,
+                *as_instance(
+                    "what is added to Contacts", other, Contacts, "fb.Contacts([contact])"
+                ).items,
+            ]
         )
 
     def __iter__(self) -> Iterator[Contact]:
@@ -214,9 +271,11 @@ class Contacts(Value):
 
 
 def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
-    """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact; read-only, at time t in s.
+    """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact;
+    read-only, at time t in s.
 
-    J is A where that is so by definition, as for a point: such a contact is asked once. Raises `InputError` for other shapes.
+    J is A where that is so by definition, as for a point: such a contact is asked once. Raises
+    `InputError` for other shapes.
     """
     A, b = map(read_only, contact.constraint(state, t))  # one's own may write to its arrays again
     cls: Any = type(contact)  # one derived from ours may have another Jacobian
@@ -229,7 +288,10 @@ def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[A
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         required = f"they must have ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
-        raise InputError(f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}; {required}.")
+        raise InputError(
+            f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}; "
+            f"{required}."
+        )
     return A, b, J
 
 
@@ -244,23 +306,48 @@ def _selected_feet(
 ) -> list[tuple[Foot, float, Array]]:
     """The feet that touch, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
-    feet = robot.feet if frames is None else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
+    feet = (
+        robot.feet
+        if frames is None
+        else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
+    )
     if not feet:
-        raise InputError(f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames lists them).')
+        raise InputError(
+            f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames '
+            f"lists them)."
+        )
     names = [foot.frame for foot in feet]
     normals = UP if normals is None else normals
-    return list(zip(feet, _per_name("mu", mu, names, DEFAULT_MU), _per_name("normals", normals, names, UP, (3,)), strict=True))
+    return list(
+        zip(
+            feet,
+            _per_name("mu", mu, names, DEFAULT_MU),
+            _per_name("normals", normals, names, UP, (3,)),
+            strict=True,
+        )
+    )
 
 
-def _per_name(argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()) -> list[Any]:
-    """One value of this shape for each name: the same for all, one after the other, or by name with a default."""
+def _per_name(
+    argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()
+) -> list[Any]:
+    """One value of this shape for each name: the same for all, one after the other, or by name with
+    a default.
+    """
     if isinstance(value, Mapping):
         for name in set(value) - set(names):
             raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
     if isinstance(value, Sequence) and value and all(isinstance(entry, str) for entry in value):
-        raise InputError(f"{argument} must be numbers, not {short_repr(value)}; names of frames go to frames=[…].")
+        raise InputError(
+            f"{argument} must be numbers, not {short_repr(value)}; names of frames go to "
+            f"frames=[…]."
+        )
     numeric = numeric_copy(value)
-    if not isinstance(value, Sequence | np.ndarray) if numeric is None else numeric.ndim == len(shape):
+    if (
+        not isinstance(value, Sequence | np.ndarray)
+        if numeric is None
+        else numeric.ndim == len(shape)
+    ):
         return [value] * len(names)
     return list(as_array(argument, value, (len(names), *shape)))

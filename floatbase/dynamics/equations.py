@@ -17,10 +17,11 @@ Block: TypeAlias = Literal["qdd", "tau", "forces"]  # the three unknowns of (7):
 
 @dataclass(frozen=True, eq=False)
 class EquationsOfMotion(Value):
-    """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of contacts.
+    """(1)(4)(7) M q̈ + h = S τ + Jᵀ λ together with A q̈ = b, at one state with one set of
+    contacts.
 
-    For point contacts A = J and b = -J̇ q̇, as the course text writes it. Without contacts it is (4) with λ empty, and for a fixed
-    base (1). Source: [FBR], §1-§2.1.
+    For point contacts A = J and b = -J̇ q̇, as the course text writes it. Without contacts it is
+    (4) with λ empty, and for a fixed base (1). Source: [FBR], §1-§2.1.
 
     M: (nv, nv), inertia.
     h: (nv,), Coriolis, centrifugal and gravity forces, N and N·m.
@@ -59,13 +60,19 @@ class EquationsOfMotion(Value):
         return int(self.J.shape[0])
 
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
-        """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N, whatever A q̈ = b asks for."""
+        """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N,
+        whatever A q̈ = b asks for.
+        """
         tau = as_array("tau", tau, (self.d,), "N·m")
         forces = as_forces(forces, self.k)
         return np.linalg.solve(self.M, self.S @ tau + self.J.T @ forces - self.h)
 
-    def residual(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> tuple[Array, Array]:
-        """How far (q̈, τ, λ) is from satisfying (7): M q̈ + h - S τ - Jᵀ λ, shape (nv,), and A q̈ - b, shape (m,)."""
+    def residual(
+        self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike
+    ) -> tuple[Array, Array]:
+        """How far (q̈, τ, λ) is from satisfying (7): M q̈ + h - S τ - Jᵀ λ, shape (nv,), and A q̈ -
+        b, shape (m,).
+        """
         qdd = as_array("qdd", qdd, (self.nv,))
         tau = as_array("tau", tau, (self.d,), "N·m")
         forces = as_forces(forces, self.k)
@@ -73,9 +80,11 @@ class EquationsOfMotion(Value):
 
 
 def equations_of_motion(state: State, contacts: Contacts, t: float = 0.0) -> EquationsOfMotion:
-    """(7) The constrained equations of motion of a state with contacts, at time t in s (which only moving constraints feel).
+    """(7) The constrained equations of motion of a state with contacts, at time t in s (which only
+    moving constraints feel).
 
-    Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame the robot lacks.
+    Raises `InputError` for values of another kind and `UnknownNameError` for a contact on a frame
+    the robot lacks.
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)

@@ -1,4 +1,6 @@
-"""h taken apart: gravity, centrifugal and Coriolis forces, and what a turning frame makes of straight paths (App. A)."""
+"""h taken apart: gravity, centrifugal and Coriolis forces, and what a turning frame makes of
+straight paths (App. A).
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,20 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.robots import State
 
 VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
-_MAX_ROTATION_STEP = 0.01  # rad between two points of the grid on which the turning is added up: 1e-10 rad off after a turn
+# rad between two points of the grid on which the turning is added up: 1e-10 rad off after a turn
+_MAX_ROTATION_STEP = 0.01
 _MAX_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
-_STEP = 1e-5  # m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
+# m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
+_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class BiasForces(Value):
-    """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each (nv,), N and N·m as h.
+    """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each
+    (nv,), N and N·m as h.
 
-    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: [FBR], Appendix A.
+    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: [FBR],
+    Appendix A.
     """
 
     gravity: Array
@@ -44,10 +50,12 @@ class BiasForces(Value):
 
 
 def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasForces:
-    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate alone gives Γ_ii.
+    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate
+    alone gives Γ_ii.
 
-    axes: of the base's velocity, acceleration, force and moment: its own, as in v, which turn and so have m ω × v_lin as a
-        Coriolis force; or the world's. A robot without a floating base has the same parts in both.
+    axes: of the base's velocity, acceleration, force and moment: its own, as in v, which turn and
+        so have m ω × v_lin as a Coriolis force; or the world's. A robot without a floating base has
+        the same parts in both.
 
     Raises `InputError` for other axes.
     """
@@ -60,13 +68,21 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
 
     def moving(v: Array) -> Array:
-        """Σ_ij Γ_ij u_i u_j for the coordinates u with v = T u: q̈ = T u̇ + Ṫ u, and forces turn with Tᵀ."""
-        turning = state.M[:, :3] @ np.cross(v[:3], v[3:6]) if axes == "world" and state.robot.is_floating else 0.0
+        """Σ_ij Γ_ij u_i u_j for the coordinates u with v = T u: q̈ = T u̇ + Ṫ u, and forces turn
+        with Tᵀ.
+        """
+        turning = (
+            state.M[:, :3] @ np.cross(v[:3], v[3:6])
+            if axes == "world" and state.robot.is_floating
+            else 0.0
+        )
         return np.asarray(T.T @ (pin.nonLinearEffects(model, data, state.q, v) - g + turning))
 
     u = T.T @ state.v  # T is orthogonal
     centrifugal = np.column_stack([moving(unit) for unit in T.T]) @ u**2
-    return BiasForces(read_only(T.T @ g), read_only(centrifugal), read_only(moving(state.v) - centrifugal))
+    return BiasForces(
+        read_only(T.T @ g), read_only(centrifugal), read_only(moving(state.v) - centrifugal)
+    )
 
 
 def _world_to_base_axes(state: State) -> Array:
@@ -78,7 +94,8 @@ def _world_to_base_axes(state: State) -> Array:
 
 
 def coriolis_matrix(state: State) -> Array:
-    """App. A: C(q, v), shape (nv, nv), with C v = centrifugal + Coriolis forces and Ṁ - 2 C skew-symmetric.
+    """App. A: C(q, v), shape (nv, nv), with C v = centrifugal + Coriolis forces and Ṁ - 2 C
+    skew-symmetric.
 
     Many matrices satisfy the first; this one, Pinocchio's, satisfies both.
     """
@@ -96,8 +113,9 @@ def inertia_rate(state: State) -> Array:
 def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
     """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
 
-    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that only vᵀ f remains. Ṁ
-    comes from central differences of M along the motion, which know nothing of C; their error is about 1e-10 of the two terms.
+    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that
+    only vᵀ f remains. Ṁ comes from central differences of M along the motion, which know nothing of
+    C; their error is about 1e-10 of the two terms.
     C: shape (nv, nv), `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
     """
     as_instance("state", state, State)
@@ -108,9 +126,11 @@ def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
 
 
 def centripetal_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
-    """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at constant rate.
+    """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at
+    constant rate.
 
-    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the link's, both in the answer's frame. It points at the axis.
+    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the link's, both in the answer's
+        frame. It points at the axis.
     """
     omega = as_array("omega", omega, (3,), "rad/s")
     return read_only(np.cross(omega, np.cross(omega, as_array("r", r, (3,), "m"))))
@@ -120,12 +140,14 @@ def centripetal_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
 class RotatingFrameView(Value):
     """A free particle as one who rides on a turning frame sees it; a row for each time.
 
-    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: [FBR], Appendix A.
+    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: [FBR], Appendix
+    A.
 
     time: (n,) s.
     rotation: (n, 3, 3), R_world_frame.
     position, velocity: of the particle, m and m/s.
-    centrifugal, coriolis, euler: -ω × (ω × p), -2 ω × ṗ and -ω̇ × p, m/s²: the accelerations that explain the curved path.
+    centrifugal, coriolis, euler: -ω × (ω × p), -2 ω × ṗ and -ω̇ × p, m/s²: the accelerations that
+        explain the curved path.
     """
 
     time: Array
@@ -138,7 +160,9 @@ class RotatingFrameView(Value):
 
     @property
     def acceleration(self) -> Array:
-        """The particle's acceleration as the frame sees it, shape (n, 3), m/s²: p̈ is all fictitious."""
+        """The particle's acceleration as the frame sees it, shape (n, 3), m/s²: p̈ is all
+        fictitious.
+        """
         return read_only(self.centrifugal + self.coriolis + self.euler)
 
 
@@ -149,21 +173,29 @@ def view_from_rotating_frame(
     velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
     omega_rate: VectorOrFunction | None = None,
 ) -> RotatingFrameView:
-    """App. A: a particle that no force acts on, moving straight in the world, seen from a frame that turns.
+    """App. A: a particle that no force acts on, moving straight in the world, seen from a frame
+    that turns.
 
-    time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the world's.
-    omega: (3,) rad/s, world, angular velocity of the frame: a constant, or a function of the time in s.
+    time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the
+        world's.
+    omega: (3,) rad/s, world, angular velocity of the frame: a constant, or a function of the time
+        in s.
     position: (3,) m, world, of the particle at time[0].
     velocity: (3,) m/s, world, of the particle.
-    omega_rate: (3,) rad/s², world, derivative of omega; zero for a constant, and needed for a function.
+    omega_rate: (3,) rad/s², world, derivative of omega; zero for a constant, and needed for a
+        function.
 
     Raises `InputError` for times that do not rise, wrong shapes and an ω(t) without its rate.
     """
     time = as_array("time", time, (None,), "s")
     if time.size < 1 or np.any(np.diff(time) <= 0.0):
-        raise InputError("time must hold at least one instant, and each must come after the one before.")
+        raise InputError(
+            "time must hold at least one instant, and each must come after the one before."
+        )
     if callable(omega) and omega_rate is None:
-        raise InputError("omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s².")
+        raise InputError(
+            "omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s²."
+        )
     omega_at, omega_rate_at = (
         _as_function("omega", omega),
         _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate),
@@ -197,7 +229,8 @@ def _as_function(name: str, value: VectorOrFunction) -> Callable[[float], Array]
 
 
 def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
-    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns by ω at two Gauss points (Magnus series).
+    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns by ω at two Gauss
+    points (Magnus series).
 
     Of fourth order. Source: Iserles et al., Lie-group methods, Acta Numerica, 2000.
     """
@@ -208,12 +241,15 @@ def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
         steps = int(np.ceil(max_speed * (end - begin) / _MAX_ROTATION_STEP)) + 1
         if steps > _MAX_STEPS:
             raise InputError(
-                f"from {begin:g} s to {end:g} s the frame turns by {steps * _MAX_ROTATION_STEP:g} rad; use a shorter time."
+                f"from {begin:g} s to {end:g} s the frame turns by {steps * _MAX_ROTATION_STEP:g} "
+                f"rad; use a shorter time."
             )
         dt = (end - begin) / steps
         R[i + 1] = R[i]
         for t in begin + dt * np.arange(steps):
-            first, second = (omega(float(t + (0.5 + side * np.sqrt(3.0) / 6.0) * dt)) for side in (-1.0, 1.0))
+            first, second = (
+                omega(float(t + (0.5 + side * np.sqrt(3.0) / 6.0) * dt)) for side in (-1.0, 1.0)
+            )
             commutator = np.sqrt(3.0) / 12.0 * dt**2 * np.cross(second, first)
             R[i + 1] = pin.exp3(0.5 * dt * (first + second) + commutator) @ R[i + 1]
     return R

@@ -1,4 +1,6 @@
-"""Which accelerations, torques and forces go together: ζ, η, C, B, their spaces and dimensions (8)-(14), (16), (17)."""
+"""Which accelerations, torques and forces go together: ζ, η, C, B, their spaces and dimensions
+(8)-(14), (16), (17).
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_forces, as_instance, cached_property, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_forces,
+    as_instance,
+    cached_property,
+    read_only,
+)
 from floatbase.affine import Affine
 from floatbase.dynamics.constraint_rank import contact_space
 from floatbase.dynamics.equations import EquationsOfMotion
@@ -17,7 +27,8 @@ from floatbase.linear_algebra import null_space, rank
 def delassus_matrix(eom: EquationsOfMotion) -> Array:
     """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces.
 
-    For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the inertia that contacts feel.
+    For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the
+    inertia that contacts feel.
     """
     as_instance("eom", eom, EquationsOfMotion)
     return read_only(eom.A @ np.linalg.solve(eom.M, eom.J.T))
@@ -26,31 +37,40 @@ def delassus_matrix(eom: EquationsOfMotion) -> Array:
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere (solo8 on four feet, corners
-    of a flat foot) this is the smallest λ, as the pseudo-inverse has it. Directions of motion that the contacts resolve worse
-    than `CONSTRAINT_RANK_TOLERANCE` count as not held, see `contact_space`. Source: [FBR], §2.2.1.
+    Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere
+    (solo8 on four feet, corners of a flat foot) this is the smallest λ, as the pseudo-inverse has
+    it. Directions of motion that the contacts resolve worse than `CONSTRAINT_RANK_TOLERANCE` count
+    as not held, see `contact_space`. Source: [FBR], §2.2.1.
     """
     space = contact_space(eom)
     # what forces must add to q̈ along the resolved rows: b - A M⁻¹ (S τ - h)
-    required_acceleration = Affine(-space.A @ np.linalg.solve(eom.M, eom.S), space.b + space.A @ np.linalg.solve(eom.M, eom.h))
+    required_acceleration = Affine(
+        -space.A @ np.linalg.solve(eom.M, eom.S), space.b + space.A @ np.linalg.solve(eom.M, eom.h)
+    )
     return Affine.linear(space.force_map) @ required_acceleration
 
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
-    """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is unique. Source: §3."""
+    """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is
+    unique. Source: §3.
+    """
     as_instance("eom", eom, EquationsOfMotion)
     return _acceleration_map(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A M⁻¹ h."""
+    """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A
+    M⁻¹ h.
+    """
     as_instance("eom", eom, EquationsOfMotion)
     C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), delassus_matrix(eom)])
     return read_only(C), read_only(eom.b + eom.A @ np.linalg.solve(eom.M, eom.h))
 
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
-    """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau" and "forces"."""
+    """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau"
+    and "forces".
+    """
     as_instance("eom", eom, EquationsOfMotion)
     return _orthonormalised(_torque_force_map(eom))
 
@@ -79,7 +99,9 @@ class FeasibleSpace(Value):
 
     @cached_property
     def qdd(self) -> Affine:
-        """(17) β -> q̈, (dimension,) to (nv,), m/s² and rad/s²: base in the base frame, then joints."""
+        """(17) β -> q̈, (dimension,) to (nv,), m/s² and rad/s²: base in the base frame, then
+        joints.
+        """
         return self.map["qdd"]
 
     @cached_property
@@ -93,9 +115,15 @@ class FeasibleSpace(Value):
         return self.map["forces"]
 
     def coordinates(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
-        """The β of a feasible (q̈, τ, λ), or of the feasible point nearest to one that is not; shape (dimension,)."""
+        """The β of a feasible (q̈, τ, λ), or of the feasible point nearest to one that is not;
+        shape (dimension,).
+        """
         eom = self.eom
-        parts = [as_array("qdd", qdd, (eom.nv,)), as_array("tau", tau, (eom.d,)), as_forces(forces, eom.k)]
+        parts = [
+            as_array("qdd", qdd, (eom.nv,)),
+            as_array("tau", tau, (eom.d,)),
+            as_forces(forces, eom.k),
+        ]
         return self.map.A.T @ (np.concatenate(parts) - self.map.b)
 
     def __call__(self, beta: npt.ArrayLike) -> tuple[Array, Array, Array]:
@@ -107,29 +135,39 @@ class FeasibleSpace(Value):
 def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
 
-    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found from the resolved part
-    of the contacts (`contact_space`): the same space as by the SVD of B, and one of bounded numbers where J nearly loses rank.
+    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found
+    from the resolved part of the contacts (`contact_space`): the same space as by the SVD of B, and
+    one of bounded numbers where J nearly loses rank.
     """
     as_instance("eom", eom, EquationsOfMotion)
     torque_force = _torque_force_map(eom)
     qdd = _acceleration_map(eom, torque_force["tau"], torque_force["forces"])
-    return FeasibleSpace(eom, _orthonormalised(Affine.stack(qdd=qdd, tau=torque_force["tau"], forces=torque_force["forces"])))
+    return FeasibleSpace(
+        eom,
+        _orthonormalised(
+            Affine.stack(qdd=qdd, tau=torque_force["tau"], forces=torque_force["forces"])
+        ),
+    )
 
 
 def internal_forces(eom: EquationsOfMotion) -> Array:
-    """Forces between the contacts that move nothing once torques balance them: orthonormal columns of null(J_bᵀ), (k, n).
+    """Forces between the contacts that move nothing once torques balance them: orthonormal columns
+    of null(J_bᵀ), (k, n).
 
-    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint columns.
-    n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal. Where J has full rank torques can bring
-    all of them about without moving anything: ζ answers -J_jᵀ λ with λ. Where J loses rank (solo8 on four feet) the k - r
-    directions of null(Jᵀ) are among them; no torques can bring those about, which leaves rank J - rank J_b to torques.
+    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint
+    columns. n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal. Where J
+    has full rank torques can bring all of them about without moving anything: ζ answers -J_jᵀ λ
+    with λ. Where J loses rank (solo8 on four feet) the k - r directions of null(Jᵀ) are among them;
+    no torques can bring those about, which leaves rank J - rank J_b to torques.
     """
     as_instance("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)
 
 
 def undetermined_forces(eom: EquationsOfMotion) -> Array:
-    """Forces that change nothing at all, orthonormal columns of null(Jᵀ), shape (k, k - rank J): why λ may not be unique."""
+    """Forces that change nothing at all, orthonormal columns of null(Jᵀ), shape (k, k - rank J):
+    why λ may not be unique.
+    """
     return contact_space(eom).null_forces
 
 
@@ -160,8 +198,8 @@ class Dimensions:
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Counts every dimension of §2.2 at this state.
 
-    `contact_space` decides the rank of J. B and C are counted by their own singular values, with the resolved rows and their
-    forces in place of A and J; the dimension of null(Jᵀ) is added.
+    `contact_space` decides the rank of J. B and C are counted by their own singular values, with
+    the resolved rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
     """
     as_instance("eom", eom, EquationsOfMotion)
     space = contact_space(eom)
@@ -187,7 +225,9 @@ def _torque_force_map(eom: EquationsOfMotion) -> Affine:
     """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the undetermined ones with it."""
     minimum_norm, null_forces = forces_from_torques(eom), undetermined_forces(eom)
     tau = Affine.linear(np.eye(eom.d, eom.d + null_forces.shape[1]))
-    return Affine.stack(tau=tau, forces=Affine(np.hstack([minimum_norm.A, null_forces]), minimum_norm.b))
+    return Affine.stack(
+        tau=tau, forces=Affine(np.hstack([minimum_norm.A, null_forces]), minimum_norm.b)
+    )
 
 
 def _acceleration_map(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:

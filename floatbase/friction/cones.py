@@ -1,6 +1,8 @@
-"""Friction (28): a force's normal and tangential parts, the exact cone, and the polyhedron with n facets in its place.
+"""Friction (28): a force's normal and tangential parts, the exact cone, and the polyhedron with n
+facets in its place.
 
-A force is what the ground does to the robot, shape (3,), N, world. Normals point out of the ground. Source: [FBR], §4.2.
+A force is what the ground does to the robot, shape (3,), N, world. Normals point out of the ground.
+Source: [FBR], §4.2.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ from floatbase._validation import (
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force be outside: rounding of forces up to 1 MN
 MAX_FACETS = 1000  # they miss the cone by 5e-6 of μ, which nobody knows as well
-ACTIVE_TOLERANCE = 0.02  # part of the friction limit μ α_⊥ within which a force counts as on the surface: measured ones scatter
+# part of the friction limit μ α_⊥ within which a force counts as on the surface: measured ones
+# scatter
+ACTIVE_TOLERANCE = 0.02
 
 Status: TypeAlias = Literal["inside", "active", "outside"]
 
@@ -34,7 +38,8 @@ Status: TypeAlias = Literal["inside", "active", "outside"]
 def tangents(normal: npt.ArrayLike) -> Array:
     """Two unit vectors t1, t2 with t1 × t2 = normal, as rows, shape (2, 3).
 
-    normal: shape (3,), world, made unit. t1 is the world's x axis projected onto the surface; y where x is nearly normal to it.
+    normal: shape (3,), world, made unit. t1 is the world's x axis projected onto the surface; y
+        where x is nearly normal to it.
     """
     n = unit_vector("normal", normal)
     axis = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -62,19 +67,23 @@ class Decomposition(Value):
 def decompose(force: npt.ArrayLike, normal: npt.ArrayLike) -> Decomposition:
     """(28) The two components of a contact force that friction compares: α_∥ ≤ μ α_⊥.
 
-    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source: [FBR], Figure 3.
+    force: shape (3,), N, world. normal: shape (3,), world, out of the ground, made unit. Source:
+        [FBR], Figure 3.
     """
     f, n = as_array("force", force, (3,), "N"), unit_vector("normal", normal)
     alpha = float(n @ f)
     f_par = f - alpha * n
-    return Decomposition(read_only(alpha * n), read_only(f_par), alpha, float(np.linalg.norm(f_par)))
+    return Decomposition(
+        read_only(alpha * n), read_only(f_par), alpha, float(np.linalg.norm(f_par))
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionCone(Value):
     """(28) The forces that Coulomb friction can make: α_∥ ≤ μ α_⊥, a round cone about the normal.
 
-    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. The ground only pushes: α_⊥ ≥ 0.
+    normal: shape (3,), world, out of the ground, made unit. mu: coefficient of friction, > 0. The
+        ground only pushes: α_⊥ ≥ 0.
     """
 
     normal: Array
@@ -92,8 +101,8 @@ class FrictionCone(Value):
     def margin(self, force: npt.ArrayLike) -> float:
         """The slack of (28), N: μ α_⊥ - α_∥, negative outside.
 
-        It is the tangential force that may be added, whatever its direction, before the foot slips; divided by √(1 + μ²) it
-        is the distance to the cone's surface.
+        It is the tangential force that may be added, whatever its direction, before the foot slips;
+        divided by √(1 + μ²) it is the distance to the cone's surface.
         """
         parts = decompose(force, self.normal)
         return self.mu * parts.alpha_perp - parts.alpha_par
@@ -103,7 +112,9 @@ class FrictionCone(Value):
         return self.margin(force) >= -as_positive("tolerance", tolerance, "N", allow_zero=True)
 
     def status(self, force: npt.ArrayLike) -> Status:
-        """(28) "inside", "active" (on the surface, within `ACTIVE_TOLERANCE` of μ α_⊥) or "outside"; force: (3,), N."""
+        """(28) "inside", "active" (on the surface, within `ACTIVE_TOLERANCE` of μ α_⊥) or
+        "outside"; force: (3,), N.
+        """
         f = as_array("force", force, (3,), "N")
         alpha = float(self.normal @ f)  # as `decompose` has it, for pictures that ask for many
         return _status(float(np.linalg.norm(f - alpha * self.normal)), self.mu * alpha)
@@ -111,14 +122,18 @@ class FrictionCone(Value):
     def project(self, force: npt.ArrayLike) -> Array:
         """The force of the cone nearest to the one given, shape (3,), N: the Euclidean projection.
 
-        A force inside stays, one of the polar cone, μ α_∥ ≤ -α_⊥, gives 0. Any other is projected at a right angle onto the
-        line n + μ f_par / α_∥ of the surface.
+        A force inside stays, one of the polar cone, μ α_∥ ≤ -α_⊥, gives 0. Any other is projected
+        at a right angle onto the line n + μ f_par / α_∥ of the surface.
         """
         parts = decompose(force, self.normal)
         if parts.alpha_par <= self.mu * parts.alpha_perp:
             return as_array("force", force, (3,), "N")
         scale = max(0.0, parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
-        return read_only(scale * (self.normal + self.mu * parts.f_par / parts.alpha_par)) if scale else read_only(np.zeros(3))
+        return (
+            read_only(scale * (self.normal + self.mu * parts.f_par / parts.alpha_par))
+            if scale
+            else read_only(np.zeros(3))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +143,11 @@ class FrictionPolyhedron(Value):
     normal: shape (3,), world, out of the ground, made unit.
     mu: coefficient of friction, > 0.
     facets: n ≥ 3.
-    inner_approximation: whether the polyhedron lies inside the cone (safe: it allows no force that slips) or outside it,
-        touching it (optimistic). Inside, the middle of a facet allows μ cos(π/n) and only the edges reach μ.
-    facet_rotation: rad, by which all facets are turned about the normal: facet 0 faces t1 of `tangents` without it.
+    inner_approximation: whether the polyhedron lies inside the cone (safe: it allows no force that
+        slips) or outside it, touching it (optimistic). Inside, the middle of a facet allows μ
+        cos(π/n) and only the edges reach μ.
+    facet_rotation: rad, by which all facets are turned about the normal: facet 0 faces t1 of
+        `tangents` without it.
     """
 
     normal: Array
@@ -142,9 +159,17 @@ class FrictionPolyhedron(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("normal", self.normal))
         object.__setattr__(self, "mu", as_positive("friction coefficient mu", self.mu))
-        object.__setattr__(self, "facet_rotation", as_number("facet_rotation", self.facet_rotation, "rad"))
-        object.__setattr__(self, "facets", as_integer("facets", self.facets, 3, MAX_FACETS, "μ is not known better"))
-        object.__setattr__(self, "inner_approximation", as_bool("inner_approximation", self.inner_approximation))
+        object.__setattr__(
+            self, "facet_rotation", as_number("facet_rotation", self.facet_rotation, "rad")
+        )
+        object.__setattr__(
+            self,
+            "facets",
+            as_integer("facets", self.facets, 3, MAX_FACETS, "μ is not known better"),
+        )
+        object.__setattr__(
+            self, "inner_approximation", as_bool("inner_approximation", self.inner_approximation)
+        )
 
     @property
     def mu_facet(self) -> float:
@@ -153,13 +178,18 @@ class FrictionPolyhedron(Value):
 
     @property
     def area_ratio(self) -> float:
-        """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside, tan(π/n) / (π/n) outside."""
+        """Area of the polyhedron's cross-section over the cone's: sin(2π/n) / (2π/n) inside,
+        tan(π/n) / (π/n) outside.
+        """
         half = np.pi / self.facets
-        return float(np.sin(2.0 * half) / (2.0 * half) if self.inner_approximation else np.tan(half) / half)
+        return float(
+            np.sin(2.0 * half) / (2.0 * half) if self.inner_approximation else np.tan(half) / half
+        )
 
     @cached_property
     def face_matrix(self) -> Array:
-        """Face matrix, shape (n, 3): face_matrix @ f ≤ 0 for f in the polyhedron; each row is d_i - μ_facet · normal.
+        """Face matrix, shape (n, 3): face_matrix @ f ≤ 0 for f in the polyhedron; each row is d_i -
+        μ_facet · normal.
 
         d_i is the unit tangent that facet i faces. Together they imply normal · f ≥ 0.
         """
@@ -167,11 +197,17 @@ class FrictionPolyhedron(Value):
 
     @cached_property
     def rays(self) -> Array:
-        """The edges, shape (n, 3), each with normal component 1; ray i lies between facets i and i + 1."""
-        return read_only(self.normal + self.mu_facet / np.cos(np.pi / self.facets) * self._directions(0.5))
+        """The edges, shape (n, 3), each with normal component 1; ray i lies between facets i and i
+        + 1.
+        """
+        return read_only(
+            self.normal + self.mu_facet / np.cos(np.pi / self.facets) * self._directions(0.5)
+        )
 
     def margin(self, force: npt.ArrayLike) -> float:
-        """The tangential force, N, that may be added before a facet is reached: the least of -face_matrix @ f; < 0 outside."""
+        """The tangential force, N, that may be added before a facet is reached: the least of
+        -face_matrix @ f; < 0 outside.
+        """
         return float(np.min(-self.face_matrix @ as_array("force", force, (3,), "N")))
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
@@ -184,12 +220,20 @@ class FrictionPolyhedron(Value):
         return _status(float(tangential.max()), limit)
 
     def active_facets(self, force: npt.ArrayLike) -> tuple[int, ...]:
-        """Numbers of the facets that a force has reached (within `ACTIVE_TOLERANCE`) or passed; none where it pulls."""
+        """Numbers of the facets that a force has reached (within `ACTIVE_TOLERANCE`) or passed;
+        none where it pulls.
+        """
         tangential, limit = self._tangential_forces(force)
-        return tuple(np.flatnonzero(tangential > (1.0 - ACTIVE_TOLERANCE) * limit).tolist()) if limit > 0.0 else ()
+        return (
+            tuple(np.flatnonzero(tangential > (1.0 - ACTIVE_TOLERANCE) * limit).tolist())
+            if limit > 0.0
+            else ()
+        )
 
     def project(self, force: npt.ArrayLike) -> Array:
-        """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖ over weights w ≥ 0."""
+        """The force of the polyhedron nearest to the one given, shape (3,), N: min ‖raysᵀ w - f‖
+        over weights w ≥ 0.
+        """
         from scipy.optimize import nnls  # slow to load, and seldom needed
 
         f = as_array("force", force, (3,), "N")
@@ -199,7 +243,9 @@ class FrictionPolyhedron(Value):
         return read_only(size * (self.rays.T @ nnls(self.rays.T, f / size)[0]))
 
     def _tangential_forces(self, force: npt.ArrayLike) -> tuple[Array, float]:
-        """The force along each facet's d_i, shape (n,), N, and what they all may be at most, μ_facet α_⊥, N."""
+        """The force along each facet's d_i, shape (n,), N, and what they all may be at most,
+        μ_facet α_⊥, N.
+        """
         f = as_array("force", force, (3,), "N")
         limit = self.mu_facet * float(self.normal @ f)
         return self.face_matrix @ f + limit, limit
@@ -212,7 +258,9 @@ class FrictionPolyhedron(Value):
 
 
 def _status(tangential: float, limit: float) -> Status:
-    """Of a tangential force and the largest that friction allows, N; that is negative where the force pulls."""
+    """Of a tangential force and the largest that friction allows, N; that is negative where the
+    force pulls.
+    """
     if tangential > (1.0 + ACTIVE_TOLERANCE) * limit:
         return "outside"
     return "active" if tangential > (1.0 - ACTIVE_TOLERANCE) * limit else "inside"

@@ -1,4 +1,6 @@
-"""What the lessons share: predictions, exercises that check themselves, panels that do not block the kernel, controllers."""
+"""What the lessons share: predictions, exercises that check themselves, panels that do not block
+the kernel, controllers.
+"""
 
 import os
 from importlib import import_module
@@ -36,7 +38,15 @@ if TYPE_CHECKING:
 _LAZY = {
     "hand_in": "submission",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
-    **dict.fromkeys(("draw_push_recovery", "measured_push_recovery", "plot_push_recovery", "controller_factory"), "push_recovery"),
+    **dict.fromkeys(
+        (
+            "draw_push_recovery",
+            "measured_push_recovery",
+            "plot_push_recovery",
+            "controller_factory",
+        ),
+        "push_recovery",
+    ),
     "slider_samples": "slider_samples",
     "FIGURES": "figures",
     **{name: name for name in ("props", "qp_plots", "static_export")},

@@ -1,4 +1,6 @@
-"""Controllers of the lessons: constant torques, and a servo in every joint. Neither knows where the ground is."""
+"""Controllers of the lessons: constant torques, and a servo in every joint. Neither knows where the
+ground is.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +14,17 @@ from floatbase._validation import Array, as_array, as_callable, as_instance, as_
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
-_DIFFERENCE_STEP = 1e-4  # s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of its velocity
+# s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of
+# its velocity
+_DIFFERENCE_STEP = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueCommand:
     """What a rollout reads from a controller's answer.
 
-    tau: shape (d,), N·m. forces: the contact forces that the controller predicts, shape (k,), N, world; None without a
+    tau: shape (d,), N·m. forces: the contact forces that the controller predicts, shape (k,), N,
+        world; None without a
     prediction.
     """
 
@@ -32,8 +37,8 @@ class ConstantTorques:
 
     tau: shape (d,), N·m.
     contacts: the stance for which forces are recorded; all feet by default.
-    predict: contact forces that a theory expects in a configuration q with velocity v, (q, v) -> shape (k,), N, world. They
-        are recorded as planned forces and change nothing.
+    predict: contact forces that a theory expects in a configuration q with velocity v, (q, v) ->
+        shape (k,), N, world. They are recorded as planned forces and change nothing.
     """
 
     def __init__(
@@ -44,7 +49,9 @@ class ConstantTorques:
     ):
         self.tau = as_array("tau", tau, (None,), "N·m")
         self.contacts = None if contacts is None else as_instance("contacts", contacts, Contacts)
-        self._predict = None if predict is None else as_callable("predict", predict, "predict(q, v)")
+        self._predict = (
+            None if predict is None else as_callable("predict", predict, "predict(q, v)")
+        )
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques, and the prediction for configuration q and velocity v."""
@@ -58,7 +65,8 @@ def joint_servo(
     stiffness: float = 100.0,
     damping: float = 10.0,
 ) -> Callable[[Array, Array, float], TorqueCommand]:
-    """A controller that knows joints only: τ = tau - stiffness · (position error) - damping · (velocity error), per joint.
+    """A controller that knows joints only: τ = tau - stiffness · (position error) - damping ·
+    (velocity error), per joint.
 
     state: its joints are the desired ones.
     tau: torques that hold the joints at rest, shape (d,), N·m; 0 by default.
@@ -69,11 +77,16 @@ def joint_servo(
     d = as_instance("state", state, State).robot.d
     joints = slice(state.robot.nv - d, None)
     holding_torques = np.zeros(d) if tau is None else as_array("tau", tau, (d,), "N·m")
-    stiffness, damping = as_positive("stiffness", stiffness, allow_zero=True), as_positive("damping", damping, allow_zero=True)
+    stiffness, damping = (
+        as_positive("stiffness", stiffness, allow_zero=True),
+        as_positive("damping", damping, allow_zero=True),
+    )
     offset = as_callable("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> TorqueCommand:
-        rate = (offset(t + _DIFFERENCE_STEP) - offset(t - _DIFFERENCE_STEP)) / (2.0 * _DIFFERENCE_STEP)
+        rate = (offset(t + _DIFFERENCE_STEP) - offset(t - _DIFFERENCE_STEP)) / (
+            2.0 * _DIFFERENCE_STEP
+        )
         error = -state.difference(q)[joints] - offset(t)
         return TorqueCommand(holding_torques - stiffness * error - damping * (v[joints] - rate))
 

@@ -1,7 +1,8 @@
-"""Exercises that check themselves: `check` says right, or what kind of mistake it looks like, without giving the answer.
+"""Exercises that check themselves: `check` says right, or what kind of mistake it looks like,
+without giving the answer.
 
-An exercise stands once, in the file `exercises` of its lesson: statement, stub, solution, judge. The judge computes the
-right value by other expressions than the solution does.
+An exercise stands once, in the file `exercises` of its lesson: statement, stub, solution, judge.
+The judge computes the right value by other expressions than the solution does.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from floatbase.lessons.rounding import rounded
 
 TRIES_BEFORE_REVEAL = 2  # so many before `reveal` shows a solution
 NEAR_MISS = 0.02  # of the right value: as much as a number with two digits may spoil
-Example: TypeAlias = tuple[Any, str]  # an answer, and the name of the hint that it must get; "" where it is right
+Example: TypeAlias = tuple[
+    Any, str
+]  # an answer, and the name of the hint that it must get; "" where it is right
 
 
 @dataclass(frozen=True)
@@ -43,21 +46,33 @@ class Verdict:
         return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
 
 
-NO_ANSWER = Verdict(False, "There is no answer yet: replace the placeholder by your expression.", "no_answer")
+NO_ANSWER = Verdict(
+    False, "There is no answer yet: replace the placeholder by your expression.", "no_answer"
+)
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
-    """The least point, (n,), of a cost that a learner gives, or a `Verdict` that says what is wrong with the cost.
+    """The least point, (n,), of a cost that a learner gives, or a `Verdict` that says what is wrong
+    with the cost.
 
-    answer: whatever a learner may give. n: how many numbers it is to be on. block: their name. hint: where they are others.
+    answer: whatever a learner may give. n: how many numbers it is to be on. block: their name.
+        hint: where they are others.
     """
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
     if not isinstance(answer, Quadratic):
         given = type(answer).__name__
-        return Verdict(False, f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {given}.", "no_cost")
+        return Verdict(
+            False,
+            f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {given}.",
+            "no_cost",
+        )
     if answer.n != n:
-        return Verdict(False, f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}", "other_block")
+        return Verdict(
+            False,
+            f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}",
+            "other_block",
+        )
     try:
         return answer.minimiser()
     except FloatbaseError as error:
@@ -65,7 +80,8 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
 
 
 def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
-    """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is wrong with it.
+    """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is
+    wrong with it.
 
     answer: whatever a learner may give. shapes: those allowed; a message names the first.
     """
@@ -77,11 +93,15 @@ def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
     except (TypeError, ValueError):
         given = None
     if given is None:
-        return Verdict(False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers")
+        return Verdict(
+            False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers"
+        )
     if given.shape not in shapes:
         return Verdict(False, _shape_error(given.shape, shapes[0]), "shape")
     if not np.all(np.abs(given) <= MAX_MAGNITUDE):
-        return Verdict(False, "The answer holds numbers that are not finite, or far too large.", "not_finite")
+        return Verdict(
+            False, "The answer holds numbers that are not finite, or far too large.", "not_finite"
+        )
     return given
 
 
@@ -109,7 +129,8 @@ class Exercise:
     stub: the code that a learner starts from; it runs.
     solution: the code that replaces the stub.
     judge: answer -> `Verdict`.
-    examples: gives answers, and the names of the hints that they must get, beside those that the judge gives itself.
+    examples: gives answers, and the names of the hints that they must get, beside those that the
+        judge gives itself.
     explanation: why the solution is right, shown with it.
     namespace: gives what the stub uses of the lesson, name -> value; numpy it has.
     """
@@ -134,8 +155,10 @@ _GENERAL = {
     "nearly": "Nearly: less than 2 % off. Is a number in it rounded, or a small part left out?",
     "sign": "The size is right, the sign is not: whose force, and in which direction?",
     "transpose": "This is the transpose of the answer.",
-    "unknown": "Neither right nor a mistake this check knows. Look at the units, then at the statement again.",
-    "unknown_count": "Neither right nor a mistake this check knows. What is counted, and what is left out or counted twice?",
+    "unknown": "Neither right nor a mistake this check knows. Look at the units, then at the "
+    "statement again.",
+    "unknown_count": "Neither right nor a mistake this check knows. What is counted, and what is "
+    "left out or counted twice?",
 }
 
 
@@ -147,7 +170,8 @@ class NumericJudge:
     praise: what a right answer is told.
     mistakes: name of a hint -> computes the value that this kind of mistake leads to.
     hints: the same names -> what is said then.
-    tolerance: values whose difference is less than this part of the right value's largest number count as equal.
+    tolerance: values whose difference is less than this part of the right value's largest number
+        count as equal.
     is_count: the answer is a number of things, without sign or unit.
     """
 
@@ -189,16 +213,21 @@ class NumericJudge:
         return "unknown"
 
     def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
-        """Whether they differ by less than this part of b's largest number, or than `self.tolerance`, if that is more."""
+        """Whether they differ by less than this part of b's largest number, or than
+        `self.tolerance`, if that is more.
+        """
         b, relative = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
-        return a.shape == b.shape and bool(np.max(np.abs(a - b)) <= relative * (1e-9 + np.max(np.abs(b))))
+        return a.shape == b.shape and bool(
+            np.max(np.abs(a - b)) <= relative * (1e-9 + np.max(np.abs(b)))
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeJudge:
     """A judge that knows what a wrong shape means, and leaves other shapes to `judge`.
 
-    shapes: shape -> what is said of it. The hint's name is made of it, such as "shape_4x3", or "shape_" of one number.
+    shapes: shape -> what is said of it. The hint's name is made of it, such as "shape_4x3", or
+        "shape_" of one number.
     """
 
     judge: Callable[[Any], Verdict]
@@ -234,13 +263,18 @@ def all_exercises() -> dict[str, Exercise]:
 
 
 def check(name: str, answer: Any) -> Verdict:
-    """Judge an answer to the exercise of that name, such as "00.1", and count the try; an unchanged stub is none.
+    """Judge an answer to the exercise of that name, such as "00.1", and count the try; an unchanged
+    stub is none.
 
     Raises `UnknownNameError` for a name that does not exist.
     """
     exercise = _find_exercise(name)
     verdict = exercise.judge(answer)
-    if answer is not None and answer is not Ellipsis and not _is_placeholder(answer, exercise.placeholder()):
+    if (
+        answer is not None
+        and answer is not Ellipsis
+        and not _is_placeholder(answer, exercise.placeholder())
+    ):
         progress.record_try(name, verdict.right, answer)
     return verdict
 
@@ -250,7 +284,10 @@ def reveal(name: str) -> None:
     exercise, tried = _find_exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
     if tried["tries"] < TRIES_BEFORE_REVEAL and not tried["right"]:
         remaining = TRIES_BEFORE_REVEAL - tried["tries"]
-        print(f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) on an answer of your own.')
+        print(
+            f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) on an '
+            f"answer of your own."
+        )
         return
     print(exercise.solution)
     if exercise.explanation:
@@ -258,7 +295,9 @@ def reveal(name: str) -> None:
 
 
 def show_progress() -> None:
-    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried; and why tries cannot be kept, if so."""
+    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried; and why tries cannot
+    be kept, if so.
+    """
     tried, known = progress.load(), all_exercises()
     marks = {name: _progress_mark(tried.get(name)) for name in known}
     for lesson in sorted({name.split(".")[0] for name in known}):
@@ -270,20 +309,26 @@ def show_progress() -> None:
 
 
 def _is_placeholder(answer: Any, placeholder: Any) -> bool:
-    """Whether an answer is the placeholder still, up to the rounding of another machine; a function by its code."""
+    """Whether an answer is the placeholder still, up to the rounding of another machine; a function
+    by its code.
+    """
     if isinstance(placeholder, FunctionType):
         return _bytecode(answer) == _bytecode(placeholder)
     if isinstance(placeholder, list) and all(isinstance(part, str) for part in placeholder):
         return isinstance(answer, list) and list(map(str, answer)) == placeholder
     if isinstance(placeholder, Quadratic):
         parts = ("H", "g", "c")
-        return isinstance(answer, Quadratic) and all(_is_placeholder(getattr(answer, p), getattr(placeholder, p)) for p in parts)
+        return isinstance(answer, Quadratic) and all(
+            _is_placeholder(getattr(answer, p), getattr(placeholder, p)) for p in parts
+        )
     given = array_or_verdict(answer, np.shape(placeholder))
     return not isinstance(given, Verdict) and np.allclose(given, placeholder, rtol=1e-6, atol=1e-6)
 
 
 def _bytecode(function: Any) -> tuple[Any, ...] | None:
-    """What a function does, whatever it is called and wherever it stands; None for anything but a function in Python."""
+    """What a function does, whatever it is called and wherever it stands; None for anything but a
+    function in Python.
+    """
     code = getattr(function, "__code__", None)
     return code and (code.co_code, code.co_consts, code.co_names, code.co_varnames)
 

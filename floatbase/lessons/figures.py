@@ -1,7 +1,7 @@
 """The course text's figures as 3-D scenes: each function returns a `Viewer` that shows one figure.
 
-Figure 1: left a robot bolted to the ground, right a floating base. Figure 2: a quadruped, its base, centre of mass and feet.
-Figure 3: left the friction cone, right the plane through normal and force.
+Figure 1: left a robot bolted to the ground, right a floating base. Figure 2: a quadruped, its base,
+centre of mass and feet. Figure 3: left the friction cone, right the plane through normal and force.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ MU = 0.7
 
 
 def figure_1_left(background: str = "white") -> Viewer:
-    """A fixed-base robot pushes a wall: the force f_r of the wall, and the moment τ_b of the bolts, which hold the base.
+    """A fixed-base robot pushes a wall: the force f_r of the wall, and the moment τ_b of the bolts,
+    which hold the base.
 
-    τ_b = -(p - p_base) × f_r, as the ground exerts it on the base. (1) has no such term: bolts bear any moment.
+    τ_b = -(p - p_base) × f_r, as the ground exerts it on the base. (1) has no such term: bolts bear
+    any moment.
     """
     robot = load("ur5")
     view = Viewer(robot, background=background)
@@ -40,20 +42,28 @@ def figure_1_left(background: str = "white") -> Viewer:
     extra |= prefixed("bolts", props.bolts(np.zeros(3), 0.11))
     extra |= {"f/wall": shapes.arrow(tool, scale * force, MEASURED, size)}
     extra |= {"f/base": markers.curled_arrow([0.0, 0.0, 0.06], ring, MEASURED)}
-    extra |= _labels(view, {"f{r}": tool + scale * force + [0, 0, 0.06], "τ{b}": [-0.16, -0.1, 0.22]})
-    view.show(state, com=False, extra=extra, title="Figure 1, left: the base is bolted to the ground")
+    extra |= _labels(
+        view, {"f{r}": tool + scale * force + [0, 0, 0.06], "τ{b}": [-0.16, -0.1, 0.22]}
+    )
+    view.show(
+        state, com=False, extra=extra, title="Figure 1, left: the base is bolted to the ground"
+    )
     return view.camera(View(-62.0, 14.0, 1.5))
 
 
 def figure_1_right(background: str = "white") -> Viewer:
-    """A floating base: the contact forces f_i sum to the force f_c and the moment τ_c at the centre of mass, (20)(21)."""
+    """A floating base: the contact forces f_i sum to the force f_c and the moment τ_c at the centre
+    of mass, (20)(21).
+    """
     robot = load("go2")
     view = Viewer(robot, background=background, scale=0.004)
     state, scale = robot.standing(), 0.004
     contacts = Contacts.points(robot, MU)
     forces = _example_forces(robot.weight)
     positions = contacts.positions(state)
-    wrench = np.concatenate([forces.sum(axis=0), np.cross(positions - state.com, forces).sum(axis=0)])
+    wrench = np.concatenate(
+        [forces.sum(axis=0), np.cross(positions - state.com, forces).sum(axis=0)]
+    )
     tips = positions + scale * forces
     labels = {f"f{{{i + 1}}}": tip + [0.045, -0.03, 0.0] for i, tip in enumerate(tips)}
     labels["f{4}"] = tips[3] + [-0.06, 0.04, 0.0]
@@ -67,14 +77,22 @@ def figure_1_right(background: str = "white") -> Viewer:
 
 
 def figure_2(background: str = "white") -> Viewer:
-    """A quadrupedal robot: its base frame, its centre of mass x_c (another point), and its feet x_i."""
+    """A quadrupedal robot: its base frame, its centre of mass x_c (another point), and its feet
+    x_i.
+    """
     robot = load("go2")
     view = Viewer(robot, background=background)
     state = robot.standing()
     contacts = Contacts.points(robot, MU)
     positions = contacts.positions(state)
-    labels = {f"x{{{i + 1}}}": _outside(position, state.com) for i, position in enumerate(positions)}
-    labels["x{4}"] = positions[3] + [-0.06, 0.04, 0.01]  # behind the robot, since its own foot would hide it outside
+    labels = {
+        f"x{{{i + 1}}}": _outside(position, state.com) for i, position in enumerate(positions)
+    }
+    labels["x{4}"] = positions[3] + [
+        -0.06,
+        0.04,
+        0.01,
+    ]  # behind the robot, since its own foot would hide it outside
     labels["x{c}"] = state.com + [0.065, -0.035, -0.035]
     pose = state.frame_pose(robot.base).homogeneous
     labels["base"] = pose[:3, 3] + [0.0, 0.0, 0.24]
@@ -96,7 +114,11 @@ def figure_3_left(background: str = "white") -> Viewer:
         "part/normal": shapes.arrow(np.zeros(3), along, COM),
         "part/tangent": shapes.arrow(along, across, ALARM),
     }
-    labels = {"f": force + [0, 0.05, 0.03], "f{⊥}": along / 2 - [0, 0.07, 0], "f{∥}": along + across / 2 + [0, 0, 0.05]}
+    labels = {
+        "f": force + [0, 0.05, 0.03],
+        "f{⊥}": along / 2 - [0, 0.07, 0],
+        "f{∥}": along + across / 2 + [0, 0, 0.05],
+    }
     picture |= _labels(view, labels | {"n": [0.0, 0.0, 0.93]})
     picture["normal"] = _rod(np.zeros(3), np.array([0.0, 0.0, 0.9]), PATCH)
     view.draw(view.painter.ground_only() | picture, "Figure 3, left: friction cone")
@@ -146,7 +168,9 @@ def _example_forces(weight: float) -> Array:
 
 
 def _cone_stage(background: str) -> tuple[Viewer, Array, Array]:
-    """A viewer for a cone alone, and the normal and the tangential part of a force in it, drawn in m."""
+    """A viewer for a cone alone, and the normal and the tangential part of a force in it, drawn in
+    m.
+    """
     view = Viewer(load("go2"), background=background)
     return view, np.array([0.0, 0.0, 0.6]), np.array([0.0, 0.26, 0.0])
 

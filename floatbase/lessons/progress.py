@@ -1,7 +1,9 @@
-"""Which exercises a learner has tried and solved, and what was predicted, stored in a file of the learner's own.
+"""Which exercises a learner has tried and solved, and what was predicted, stored in a file of the
+learner's own.
 
-Every try and every prediction is one line at the end of the file, written at once: processes and threads that write together
-need no lock, and an interrupt or a full disk costs that one line at most. Nothing that stands in the file is ever changed.
+Every try and every prediction is one line at the end of the file, written at once: processes and
+threads that write together need no lock, and an interrupt or a full disk costs that one line at
+most. Nothing that stands in the file is ever changed.
 """
 
 from __future__ import annotations
@@ -18,12 +20,15 @@ from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
 _FILE_NAME = "progress.jsonl"
-_MAX_ANSWER_LENGTH = 100_000  # characters of an answer that is kept; the longest right one of the course takes less than 20 000
-_OLD_FILE_NAME = "progress.json"  # one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
+# characters of an answer that is kept; the longest right one of the course takes less than 20 000
+_MAX_ANSWER_LENGTH = 100_000
+# one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
+_OLD_FILE_NAME = "progress.json"
 
 
 def path() -> Path:
-    """Where it is stored: progress.jsonl in the folder that FLOATBASE_HOME names, ~/.floatbase by default.
+    """Where it is stored: progress.jsonl in the folder that FLOATBASE_HOME names, ~/.floatbase by
+    default.
 
     Raises `RuntimeError` where there is no home folder either.
     """
@@ -31,7 +36,9 @@ def path() -> Path:
 
 
 def load() -> dict[str, dict[str, int]]:
-    """For each exercise that was tried: {"tries": n, "right": m}. What is damaged is left out, the rest is counted."""
+    """For each exercise that was tried: {"tries": n, "right": m}. What is damaged is left out, the
+    rest is counted.
+    """
     tried: dict[str, dict[str, int]] = {}
     for text in _lines():
         for name, tries, right in _try_counts(text):
@@ -42,15 +49,19 @@ def load() -> dict[str, dict[str, int]]:
 
 
 def record_try(name: str, right: bool, answer: Any = None) -> None:
-    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten, without an error.
+    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten,
+    without an error.
 
-    answer: what was answered; it is kept as the numbers or names that it is, or as the text of a function, and is never run.
+    answer: what was answered; it is kept as the numbers or names that it is, or as the text of a
+        function, and is never run.
     """
     append(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
 
 
 def answers() -> dict[str, Any]:
-    """For each exercise that was tried: the last right answer `as_json`, or where none was right the last."""
+    """For each exercise that was tried: the last right answer `as_json`, or where none was right
+    the last.
+    """
     found: dict[str, Any] = {}
     solved = set()
     for text in _lines():
@@ -63,12 +74,16 @@ def answers() -> dict[str, Any]:
 
 
 def predictions() -> dict[str, dict[str, Any]]:
-    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is one; see `append`."""
+    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is
+    one; see `append`.
+    """
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
             usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text}
-            kept = {key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])}
+            kept = {
+                key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])
+            }
             if kept and _is_text(name):
                 found.setdefault(name, {}).update(kept)
     return found
@@ -77,7 +92,8 @@ def predictions() -> dict[str, dict[str, Any]]:
 def append(name: str, entry: dict[str, Any]) -> str:
     """Add a line about the exercise or prediction `name`; what prevented it, and what to do, or "".
 
-    entry: of a prediction "said" and "is" are a number, a list of numbers or a text; "unit" is a text.
+    entry: of a prediction "said" and "is" are a number, a list of numbers or a text; "unit" is a
+        text.
     """
     # the line end comes first: a line that a full disk cut short before this one stays alone
     return _append_line(("\n" + json.dumps({name: entry})).encode())
@@ -89,9 +105,11 @@ def storage_problem() -> str:
 
 
 def as_json(answer: Any) -> Any:
-    """An answer in the form in which it is kept: numbers, texts, lists; else an object that says what it is.
+    """An answer in the form in which it is kept: numbers, texts, lists; else an object that says
+    what it is.
 
-    `from_json` gives back an answer that a judge takes for the same; only of a function no more than its code is left.
+    `from_json` gives back an answer that a judge takes for the same; only of a function no more
+    than its code is left.
     """
     try:
         kept = _as_json(answer)
@@ -123,23 +141,36 @@ def _source_of(function: Any) -> str:
 
 
 def from_json(kept: Any) -> Any:
-    """The answer that `as_json` kept. Raises `ValueError` or another error of Python where it is damaged."""
+    """The answer that `as_json` kept. Raises `ValueError` or another error of Python where it is
+    damaged.
+    """
     if isinstance(kept, list) and (array := numeric_copy(kept)) is not None:
         return array
     if isinstance(kept, list):
         return [from_json(part) for part in kept]
     if isinstance(kept, dict):
-        return tuple(map(from_json, kept["tuple"])) if "tuple" in kept else Quadratic(kept["H"], kept["g"], kept["c"])
+        return (
+            tuple(map(from_json, kept["tuple"]))
+            if "tuple" in kept
+            else Quadratic(kept["H"], kept["g"], kept["c"])
+        )
     return kept
 
 
 def _append_line(line: bytes) -> str:
-    """Write a line at the end of the file; what prevented it, or "". Without a line only whether one could be written."""
-    lost, advice = "Tries and predictions cannot be kept", "Set FLOATBASE_HOME to a folder that you may write to"
+    """Write a line at the end of the file; what prevented it, or "". Without a line only whether
+    one could be written.
+    """
+    lost, advice = (
+        "Tries and predictions cannot be kept",
+        "Set FLOATBASE_HOME to a folder that you may write to",
+    )
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         if not line and not path().exists():
-            return "" if os.access(path().parent, os.W_OK) else f"{lost} in {path().parent}. {advice}."
+            return (
+                "" if os.access(path().parent, os.W_OK) else f"{lost} in {path().parent}. {advice}."
+            )
         file = os.open(path(), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
             if os.write(file, line) < len(line):
@@ -172,7 +203,11 @@ def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:
         found = json.loads(text)
     except (ValueError, RecursionError):
         return
-    yield from ((name, entry) for name, entry in found.items() if isinstance(entry, dict)) if isinstance(found, dict) else ()
+    yield from (
+        ((name, entry) for name, entry in found.items() if isinstance(entry, dict))
+        if isinstance(found, dict)
+        else ()
+    )
 
 
 def _try_counts(text: bytes) -> Iterator[tuple[str, int, int]]:
@@ -185,7 +220,9 @@ def _try_counts(text: bytes) -> Iterator[tuple[str, int, int]]:
 
 def _is_answer(value: Any) -> bool:
     numbers = value if isinstance(value, list) else [value]
-    return _is_text(value) or (bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers))
+    return _is_text(value) or (
+        bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers)
+    )
 
 
 def _is_text(value: Any) -> bool:

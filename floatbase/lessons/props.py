@@ -20,13 +20,20 @@ RUBBER: RGB = (0.16, 0.17, 0.18)
 WALL: RGB = (0.78, 0.76, 0.72)
 
 
-def wheel(centre: npt.ArrayLike, axis: npt.ArrayLike, radius: float, angle: float, width: float | None = None) -> Item:
+def wheel(
+    centre: npt.ArrayLike,
+    axis: npt.ArrayLike,
+    radius: float,
+    angle: float,
+    width: float | None = None,
+) -> Item:
     """A wheel with spokes, one of them marked.
 
     centre: (3,), m, world.
     axis: (3,), world, direction of its axle.
     radius: m.
-    angle: rad, how far it has turned about the axle by the right-hand rule; at 0 the marked spoke points upwards.
+    angle: rad, how far it has turned about the axle by the right-hand rule; at 0 the marked spoke
+        points upwards.
     width: m; None for 0.35 of the radius.
     """
     axle = unit_vector("axis of the wheel", axis)
@@ -46,26 +53,39 @@ def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
 
     centre: (3,), m, world, of its top.
     radius: m.
-    angle: rad, how far it has turned about the vertical by the right-hand rule; at 0 the marked line points along x.
+    angle: rad, how far it has turned about the vertical by the right-hand rule; at 0 the marked
+        line points along x.
     """
     as_positive("radius of the turntable", radius, "m")
     c, s = np.cos(angle), np.sin(angle)
-    return Item(_unit_table(), transform(centre, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), radius))
+    return Item(
+        _unit_table(),
+        transform(centre, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), radius),
+    )
 
 
 def hydraulic_cylinder(
-    base: npt.ArrayLike, end: npt.ArrayLike, stroke: tuple[float, float], pressures: tuple[float, float] = (0.5, 0.5)
+    base: npt.ArrayLike,
+    end: npt.ArrayLike,
+    stroke: tuple[float, float],
+    pressures: tuple[float, float] = (0.5, 0.5),
 ) -> Picture:
     """A double-acting hydraulic cylinder: barrel, rod, piston and two chambers.
 
     base, end: (3,), m, world, its two ends.
     stroke: the shortest and the longest distance between the ends, m.
-    pressures: of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1 (full colour).
+    pressures: of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1
+        (full colour).
     """
     if not 0.0 < stroke[0] < stroke[1]:
-        raise InputError(f"stroke of the cylinder is {stroke}; it must be its shortest and longest length, m, above zero.")
+        raise InputError(
+            f"stroke of the cylinder is {stroke}; it must be its shortest and longest length, m, "
+            f"above zero."
+        )
     start = as_array("base of the cylinder", base, (3,), "m")
-    way, length = vector_and_length("a cylinder", as_array("end of the cylinder", end, (3,), "m") - start)
+    way, length = vector_and_length(
+        "a cylinder", as_array("end of the cylinder", end, (3,), "m") - start
+    )
     turned = geometry.rotation_with_z_axis(way / length)
     barrel = 0.92 * stroke[0]
     piston = min(max(length - 0.95 * stroke[0], 0.06 * barrel), 0.94 * barrel)
@@ -77,9 +97,15 @@ def hydraulic_cylinder(
     return {
         "/barrel": Item(_tube(), between(0.0, barrel, radius)),
         "/rod": Item(_rod(STEEL), between(piston, length, 0.38 * radius)),
-        "/piston": Item(_rod(RUBBER), between(piston - 0.03 * barrel, piston + 0.03 * barrel, 0.93 * radius)),
-        "/base chamber": Item(_fluid(), between(0.0, piston, 0.9 * radius), (*MEASURED, 0.15 + 0.7 * pressures[0])),
-        "/rod chamber": Item(_fluid(), between(piston, barrel, 0.9 * radius), (*PLANNED, 0.15 + 0.7 * pressures[1])),
+        "/piston": Item(
+            _rod(RUBBER), between(piston - 0.03 * barrel, piston + 0.03 * barrel, 0.93 * radius)
+        ),
+        "/base chamber": Item(
+            _fluid(), between(0.0, piston, 0.9 * radius), (*MEASURED, 0.15 + 0.7 * pressures[0])
+        ),
+        "/rod chamber": Item(
+            _fluid(), between(piston, barrel, 0.9 * radius), (*PLANNED, 0.15 + 0.7 * pressures[1])
+        ),
     }
 
 
@@ -93,17 +119,24 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
     n = unit_vector("normal of the wall", normal)
     side = np.cross([0.0, 0.0, 1.0], n)
     if np.linalg.norm(side) < 1e-6:
-        raise InputError("normal of the wall is vertical; a wall stands, so its normal has a horizontal part.")
+        raise InputError(
+            "normal of the wall is vertical; a wall stands, so its normal has a horizontal part."
+        )
     side /= np.linalg.norm(side)
     as_positive("width of the wall", width, "m")
     as_positive("height of the wall", height, "m")
     turned = np.stack([n, side, np.cross(n, side)], axis=1)
     thick = 0.05 * height
-    return Item(_unit_box(WALL), transform(np.asarray(position) - n * thick / 2, turned, (thick, width, height)))
+    return Item(
+        _unit_box(WALL),
+        transform(np.asarray(position) - n * thick / 2, turned, (thick, width, height)),
+    )
 
 
 def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
-    """`count` bolts on a circle. position: (3,), m, world, centre of the circle. radius: of the circle, m."""
+    """`count` bolts on a circle. position: (3,), m, world, centre of the circle. radius: of the
+    circle, m.
+    """
     as_positive("radius of the bolts' circle", radius, "m")
     picture: Picture = {}
     for i in range(count):
@@ -116,33 +149,64 @@ def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
 @lru_cache(maxsize=1)
 def _unit_wheel() -> Shape:
     """A wheel around z, of radius 1 and width 1, one of its spokes marked."""
-    tyre = geometry.surface_of_revolution([(0.8, -0.5), (1.0, -0.5), (1.0, 0.5), (0.8, 0.5), (0.8, -0.5)], 48)
+    tyre = geometry.surface_of_revolution(
+        [(0.8, -0.5), (1.0, -0.5), (1.0, 0.5), (0.8, 0.5), (0.8, -0.5)], 48
+    )
     hub = geometry.surface_of_revolution([(0.0, -0.5), (0.16, -0.5), (0.16, 0.5), (0.0, 0.5)])
     angles = 2.0 * np.pi * np.arange(6) / 6
-    spokes = [geometry.cylinder(np.zeros(3), [0.85 * np.cos(a), 0.85 * np.sin(a), 0.0], 0.06) for a in angles]
-    parts = [(tyre, RUBBER), (hub, STEEL), (spokes[0], WARNING), *((spoke, STEEL) for spoke in spokes[1:])]
-    colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
+    spokes = [
+        geometry.cylinder(np.zeros(3), [0.85 * np.cos(a), 0.85 * np.sin(a), 0.0], 0.06)
+        for a in angles
+    ]
+    parts = [
+        (tyre, RUBBER),
+        (hub, STEEL),
+        (spokes[0], WARNING),
+        *((spoke, STEEL) for spoke in spokes[1:]),
+    ]
+    colours = [
+        np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts
+    ]
     return threejs.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
 
 
 @lru_cache(maxsize=1)
 def _unit_table() -> Shape:
-    """A disc of radius 1 with its top at z = 0, a rim and twelve painted lines, the one along x dark and wide."""
+    """A disc of radius 1 with its top at z = 0, a rim and twelve painted lines, the one along x
+    dark and wide.
+    """
     top = geometry.surface_of_revolution([(0.97, 0.0), (0.0, 0.0)], 72)
-    rim = geometry.surface_of_revolution([(0.97, -0.05), (1.0, -0.05), (1.0, 0.012), (0.97, 0.012), (0.97, -0.05)], 72)
-    foot = geometry.surface_of_revolution([(0.0, -0.25), (0.3, -0.25), (0.06, -0.2), (0.06, -0.05), (0.0, -0.05)], 36)
+    rim = geometry.surface_of_revolution(
+        [(0.97, -0.05), (1.0, -0.05), (1.0, 0.012), (0.97, 0.012), (0.97, -0.05)], 72
+    )
+    foot = geometry.surface_of_revolution(
+        [(0.0, -0.25), (0.3, -0.25), (0.06, -0.2), (0.06, -0.05), (0.0, -0.05)], 36
+    )
     angles = 2.0 * np.pi * np.arange(12) / 12
-    lines = [geometry.cylinder(np.zeros(3), [0.97 * np.cos(a), 0.97 * np.sin(a), 0.0], 0.005) for a in angles]
+    lines = [
+        geometry.cylinder(np.zeros(3), [0.97 * np.cos(a), 0.97 * np.sin(a), 0.0], 0.005)
+        for a in angles
+    ]
     mark = geometry.cylinder([0.0, 0.0, 0.0], [0.97, 0.0, 0.0], 0.016)
-    parts = [(top, WALL), (rim, STEEL), (foot, STEEL), (mark, RUBBER), *((line, STEEL) for line in lines[1:])]
-    colours = [np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts]
+    parts = [
+        (top, WALL),
+        (rim, STEEL),
+        (foot, STEEL),
+        (mark, RUBBER),
+        *((line, STEEL) for line in lines[1:]),
+    ]
+    colours = [
+        np.tile(np.round(255 * np.array(colour)), (len(mesh[0]), 1)) for mesh, colour in parts
+    ]
     return threejs.mesh(*geometry.merged([mesh for mesh, _ in parts]), colours=np.vstack(colours))
 
 
 @lru_cache(maxsize=1)
 def _tube() -> Shape:
     """A translucent tube along z, 1 long, of radius 1."""
-    return threejs.mesh(*geometry.surface_of_revolution([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35)
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35
+    )
 
 
 @lru_cache(maxsize=1)
@@ -153,7 +217,10 @@ def _fluid() -> Shape:
 
 @lru_cache(maxsize=8)
 def _rod(colour: RGB) -> Shape:
-    return threejs.mesh(*geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 24), colour)
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 24),
+        colour,
+    )
 
 
 @lru_cache(maxsize=8)
@@ -161,7 +228,11 @@ def _unit_box(colour: RGB) -> Shape:
     """A cube of side 1 around the origin."""
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return threejs.mesh(*geometry.merged([geometry.convex_polygon(corners[list(side)]) for side in sides]), colour, flat=True)
+    return threejs.mesh(
+        *geometry.merged([geometry.convex_polygon(corners[list(side)]) for side in sides]),
+        colour,
+        flat=True,
+    )
 
 
 @lru_cache(maxsize=1)

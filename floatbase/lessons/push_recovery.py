@@ -1,8 +1,10 @@
-"""The push roses that end lessons from 05 on: measured by a command, kept with the course, drawn over the former lesson's.
+"""The push roses that end lessons from 05 on: measured by a command, kept with the course, drawn
+over the former lesson's.
 
-`python -m floatbase.lessons.publish push-recovery 05` measures that of lesson 05 anew, which takes a minute or two, and writes it into
-push_recovery.json beside this file, where the lessons read it. A lesson that has one offers `make_controller()`, which makes its
-controller. What lies in grey below is the rose of the lesson before; or, where the robot is another one, a second rose of the
+`python -m floatbase.lessons.publish push-recovery 05` measures that of lesson 05 anew, which takes
+a minute or two, and writes it into push_recovery.json beside this file, where the lessons read it.
+A lesson that has one offers `make_controller()`, which makes its controller. What lies in grey
+below is the rose of the lesson before; or, where the robot is another one, a second rose of the
 lesson's own: "09 standing" is that of `make_standing_controller()` in the package of lesson 09.
 """
 
@@ -27,11 +29,14 @@ from floatbase.viewer.plots import push_recovery_plots
 _FILE = Path(__file__).with_name("push_recovery.json")
 _DIRECTIONS = 8
 _STEP, _DURATION = 5.0, 0.1  # N, s
-_WATCH_TIME = 1.5  # s after a push, in which who stands on the spot has fallen; a lesson with steps says `PUSH_RECOVERY_WATCH_TIME`, more
+# s after a push, in which who stands on the spot has fallen; a lesson with steps says
+# `PUSH_RECOVERY_WATCH_TIME`, more
+_WATCH_TIME = 1.5
 
 
 def measured_push_recovery(lesson: str) -> PushRecovery:
-    """The rose of that lesson's controller, such as "05", or of a second one, "09 standing", as it was measured last.
+    """The rose of that lesson's controller, such as "05", or of a second one, "09 standing", as it
+    was measured last.
 
     Raises `InputError` for a lesson without one.
     """
@@ -41,20 +46,29 @@ def measured_push_recovery(lesson: str) -> PushRecovery:
     controller = controller_factory(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     start = Simulation(controller.robot).state
-    return PushRecovery(angles, np.array(kept[lesson]), _STEP, _DURATION, "base", start, controller.contacts)
+    return PushRecovery(
+        angles, np.array(kept[lesson]), _STEP, _DURATION, "base", start, controller.contacts
+    )
 
 
 def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
-    """The rose of that lesson, over the former lesson's in grey. axis: polar axes to plot on; None for a new figure."""
-    return push_recovery_plots.plot(measured_push_recovery(lesson), axis, theory=False, previous=_former_push_recovery(lesson))
+    """The rose of that lesson, over the former lesson's in grey. axis: polar axes to plot on; None
+    for a new figure.
+    """
+    return push_recovery_plots.plot(
+        measured_push_recovery(lesson), axis, theory=False, previous=_former_push_recovery(lesson)
+    )
 
 
 def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """What `plot_push_recovery` plots, on the ground below the robot: items for `extra` of `Viewer.show`.
+    """What `plot_push_recovery` plots, on the ground below the robot: items for `extra` of
+    `Viewer.show`.
 
     scale: length of a drawn push, m/N; None makes the widest rose half as wide again as the stance.
     """
-    return push_recovery_plots.picture(measured_push_recovery(lesson), scale, theory=False, previous=_former_push_recovery(lesson))
+    return push_recovery_plots.picture(
+        measured_push_recovery(lesson), scale, theory=False, previous=_former_push_recovery(lesson)
+    )
 
 
 def controller_factory(lesson: str) -> Callable[[], Any]:
@@ -64,16 +78,25 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
     """
     second = as_string("lesson", lesson).partition(" ")[2]
     try:
-        make: Callable[[], Any] = getattr(_lesson_package(lesson), f"make_{second}_controller" if second else "make_controller")
+        make: Callable[[], Any] = getattr(
+            _lesson_package(lesson), f"make_{second}_controller" if second else "make_controller"
+        )
     except (ModuleNotFoundError, AttributeError) as error:
-        raise InputError(f"lesson {lesson!r} has no controller to push: lessons from 05 to 09 have.") from error
+        raise InputError(
+            f"lesson {lesson!r} has no controller to push: lessons from 05 to 09 have."
+        ) from error
     return make
 
 
 def measure_push_recovery(lesson: str) -> PushRecovery:
     """Measure the rose of that lesson and keep it."""
-    make, watch = controller_factory(lesson), getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME)
-    recovery = push_recovery(make, directions=_DIRECTIONS, resolution=_STEP, duration=_DURATION, observation_time=watch)
+    make, watch = (
+        controller_factory(lesson),
+        getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME),
+    )
+    recovery = push_recovery(
+        make, directions=_DIRECTIONS, resolution=_STEP, duration=_DURATION, observation_time=watch
+    )
     kept = {**_stored_pushes(), lesson: recovery.pushes.tolist()}
     lines = [f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept)]
     _FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

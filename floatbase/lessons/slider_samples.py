@@ -1,4 +1,5 @@
-"""Panels on a site, which has no kernel: what a panel shows is computed before, at stops of its sliders.
+"""Panels on a site, which has no kernel: what a panel shows is computed before, at stops of its
+sliders.
 
 Of few stops all combinations are computed, of many one slider at a time, from where all began.
 """
@@ -23,21 +24,40 @@ MAX_COMBINATIONS = 100  # combinations that are computed
 _SAMPLES, _SAMPLES_OF_SLOW = 11, 9  # stops of a slider, about; of one that is slow to draw
 _SAMPLES_OF_TWO = (9, 7, 6, 5)  # the same for two sliders: the first with few enough combinations
 _ROUND_STEPS = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: from stop to stop
-_MIN_GAP = 0.22  # of the way to the next stop: a round number that is nearer to a bound than this is left out
-DIRECTIONS = {"forwards": 0.0, "to the left": 90.0, "backwards": 180.0, "to the right": 270.0}  # degrees
-_PUSH_START, _TIME_SEEN = 0.1, 1.5  # s: when a recorded push begins, and how long it is seen from then on
+# of the way to the next stop: a round number that is nearer to a bound than this is left out
+_MIN_GAP = 0.22
+DIRECTIONS = {
+    "forwards": 0.0,
+    "to the left": 90.0,
+    "backwards": 180.0,
+    "to the right": 270.0,
+}  # degrees
+_PUSH_START, _TIME_SEEN = (
+    0.1,
+    1.5,
+)  # s: when a recorded push begins, and how long it is seen from then on
 _FRAME_RATE = 15.0  # pictures a second of a recorded push
 _SAMPLED_NOTE = "Computed for these stops; in the live lesson the sliders have all values between."
 _ONE_AT_A_TIME_NOTE = " Here one slider moves at a time: the others go back to where they began."
-_OUTCOME_TEXTS = {"completed": "it stands", "fell": "it falls", "controller failed": "its controller finds no answer, and it falls"}
+_OUTCOME_TEXTS = {
+    "completed": "it stands",
+    "fell": "it falls",
+    "controller failed": "its controller finds no answer, and it falls",
+}
 RECORDED_NOTE = "Recorded. In the live lesson you push while it runs, in any direction."
 
 
-def sample_values(low: float, first: float, high: float, step: float, count: int = _SAMPLES) -> tuple[float, ...]:
-    """Some `rounded` values from `low` to `high`, with both, `first` and round ones between, all multiples of `step` from low."""
+def sample_values(
+    low: float, first: float, high: float, step: float, count: int = _SAMPLES
+) -> tuple[float, ...]:
+    """Some `rounded` values from `low` to `high`, with both, `first` and round ones between, all
+    multiples of `step` from low.
+    """
     if not high > low:
         return (low,)
-    between = min(_round_spacings(high - low, step), key=lambda gap: abs((high - low) / gap + 1 - count))
+    between = min(
+        _round_spacings(high - low, step), key=lambda gap: abs((high - low) / gap + 1 - count)
+    )
     fixed = sorted({low, first, high})
     inner = between * np.arange(math.ceil(low / between), math.floor(high / between) + 1)
     far = [float(x) for x in inner if min(abs(x - bound) for bound in fixed) > _MIN_GAP * between]
@@ -47,9 +67,16 @@ def sample_values(low: float, first: float, high: float, step: float, count: int
 
 
 def _round_spacings(width: float, step: float) -> list[float]:
-    """Round numbers between a step and the whole width; whole numbers of steps, where there are any."""
+    """Round numbers between a step and the whole width; whole numbers of steps, where there are
+    any.
+    """
     power = math.floor(math.log10(width))
-    gaps = [part * 10.0 ** (power - i) for i in range(4) for part in _ROUND_STEPS if step <= part * 10.0 ** (power - i) <= width]
+    gaps = [
+        part * 10.0 ** (power - i)
+        for i in range(4)
+        for part in _ROUND_STEPS
+        if step <= part * 10.0 ** (power - i) <= width
+    ]
     whole = [gap for gap in gaps if abs(gap / step - round(gap / step)) < 1e-6]
     return whole or gaps or [step]
 
@@ -58,13 +85,23 @@ def panel_samples(panel: SliderPanel) -> dict[str, tuple[float, ...]]:
     """The stops of each slider of a panel: those that the lesson gives, else round ones."""
     counts = _SAMPLES_OF_TWO if len(panel.sliders) == 2 else (_SAMPLES,)
     sliders = panel.sliders.items()
-    found = [{name: _slider_samples(slider, panel.samples.get(name), count) for name, slider in sliders} for count in counts]
-    return next((samples for samples in found if math.prod(map(len, samples.values())) <= MAX_COMBINATIONS), found[0])
+    found = [
+        {name: _slider_samples(slider, panel.samples.get(name), count) for name, slider in sliders}
+        for count in counts
+    ]
+    return next(
+        (samples for samples in found if math.prod(map(len, samples.values())) <= MAX_COMBINATIONS),
+        found[0],
+    )
 
 
 def _slider_samples(slider: Any, given: Sequence[float] | None, count: int) -> tuple[float, ...]:
     count = count if slider.continuous_update else min(count, _SAMPLES_OF_SLOW)
-    values = sample_values(slider.min, slider.value, slider.max, slider.step, count) if given is None else given
+    values = (
+        sample_values(slider.min, slider.value, slider.max, slider.step, count)
+        if given is None
+        else given
+    )
     return tuple(sorted({*map(float, values), float(slider.value)}))
 
 
@@ -75,7 +112,11 @@ def combinations(counts: Sequence[int], first: Sequence[int]) -> tuple[list[tupl
     """
     if math.prod(counts) <= MAX_COMBINATIONS:
         return list(product(*(range(count) for count in counts))), True
-    alone = [(*first[:i], sample, *first[i + 1 :]) for i, count in enumerate(counts) for sample in range(count)]
+    alone = [
+        (*first[:i], sample, *first[i + 1 :])
+        for i, count in enumerate(counts)
+        for sample in range(count)
+    ]
     return list(dict.fromkeys(map(tuple, alone))), False
 
 
@@ -92,20 +133,31 @@ def precomputed_panel(panel: SliderPanel) -> dict[str, Any]:
         note = panel.draw_at({name: values[name][i] for name, i in zip(values, place, strict=True)})
         pack.add_sample(place, note)
     panel.draw_at(panel.values())
-    controls = [_site_control(panel.sliders[name], values[name], i) for name, i in zip(values, first, strict=True)]
+    controls = [
+        _site_control(panel.sliders[name], values[name], i)
+        for name, i in zip(values, first, strict=True)
+    ]
     return pack.bundle(controls, together)
 
 
 def _site_control(slider: Any, values: Sequence[float], first: int) -> Control:
     """The control of a site for a slider of a panel."""
     name, _, unit = slider.description.partition(" [")
-    return Control(name, tuple(_format_value(x, slider.readout_format) for x in values), first, unit=unit.removesuffix("]"))
+    return Control(
+        name,
+        tuple(_format_value(x, slider.readout_format) for x in values),
+        first,
+        unit=unit.removesuffix("]"),
+    )
 
 
 def recorded_pushes(
-    titles: Mapping[str, tuple[Viewer, Simulation, Controller]], forces: Iterable[float], directions: Sequence[str]
+    titles: Mapping[str, tuple[Viewer, Simulation, Controller]],
+    forces: Iterable[float],
+    directions: Sequence[str],
 ) -> dict[str, Any]:
-    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site. Without a push they stand still.
+    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site.
+    Without a push they stand still.
 
     titles: what stands above each picture -> its viewer, and what runs in it.
     """
@@ -117,7 +169,10 @@ def recorded_pushes(
     for k in range(len(directions)):
         pack.add_sample((0, k))
     for (i, force), (k, direction) in product(enumerate(sizes), enumerate(directions)):
-        records = [_record_push(sim, controller, force, DIRECTIONS[direction]) for _, sim, controller in titles.values()]
+        records = [
+            _record_push(sim, controller, force, DIRECTIONS[direction])
+            for _, sim, controller in titles.values()
+        ]
         for view, record in zip(views, records, strict=True):
             view.play(record, rate=_FRAME_RATE)
         pack.add_sample((i + 1, k), ", ".join(_outcome_texts(titles, records)))

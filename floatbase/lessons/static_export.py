@@ -1,7 +1,9 @@
-"""Pictures for pages without a kernel: of some viewers what they show first, and for each stop of the controls what differs.
+"""Pictures for pages without a kernel: of some viewers what they show first, and for each stop of
+the controls what differs.
 
-Where FLOATBASE_VIEWER=site is in the environment, a display puts this beside its image into the output, as plain data: the
-commands of the scenes (see `protocol`), each held once, and numbers that refer to them.
+Where FLOATBASE_VIEWER=site is in the environment, a display puts this beside its image into the
+output, as plain data: the commands of the scenes (see `protocol`), each held once, and numbers that
+refer to them.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ _END = (protocol.ANIMATION[0], protocol.ANIMATION[1], "end")
 class Control:
     """A control with so many stops.
 
-    name: what stands beside it. values: what a stop is called. first: number of the first stop. kind: "range" for a slider,
+    name: what stands beside it. values: what a stop is called. first: number of the first stop.
+        kind: "range" for a slider,
     "choice" of one of several, "switch" for one that is off or on. unit: of the values.
     Raises `ViewerError` for another kind and for a first stop that there is none of.
     """
@@ -45,13 +48,16 @@ class Control:
 
     def __post_init__(self) -> None:
         if self.kind not in _KINDS or not 0 <= self.first < len(self.values):
-            raise ViewerError(f"no control is of the kind {self.kind!r} with stop {self.first} of {self.values}.")
+            raise ViewerError(
+                f"no control is of the kind {self.kind!r} with stop {self.first} of {self.values}."
+            )
 
 
 class StaticExport:
     """What some viewers show now, and what they show at stops of the controls.
 
-    views: side by side; none where the notes have all there is to see. beside: whether a note stands to their right.
+    views: side by side; none where the notes have all there is to see. beside: whether a note
+        stands to their right.
     words: what stands below, such as that more of it is live only. titles: above each picture.
     """
 
@@ -68,7 +74,10 @@ class StaticExport:
         self._keys: dict[protocol.Key, int] = {}
         self._notes: dict[str, int] = {}
         self._first = [_entries(view.window.scene) for view in self._views]
-        self._thumbnails = [thumbnail.render_png(view.renderer.picture, view.window.scene, view.height) for view in self._views]
+        self._thumbnails = [
+            thumbnail.render_png(view.renderer.picture, view.window.scene, view.height)
+            for view in self._views
+        ]
         self._samples: dict[str, list[Any]] = {}
         self._head = {
             "titles": list(titles), "names": [view.robot.name for view in self._views],
@@ -78,37 +87,60 @@ class StaticExport:
         }  # fmt: skip
 
     def add_sample(self, at: Iterable[int], note: str = "") -> None:
-        """What the viewers show now belongs to these stops of the controls, one of each. note: HTML."""
+        """What the viewers show now belongs to these stops of the controls, one of each. note:
+        HTML.
+        """
         scenes = [_entries(view.window.scene) for view in self._views]
-        changed = [self._changes(first, scene) for first, scene in zip(self._first, scenes, strict=True)]
+        changed = [
+            self._changes(first, scene) for first, scene in zip(self._first, scenes, strict=True)
+        ]
         self._samples[",".join(map(str, at))] = [self._note_number(note), *changed]
 
     def bundle(self, controls: Sequence[Control] = (), together: bool = True) -> dict[str, Any]:
-        """The mimebundle of a display. together: whether there is a stop for every combination of the controls' stops."""
-        packed = base64.b64encode(gzip.compress(protocol.frame(self._commands), 6, mtime=0)).decode()
+        """The mimebundle of a display. together: whether there is a stop for every combination of
+        the controls' stops.
+        """
+        packed = base64.b64encode(
+            gzip.compress(protocol.frame(self._commands), 6, mtime=0)
+        ).decode()
         data = {
-            **self._head, "controls": [asdict(control) for control in controls], "together": together, "stops": self._samples,
-            "notes": list(self._notes), "keys": [list(key) for key in self._keys], "commands": packed,
+            **self._head, "controls": [asdict(control) for control in controls],
+            "together": together, "stops": self._samples,
+            "notes": list(self._notes), "keys": [list(key) for key in self._keys],
+            "commands": packed,
         }  # fmt: skip
-        shown: dict[str, Any] = {MIME: data, "text/plain": ", ".join(map(repr, self._views)) or "a panel"}
+        shown: dict[str, Any] = {
+            MIME: data,
+            "text/plain": ", ".join(map(repr, self._views)) or "a panel",
+        }
         if self._thumbnails:
             shown["image/png"] = base64.b64encode(self._image()).decode()
         return shown
 
     def _image(self) -> bytes:
-        return self._thumbnails[0] if len(self._thumbnails) == 1 else thumbnail.side_by_side(self._thumbnails)
+        return (
+            self._thumbnails[0]
+            if len(self._thumbnails) == 1
+            else thumbnail.side_by_side(self._thumbnails)
+        )
 
     def _note_number(self, note: str) -> int:
         return self._notes.setdefault(note, len(self._notes))
 
     def _numbers(self, key: protocol.Key, command: bytes | None) -> tuple[int, int]:
-        number = REMOVED if command is None else self._commands.setdefault(command, len(self._commands))
+        number = (
+            REMOVED if command is None else self._commands.setdefault(command, len(self._commands))
+        )
         return self._keys.setdefault(key, len(self._keys)), number
 
-    def _changes(self, first: dict[protocol.Key, bytes], now: dict[protocol.Key, bytes]) -> list[int]:
+    def _changes(
+        self, first: dict[protocol.Key, bytes], now: dict[protocol.Key, bytes]
+    ) -> list[int]:
         """Numbers of key and command, in turn, of all that differs from the first."""
         gone = [self._numbers(key, None) for key in first if key not in now]
-        fresh = [self._numbers(key, command) for key, command in now.items() if first.get(key) != command]
+        fresh = [
+            self._numbers(key, command) for key, command in now.items() if first.get(key) != command
+        ]
         return [number for pair in (*gone, *fresh) for number in pair]
 
 
@@ -120,7 +152,9 @@ def commands(data: dict[str, Any]) -> list[bytes]:
 def _entries(scene: Scene) -> dict[protocol.Key, bytes]:
     """The scene without animations that have ended."""
     ended = protocol.no_animation()[1]
-    return {key: command for key, command in scene.file_entries() if key != _END and command != ended}
+    return {
+        key: command for key, command in scene.file_entries() if key != _END and command != ended
+    }
 
 
 def bundle(view: Viewer) -> dict[str, Any]:

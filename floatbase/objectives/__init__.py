@@ -38,9 +38,13 @@ from floatbase.objectives.tasks import (
 
 # fmt: off
 __all__ = [
-    "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueTask", "TorquesFromForces",
-    "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate", "com_wrench_map",
-    "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "minimum_norm_coordinates", "minimum_norm_pullback",
-    "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks", "tangential_bias",
+    "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueTask",
+    "TorquesFromForces",
+    "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
+    "com_wrench_map",
+    "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "minimum_norm_coordinates",
+    "minimum_norm_pullback",
+    "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks",
+    "tangential_bias",
     "target_shapes", "targets_at", "torques_from_forces", "wrench_objective",
 ]

@@ -1,10 +1,13 @@
-"""Tasks: what a controller should bring about, each a weighted affine residual, actual - desired, in q̈, τ or λ.
+"""Tasks: what a controller should bring about, each a weighted affine residual, actual - desired,
+    in q̈, τ or λ.
 
-A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of position and velocity. Its
-residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term of ψ in (26).
+A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
+position and velocity. Its residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term
+of ψ in (26).
 
-A target is a value, or a function of the time t in s that gives one. That of a motion task gives the position alone, and the
-target's velocity and acceleration count as zero, or all three together: `lambda t: (position, velocity, acceleration)`.
+A target is a value, or a function of the time t in s that gives one. That of a motion task gives
+the position alone, and the target's velocity and acceleration count as zero, or all three together:
+`lambda t: (position, velocity, acceleration)`.
 """
 
 from __future__ import annotations
@@ -38,10 +41,15 @@ from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State, check_unit_norms
 
-Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
+Target: TypeAlias = (
+    npt.ArrayLike
+    | Callable[[float], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]]
+)
 _ZERO3 = (0.0, 0.0, 0.0)
 _TRIPLE_HINT = "all three together, as in lambda t: (position, velocity, acceleration)"
-_ROTATION_TOLERANCE = 1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+_ROTATION_TOLERANCE = (
+    1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+)
 _IDENTITY = frozen(np.eye(3))
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 
@@ -52,8 +60,9 @@ class Task(Protocol):
 
     name: in messages and tables. weight: of ½‖residual‖² in the objective.
 
-    A user-defined object of this form is a task too, on the compiled tick as on the reference backend: this one keeps the height
-    of the centre of mass, as far as its acceleration may be 100 (h - z) - 20 ż, m/s².
+    A user-defined object of this form is a task too, on the compiled tick as on the reference
+    backend: this one keeps the height of the centre of mass, as far as its acceleration may be 100
+        (h - z) - 20 ż, m/s².
 
         class Height:
             name, weight, block = "height", 10.0, "qdd"
@@ -84,7 +93,9 @@ def _check_arguments(eom: EquationsOfMotion, t: float) -> None:
 
 
 def target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
-    """Shape of each target of a task of the package by its attribute, with k forces; the first may be a function of time."""
+    """Shape of each target of a task of the package by its attribute, with k forces; the first may
+    be a function of time.
+    """
     if isinstance(task, OrientationTask):
         return {"rotation": (3, 3), "angular_velocity": (3,), "angular_acceleration": (3,)}
     if isinstance(task, CoMTask | FrameTask):
@@ -97,7 +108,8 @@ def target_shapes(task: Task, robot: Robot, k: int) -> dict[str, tuple[int, ...]
 def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
     """The targets of a task of the package at time t in s, in the order of `target_shapes`.
 
-    Raises `InputError` for a function's value that has another shape, or is no rotation or configuration.
+    Raises `InputError` for a function's value that has another shape, or is no rotation or
+    configuration.
     """
     shapes = target_shapes(task, robot, k)
     values = [getattr(task, name) for name in shapes]
@@ -105,30 +117,48 @@ def targets_at(task: Task, robot: Robot, k: int, t: float) -> list[Array]:
     if time_varying:
         values = _split_target(task.name, values[0](t), *shapes.values())
     else:
-        values = [_zeros(shape) if value is None else value for value, shape in zip(values, shapes.values(), strict=True)]
-    targets = [_as_target(f"{name} of {task.name}", value, shapes[name]) for name, value in zip(shapes, values, strict=True)]
+        values = [
+            _zeros(shape) if value is None else value
+            for value, shape in zip(values, shapes.values(), strict=True)
+        ]
+    targets = [
+        _as_target(f"{name} of {task.name}", value, shapes[name])
+        for name, value in zip(shapes, values, strict=True)
+    ]
     if isinstance(task, OrientationTask) and time_varying:
         targets[0] = nearest_rotation(task.name, targets[0])
     if isinstance(task, PostureTask):
-        check_unit_norms(robot.model, f"q of {task.name}", targets[0], first_joint=2 if robot.is_floating else 1)
+        check_unit_norms(
+            robot.model, f"q of {task.name}", targets[0], first_joint=2 if robot.is_floating else 1
+        )
     return targets
 
 
-def _split_target(name: str, value: Any, shape: tuple[int, ...], *derivative_shapes: tuple[int, ...]) -> list[Any]:
-    """What a function of time gave, with zeros for velocity and acceleration unless it gave all three."""
+def _split_target(
+    name: str, value: Any, shape: tuple[int, ...], *derivative_shapes: tuple[int, ...]
+) -> list[Any]:
+    """What a function of time gave, with zeros for velocity and acceleration unless it gave all
+    three.
+    """
     is_sequence = (
-        derivative_shapes and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim)) and len(value) > 1
+        derivative_shapes
+        and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim))
+        and len(value) > 1
     )
     first = numeric_copy(value[0]) if is_sequence else None
     if first is None or first.ndim != len(shape):
         return [value, *map(_zeros, derivative_shapes)]
     if len(value) == 3:
         return list(value)
-    raise InputError(f"the function of {name} gave {len(value)} targets; it must give one, or {_TRIPLE_HINT}.")
+    raise InputError(
+        f"the function of {name} gave {len(value)} targets; it must give one, or {_TRIPLE_HINT}."
+    )
 
 
 def _as_target(name: str, target: Any, shape: tuple[int, ...]) -> Array:
-    """A target. One that does not move was checked when its task was made, but for a robot's own shape."""
+    """A target. One that does not move was checked when its task was made, but for a robot's own
+    shape.
+    """
     if type(target) is np.ndarray and target.shape == shape and not target.flags.writeable:
         return target
     return as_array(name, target, shape)
@@ -140,14 +170,18 @@ def _zeros(shape: tuple[int, ...]) -> Array:
 
 
 def _set_validated_fields(task: Task, **shapes: tuple[int | None, ...]) -> None:
-    """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2 √kp, by default.
+    """Check gains and weight, and copy the targets that do not move; kd is critically damped, 2
+    √kp, by default.
 
-    shapes: of each target as far as the task knows it, the one that may be a function of time first.
+    shapes: of each target as far as the task knows it, the one that may be a function of time
+        first.
     """
     as_string("name of a task", task.name)
     if isinstance(task, OrientationTask | FrameTask):
         as_string("frame of a task", task.frame)
-    fields: dict[str, object] = {"weight": as_positive(f"weight of {task.name}", task.weight, allow_zero=True)}
+    fields: dict[str, object] = {
+        "weight": as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
+    }
     if isinstance(task, CoMTask | OrientationTask | FrameTask | PostureTask):
         kp = fields["kp"] = as_positive(f"kp of {task.name}", task.kp, "1/s²", allow_zero=True)
         kd = 2.0 * kp**0.5 if task.kd is None else task.kd
@@ -158,12 +192,23 @@ def _set_validated_fields(task: Task, **shapes: tuple[int | None, ...]) -> None:
         if name == first and callable(target) and not isinstance(target, type):
             time_varying, _ = True, as_callable(label, target, f"{name}(t)")
         elif name != first and callable(target):
-            raise InputError(f"{label} cannot be a function: let {first} be one, and give {_TRIPLE_HINT}.")
-        elif target is not None or getattr(type(task), name, ...) is not None:  # None counts where it is the default
-            array = as_forces(target, None, label) if task.block == "forces" else as_array(label, target, shape)
+            raise InputError(
+                f"{label} cannot be a function: let {first} be one, and give {_TRIPLE_HINT}."
+            )
+        elif (
+            target is not None or getattr(type(task), name, ...) is not None
+        ):  # None counts where it is the default
+            array = (
+                as_forces(target, None, label)
+                if task.block == "forces"
+                else as_array(label, target, shape)
+            )
             fields[name] = nearest_rotation(task.name, array) if name == "rotation" else array
             if time_varying and np.any(array):
-                raise InputError(f"{label} must be left out, for {first} is a function: let it give {_TRIPLE_HINT}.")
+                raise InputError(
+                    f"{label} must be left out, for {first} is a function: let it give "
+                    f"{_TRIPLE_HINT}."
+                )
     for name, value in fields.items():
         object.__setattr__(task, name, value)
 
@@ -172,7 +217,8 @@ def _set_validated_fields(task: Task, **shapes: tuple[int | None, ...]) -> None:
 class CoMTask(Value):
     """Bring the centre of mass to a position; residual in q̈, m/s².
 
-    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity, acceleration).
+    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity,
+        acceleration).
     velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
     kp, kd: gains, 1/s² and 1/s; kd is critically damped by default.
     weight: of ½‖residual‖² in the objective.
@@ -195,16 +241,21 @@ class CoMTask(Value):
         """J_com q̈ + J̇_com q̇ - a, shape (3,), m/s²."""
         _check_arguments(eom, t)
         state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
-        return _motion_residual(self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v)
+        return _motion_residual(
+            self, state.com_jacobian, state.com_drift, a, state.com - x, state.com_velocity - v
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class OrientationTask(Value):
-    """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ), rad, world-aligned.
+    """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ),
+    rad, world-aligned.
 
     frame: its name; "base" is the base link.
-    rotation: R_world_frame, shape (3, 3); or a function of t that gives it, or (R, angular velocity, angular acceleration).
-    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world, of a target that is no function.
+    rotation: R_world_frame, shape (3, 3); or a function of t that gives it, or (R, angular
+        velocity, angular acceleration).
+    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world, of a target that is
+        no function.
     kp, kd, weight: as for `CoMTask`.
     """
 
@@ -218,7 +269,9 @@ class OrientationTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def __post_init__(self) -> None:
-        _set_validated_fields(self, rotation=(3, 3), angular_velocity=(3,), angular_acceleration=(3,))
+        _set_validated_fields(
+            self, rotation=(3, 3), angular_velocity=(3,), angular_acceleration=(3,)
+        )
 
     @property
     def name(self) -> str:
@@ -231,18 +284,22 @@ class OrientationTask(Value):
         state, (R, omega, alpha) = eom.state, targets_at(self, eom.robot, eom.k, t)
         e = pin.log3(state.frame_pose(self.frame).rotation @ R.T)
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
-        return _motion_residual(self, J, drift, alpha, e, state.frame_velocity(self.frame)[3:] - omega)
+        return _motion_residual(
+            self, J, drift, alpha, e, state.frame_velocity(self.frame)[3:] - omega
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class FrameTask(Value):
     """Bring a frame's origin to a position; residual in q̈, m/s². A foot that swings, a hand.
 
-    The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole, one radius lower where the
-    frame sits in the ball's centre. So aim at `state.point(frame)`, or at a position one radius above the ground.
+    The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole,
+    one radius lower where the frame sits in the ball's centre. So aim at `state.point(frame)`, or
+    at a position one radius above the ground.
 
     frame: its name.
-    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity, acceleration).
+    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity,
+        acceleration).
     velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
     kp, kd, weight: as for `CoMTask`.
     """
@@ -269,18 +326,22 @@ class FrameTask(Value):
         _check_arguments(eom, t)
         state, (x, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         J, drift = state.frame_jacobian(self.frame)[:3], state.frame_drift(self.frame)[:3]
-        return _motion_residual(self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v)
+        return _motion_residual(
+            self, J, drift, a, state.point(self.frame) - x, state.frame_velocity(self.frame)[:3] - v
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class PostureTask(Value):
     """Bring the joints to those of a configuration; residual in q̈, rad/s².
 
-    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of length 1. Or a function of
-        t that gives it, or (q, velocity, acceleration).
-    velocity, acceleration: shape (d,), of the joints, of a target that is no function; 0 by default.
-    kp, kd, weight, name: as for `CoMTask`. The weight is small, so that posture settles only what other tasks leave open;
-        where posture is what matters most, as for an arm, give it more, such as 1.
+    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of
+        length 1. Or a function of t that gives it, or (q, velocity, acceleration).
+    velocity, acceleration: shape (d,), of the joints, of a target that is no function; 0 by
+        default.
+    kp, kd, weight, name: as for `CoMTask`. The weight is small, so that posture settles only what
+        other tasks leave open; where posture is what matters most, as for an arm, give it more,
+        such as 1.
     """
 
     q: Target
@@ -300,7 +361,9 @@ class PostureTask(Value):
         _check_arguments(eom, t)
         state, (q, v, a) = eom.state, targets_at(self, eom.robot, eom.k, t)
         joints = slice(eom.nv - eom.d, None)
-        return _motion_residual(self, eom.S.T, np.zeros(eom.d), a, state.difference(q)[joints], state.v[joints] - v)
+        return _motion_residual(
+            self, eom.S.T, np.zeros(eom.d), a, state.difference(q)[joints], state.v[joints] - v
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,10 +408,15 @@ class TorqueTask(Value):
 def standing_tasks(state: State) -> tuple[Task, ...]:
     """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture.
 
-    To go elsewhere, replace the centre of mass's target: posture gives way, and settles only what the others leave open.
+    To go elsewhere, replace the centre of mass's target: posture gives way, and settles only what
+    the others leave open.
     """
     as_instance("state", state, State)
-    return CoMTask(state.com), OrientationTask("base", state.frame_pose("base").rotation), PostureTask(state.q)
+    return (
+        CoMTask(state.com),
+        OrientationTask("base", state.frame_pose("base").rotation),
+        PostureTask(state.q),
+    )
 
 
 def _motion_residual(
@@ -365,14 +433,18 @@ def _motion_residual(
 
 
 def nearest_rotation(name: str, R: Array) -> Array:
-    """The rotation nearest to R (3, 3), which may be off by the rounding of printed digits or of float32.
+    """The rotation nearest to R (3, 3), which may be off by the rounding of printed digits or of
+    float32.
 
     Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
     """
     R = as_array(f"rotation of {name}", R, (3, 3))
     error = np.max(np.abs(R @ R.T - _IDENTITY))
     if not error <= _ROTATION_TOLERANCE or cross(R[0], R[1]) @ R[2] < 0:
-        raise InputError(f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, determinant +1.")
+        raise InputError(
+            f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, "
+            f"determinant +1."
+        )
     if error < _ROTATION_ROUNDING:
         return R
     U, _, Vt = np.linalg.svd(R)

@@ -1,4 +1,6 @@
-"""The playground: a live robot with all that a controller may know or mistake, in a notebook and on a page of its own."""
+"""The playground: a live robot with all that a controller may know or mistake, in a notebook and on
+a page of its own.
+"""
 
 from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
 from floatbase.playground.equation import EQUATION, SYMBOLS, Term

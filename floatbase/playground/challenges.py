@@ -29,9 +29,11 @@ _CHOICE_TIME = 1.0  # s that a number must stay: a slider on its way passes all 
 
 
 class Judge:
-    """Watches a run from one reset to the next: `observe` gets every slice, `run_ended` why it stopped. `message` is the state of play.
+    """Watches a run from one reset to the next: `observe` gets every slice, `run_ended` why it
+    stopped. `message` is the state of play.
 
-    `pushes` are those seen so far. `violation` says what was changed that may not be: there is nothing to win any more.
+    `pushes` are those seen so far. `violation` says what was changed that may not be: there is
+    nothing to win any more.
     """
 
     def __init__(self, challenge: Challenge):
@@ -48,7 +50,9 @@ class Judge:
 
     def observe(self, record: fb.Rollout, session: Session) -> None:
         """A slice has been run."""
-        self.pushes += [push for push in record.pushes if all(push is not seen for seen in self.pushes)]
+        self.pushes += [
+            push for push in record.pushes if all(push is not seen for seen in self.pushes)
+        ]
         self._apply_verdict(self.challenge.watch(self, record, session), session)
 
     def run_ended(self, status: str, session: Session) -> None:
@@ -61,7 +65,10 @@ class Judge:
         if self.won:
             return
         if violations := self.challenge.violations(session.settings):
-            self.violation = f'{" and ".join(violations)} may not be changed in this challenge: press "all as at first".'
+            self.violation = (
+                f"{' and '.join(violations)} may not be changed in this challenge: "
+                f'press "all as at first".'
+            )
         if self.violation:
             self.message = self.violation
         elif verdict is True:
@@ -102,8 +109,14 @@ class Challenge:
 
     def violations(self, settings: Settings) -> list[str]:
         """What differs from the start and may not, in words."""
-        locked = [name for name in self.locked if getattr(settings, name) != getattr(self.start, name)]
-        return locked + [f"true {name}" for name in self.locked_actual if getattr(settings, name)[1] != getattr(self.start, name)[1]]
+        locked = [
+            name for name in self.locked if getattr(settings, name) != getattr(self.start, name)
+        ]
+        return locked + [
+            f"true {name}"
+            for name in self.locked_actual
+            if getattr(settings, name)[1] != getattr(self.start, name)[1]
+        ]
 
 
 def _normals(record: fb.Rollout) -> dict[str, Array]:
@@ -152,7 +165,12 @@ def _on_an_edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], session.settings.facets)
         force = record.force(name, "planned")[-1]
         if np.isfinite(force).all() and force @ contacts.normals[i] > _MIN_LOAD:
-            found[name] = int(np.sum(cone.face_matrix @ force > -_FACET_TOLERANCE * float(force @ contacts.normals[i])))
+            found[name] = int(
+                np.sum(
+                    cone.face_matrix @ force
+                    > -_FACET_TOLERANCE * float(force @ contacts.normals[i])
+                )
+            )
     most = max(found.values(), default=0)
     return most >= 2 or f"{most} active facet{'s' if most != 1 else ''} at a foot."
 
@@ -162,7 +180,11 @@ def _no_answer(judge: Judge, record: fb.Rollout, session: Session) -> bool | str
 
 
 def _infeasible(judge: Judge, status: str, session: Session) -> bool | str:
-    return True if "infeasible" in status or "conflict" in status else f"Not that: {status.splitlines()[0][:80]}"
+    return (
+        True
+        if "infeasible" in status or "conflict" in status
+        else f"Not that: {status.splitlines()[0][:80]}"
+    )
 
 
 def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
@@ -170,7 +192,10 @@ def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
     normals, heights = _normals(record), _heights(session)
     front = max(heights["FL_foot"], heights["FR_foot"])
     if "up" not in judge.memory:
-        if len(normals) == len(heights) and min(float(force[-1]) for force in normals.values()) > _MIN_LOAD:
+        if (
+            len(normals) == len(heights)
+            and min(float(force[-1]) for force in normals.values()) > _MIN_LOAD
+        ):
             judge.memory["all"] = float(record.time[-1])
         if front <= _LIFTED_HEIGHT or "all" not in judge.memory:
             return "Lift a front foot 2 cm, and stay on the other three for a second."
@@ -187,18 +212,28 @@ def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
 
 def _feet_that_travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
     normals = _normals(record)
-    if len(normals) < len(session.sim.point_names) or min(float(force.min()) for force in normals.values()) < _MIN_LOAD:
+    if (
+        len(normals) < len(session.sim.point_names)
+        or min(float(force.min()) for force in normals.values()) < _MIN_LOAD
+    ):
         judge.memory.clear()
         return "A foot was lifted: it begins anew."
     places, rolled = record.foot_positions, record.rolling_displacement()
-    slid = judge.memory.get("slid", np.zeros(places.shape[1:])) + (places - rolled)[-1] - (places - rolled)[0]
+    slid = (
+        judge.memory.get("slid", np.zeros(places.shape[1:]))
+        + (places - rolled)[-1]
+        - (places - rolled)[0]
+    )
     judge.memory["slid"] = slid
     start = judge.memory.setdefault("places", np.array(places[0]))
     way = np.linalg.norm((places[-1] - start)[:, :2], axis=1)
     slip = float(np.linalg.norm(slid[:, :2], axis=1).max())
     if slip > _MAX_SLIP:
         return f"A foot slipped by {1e3 * slip:.0f} mm: reset, and more gently."
-    return float(way.min()) >= _TRAVEL_DISTANCE or f"The feet are {', '.join(f'{1e3 * x:.0f}' for x in way)} mm from where they stood."
+    return (
+        float(way.min()) >= _TRAVEL_DISTANCE
+        or f"The feet are {', '.join(f'{1e3 * x:.0f}' for x in way)} mm from where they stood."
+    )
 
 
 def _on_ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
@@ -223,11 +258,16 @@ def _how_many_facets(judge: Judge, record: fb.Rollout, session: Session) -> bool
         return f"{n} facets: the weakest direction has lost {100 * lost:.1f} % of its friction."
     if 1.0 - math.cos(math.pi / (n - 1)) <= 0.03:
         return f"{n} facets lose {100 * lost:.1f} %; fewer would do."
-    return _time_held(judge, record, True) >= _CHOICE_TIME or f"{n} facets lose {100 * lost:.1f} %: leave it there for a second."
+    return (
+        _time_held(judge, record, True) >= _CHOICE_TIME
+        or f"{n} facets lose {100 * lost:.1f} %: leave it there for a second."
+    )
 
 
 def _topple(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    return _ONE_PUSH_ONLY if len(judge.pushes) > 1 else "One push, with as little force as topples it."
+    return (
+        _ONE_PUSH_ONLY if len(judge.pushes) > 1 else "One push, with as little force as topples it."
+    )
 
 
 def _toppled(judge: Judge, status: str, session: Session) -> bool | str:
@@ -238,7 +278,10 @@ def _toppled(judge: Judge, status: str, session: Session) -> bool | str:
     (push,) = judge.pushes
     impulse = float(np.linalg.norm(push.force)) * push.duration
     judge.memory["score"] = f"{impulse:.1f} N·s."
-    return impulse <= _MAX_TOPPLING_IMPULSE or f"{impulse:.1f} N·s topple it; {_MAX_TOPPLING_IMPULSE:.0f} do, from the right side."
+    return (
+        impulse <= _MAX_TOPPLING_IMPULSE
+        or f"{impulse:.1f} N·s topple it; {_MAX_TOPPLING_IMPULSE:.0f} do, from the right side."
+    )
 
 
 _LOCKED_PHYSICS = ("mass", "actual_off", "assumed_off", "slope")
@@ -246,35 +289,44 @@ _LOCKED_STANCE = ("com_shift", "lifted_feet", "nod", "gait", "steps_when_pushed"
 _LOCKED_QP = ("facets", "torque_fraction", "min_normal_force", "weights")
 CHALLENGES = (
     Challenge("Stand on two feet", "Lift FR and RL, and stand on FL and RR for a second.", _two_feet, locked=_LOCKED_PHYSICS),
-    Challenge("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its feet.", _survive, locked=_LOCKED_PHYSICS),
+    Challenge("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its "
+                               "feet.", _survive, locked=_LOCKED_PHYSICS),
     Challenge(
-        "Down an icy slope", "The ground falls by 20° and is slippery. Press run, and slide 30 cm without falling.", _icy_slope,
-        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "actual_off", "assumed_off"), ("slope", "friction"),
+        "Down an icy slope", "The ground falls by 20° and is slippery. Press run, and slide 30 cm "
+                             "without falling.", _icy_slope,
+        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "actual_off", "assumed_off"),
+        ("slope", "friction"),
         paused=True,
     ),
-    Challenge("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two active facets.", _on_an_edge, locked=_LOCKED_PHYSICS),
+    Challenge("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two "
+                            "active facets.", _on_an_edge, locked=_LOCKED_PHYSICS),
     Challenge(
         "No answer", "Find settings for which the quadratic program has no solution.", _no_answer,
         locked=("actual_off", "assumed_off"), end=_infeasible,
     ),
     Challenge(
-        "Quick foot", "From four feet that carry to a front foot 2 cm in the air in less than 0.5 s; stay so for 1 s.", _quick_foot,
+        "Quick foot", "From four feet that carry to a front foot 2 cm in the air in less than 0.5 "
+                      "s; stay so for 1 s.", _quick_foot,
         locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "Feet that travel", "No foot is lifted, none slips, and all four end 12 mm away from where they stood.", _feet_that_travel,
+        "Feet that travel", "No foot is lifted, none slips, and all four end 12 mm away from where "
+                            "they stood.", _feet_that_travel,
         locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "On ice", "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for 2 s.", _on_ice,
+        "On ice", "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for "
+                  "2 s.", _on_ice,
         Settings(friction=(0.7, 0.05)), (*_LOCKED_PHYSICS, "gait"), ("friction",),
     ),
     Challenge(
-        "How many facets?", "The fewest facets with which no direction loses more than 3 % of the cone's friction.", _how_many_facets,
+        "How many facets?", "The fewest facets with which no direction loses more than 3 % of the "
+                            "cone's friction.", _how_many_facets,
         locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "The weakest side", "Topple the standing robot with one push of at most 19 N·s.", _topple,
-        locked=(*_LOCKED_PHYSICS, "friction", "bandwidth", *_LOCKED_STANCE, *_LOCKED_QP), end=_toppled,
+        locked=(*_LOCKED_PHYSICS, "friction", "bandwidth", *_LOCKED_STANCE, *_LOCKED_QP),
+        end=_toppled,
     ),
 )  # fmt: skip

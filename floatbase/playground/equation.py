@@ -1,4 +1,6 @@
-"""The terms of (7) in the playground: how each is written, and which switches it has in the belief and in the world."""
+"""The terms of (7) in the playground: how each is written, and which switches it has in the belief
+and in the world.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +10,11 @@ from typing import NamedTuple
 class Term(NamedTuple):
     """A term of (7).
 
-    name: in `Settings.assumed_off` and `Settings.actual_off`. symbol: as it is written over the picture.
+    name: in `Settings.assumed_off` and `Settings.actual_off`. symbol: as it is written over the
+        picture.
     assumed_switch, actual_switch: the names of its switches on the page; "" for none.
-    mismatch_option, perturbation_option: the options of `ModelMismatch` and of `Perturbation` that switch it; "" where that takes more than a flag.
+    mismatch_option, perturbation_option: the options of `ModelMismatch` and of `Perturbation` that
+        switch it; "" where that takes more than a flag.
     """
 
     name: str
@@ -24,13 +28,16 @@ class Term(NamedTuple):
 EQUATION = (
     Term("inertia", "M q̈"),
     Term(
-        "velocity", "+ C q̇", "Coriolis and centrifugal forces believed", "Coriolis and centrifugal forces in the world",
+        "velocity", "+ C q̇", "Coriolis and centrifugal forces believed", "Coriolis and "
+                                                                          "centrifugal forces in "
+                                                                          "the world",
         "velocity_forces", "velocity_forces",
     ),
     Term("gravity", "+ g", "gravity believed", "gravity in the world", "gravity", "gravity"),
     Term("zeros", "= S τ", "zeros of S believed", "zeros of S in the world", "underactuated"),
     Term("forces", "+ Jᵀλ", "force of one leg believed", "force of one leg in the world"),
     Term("drift", "J̇ q̇", "drift of the contacts believed", "", "drift"),
-    Term("cones", "nᵀλ ≥ 0", "feet that cannot pull believed", "feet that cannot pull in the world", "cones"),
+    Term("cones", "nᵀλ ≥ 0", "feet that cannot pull believed", "feet that cannot pull in the "
+                                                               "world", "cones"),
 )  # fmt: skip
 SYMBOLS = {term.name: term.symbol for term in EQUATION}

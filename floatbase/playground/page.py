@@ -31,9 +31,11 @@ _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn at first
 
 
 class Playground:
-    """A robot on the physics, everything about it that a controller may know or mistake, and challenges to solve with it.
+    """A robot on the physics, everything about it that a controller may know or mistake, and
+    challenges to solve with it.
 
-    In a notebook, as the last line of a cell, it displays itself. Elsewhere, open `playground.url` in a browser.
+    In a notebook, as the last line of a cell, it displays itself. Elsewhere, open `playground.url`
+    in a browser.
 
     robot: as from `fb.load`.
     settings: those at first.
@@ -53,11 +55,18 @@ class Playground:
     ):
         self.robot = robot
         facets = 4 if robot.feet else None
-        self.view = fb.Viewer(robot, background=background, port=port, facets=facets, follow=True, height=height)
+        self.view = fb.Viewer(
+            robot, background=background, port=port, facets=facets, follow=True, height=height
+        )
         self.session = Session(robot, settings)
         self._initial_settings = self.session.settings
-        self.force, self.towards = self._default_push, 0.0  # N, and degrees: 0 forwards, 90 to the left
-        self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name  # of an arm its tip
+        self.force, self.towards = (
+            self._default_push,
+            0.0,
+        )  # N, and degrees: 0 forwards, 90 to the left
+        self.pushed_frame = (
+            "base" if robot.is_floating else robot.model.frames[-1].name
+        )  # of an arm its tip
         self.outcome = ""
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
@@ -69,7 +78,8 @@ class Playground:
         self._drawing_lock = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
         self.run = LiveSimulation(
-            session.sim, session.controller, self._on_slice, control_period=PERIOD, actuators=session.actuators,
+            session.sim, session.controller, self._on_slice, control_period=PERIOD,
+            actuators=session.actuators,
             after_reset=self._after_reset,
         )  # fmt: skip
         self.run.on_status(self._on_status)
@@ -102,7 +112,8 @@ class Playground:
     def push(self, force: float | None = None, towards: float | None = None) -> None:
         """Push the robot for a tenth of a second.
 
-        force: N; towards: degrees, from forwards to the left; both are as set before where they are not given.
+        force: N; towards: degrees, from forwards to the left; both are as set before where they are
+            not given.
         """
         self.force = self.force if force is None else force
         self.towards = self.towards if towards is None else towards
@@ -128,7 +139,9 @@ class Playground:
             self.run.call_soon(self._apply_requested)
 
     def set_nodding(self, size: float) -> None:
-        """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size: rad, half its width."""
+        """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size:
+        rad, half its width.
+        """
         pending = self.pending_settings
         self.set(nod=size, start_time=pending.start_time if pending.nod else self.session.sim.time)
 
@@ -139,12 +152,16 @@ class Playground:
         self._update_text()
 
     def reset_all(self) -> None:
-        """Set everything as it was at first, the push, the speed and what is shown too, and put the robot back on its feet."""
+        """Set everything as it was at first, the push, the speed and what is shown too, and put the
+        robot back on its feet.
+        """
         self.force, self.towards, self._last_push = self._default_push, 0.0, None
         self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self.run.set_time_scale(1.0)
         self._panel.show_view_settings(1.0)
-        self._restart_with(self._initial_settings if self.challenge is None else self.challenge.start)
+        self._restart_with(
+            self._initial_settings if self.challenge is None else self.challenge.start
+        )
 
     def _restart_with(self, settings: Settings) -> None:
         """Put the robot back on its feet under these settings."""
@@ -173,7 +190,9 @@ class Playground:
 
     def _update_run(self) -> None:
         session = self.session
-        self.run.set_controller(session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD)
+        self.run.set_controller(
+            session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD
+        )
         self.view.set_ground(session.sim.ground)  # the true one, whatever the controller believes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
@@ -237,19 +256,30 @@ class Playground:
             self._pause_after_slice = False
             self.run.pause()
         if self.robot.is_floating:
-            self.view.add_plot_point("planned and measured forces differ by", float(record.time[-1]), mean_force_error(record), "N")
+            self.view.add_plot_point(
+                "planned and measured forces differ by",
+                float(record.time[-1]),
+                mean_force_error(record),
+                "N",
+            )
 
     def _draw(self, record: fb.Rollout) -> None:
-        """The last row of a slice, under the time, the part of real time that this machine reaches, and messages."""
+        """The last row of a slice, under the time, the part of real time that this machine reaches,
+        and messages.
+        """
         now, session = float(record.time[-1]), self.session
         with self._drawing_lock:
             factor = self.real_time_factor.update(now)
             rate = "" if factor is None else f", {factor:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
-            headline = f"{self.robot.name}{gait}, {now:.1f} s{rate}, control every {1e3 * PERIOD:g} ms"
+            headline = (
+                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control every {1e3 * PERIOD:g} ms"
+            )
             self.view.show(
-                record.final, record.contacts, record.measured[-1], _last_planned_forces(record), push=push_at(record, -1, PUSH_DISPLAY_TIME),
-                cones=self.shown_terms["cones"], arrows=self.shown_terms["forces"], support=True, extra=self._term_arrows(record),
+                record.final, record.contacts, record.measured[-1], _last_planned_forces(record),
+                push=push_at(record, -1, PUSH_DISPLAY_TIME),
+                cones=self.shown_terms["cones"], arrows=self.shown_terms["forces"], support=True,
+                extra=self._term_arrows(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.refusal])),
             )  # fmt: skip
 
@@ -259,9 +289,18 @@ class Playground:
         settings = self.session.settings
         for term, shown in self.shown_terms.items():
             if shown:
-                picture |= term_arrows(term, record, self.view.scale, self.view.painter.size, settings.actual_off, settings.mass[1])
+                picture |= term_arrows(
+                    term,
+                    record,
+                    self.view.scale,
+                    self.view.painter.size,
+                    settings.actual_off,
+                    settings.mass[1],
+                )
         walk = self.session.walk
-        return picture if walk is None else picture | dict(self.view.walk_overlay(walk, record.final))
+        return (
+            picture if walk is None else picture | dict(self.view.walk_overlay(walk, record.final))
+        )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         if display_mode() == "site":
@@ -280,10 +319,14 @@ def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> 
 
 
 def mean_force_error(record: fb.Rollout) -> float:
-    """Planned less measured forces: the length of the difference, N, added over the contacts, on average over a record."""
+    """Planned less measured forces: the length of the difference, N, added over the contacts, on
+    average over a record.
+    """
     if not len(record) or not record.planned.size:
         return 0.0
-    off = np.linalg.norm((record.planned - record.measured).reshape(len(record), -1, 3), axis=2).sum(axis=1)
+    off = np.linalg.norm(
+        (record.planned - record.measured).reshape(len(record), -1, 3), axis=2
+    ).sum(axis=1)
     return float(np.nanmean(off)) if np.isfinite(off).any() else 0.0
 
 

@@ -22,7 +22,13 @@ TERM_LEGEND = {  # term: (colour of its arrows, what they are)
     "zeros": (MEASURED, "τ, torques of the joints"),
     "drift": (COM, "J̇ q̇, drift of the feet"),
 }
-_WORD_HEIGHTS = {"inertia": 0.25, "velocity": 0.37, "gravity": 0.49, "zeros": 0.61, "drift": 0.73}  # of words, over the robot's size
+_WORD_HEIGHTS = {
+    "inertia": 0.25,
+    "velocity": 0.37,
+    "gravity": 0.49,
+    "zeros": 0.61,
+    "drift": 0.73,
+}  # of words, over the robot's size
 _PROPORTIONAL_TO_MASS = ("inertia", "velocity", "gravity")
 _WORD_DISTANCE = 1.1  # times its size behind its centre of mass, where no arrow stands
 
@@ -35,19 +41,32 @@ def term_arrows(
     off: tuple[str, ...] = (),
     mass: float = 1.0,
 ) -> Picture:
-    """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by the viewer itself.
+    """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by
+    the viewer itself.
 
-    A term that is too small to be seen, or that the world does not have, is told in words behind the robot.
+    A term that is too small to be seen, or that the world does not have, is told in words behind
+    the robot.
     scale: m/N, as the viewer draws forces.
     size: of the robot, m.
     off: terms that the world does not have: gravity and C q̇ have no arrow then.
-    mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with it, as they truly are.
+    mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with
+        it, as they truly are.
     """
     if term not in TERM_LEGEND:
         return {}
-    made = {"inertia": _inertia, "velocity": _velocity, "gravity": _gravity, "zeros": _torques, "drift": _drift}
+    made = {
+        "inertia": _inertia,
+        "velocity": _velocity,
+        "gravity": _gravity,
+        "zeros": _torques,
+        "drift": _drift,
+    }
     lacking = term in off and term in ("gravity", "velocity")
-    drawn = {} if lacking else made[term](record, scale * (mass if term in _PROPORTIONAL_TO_MASS else 1.0), size)
+    drawn = (
+        {}
+        if lacking
+        else made[term](record, scale * (mass if term in _PROPORTIONAL_TO_MASS else 1.0), size)
+    )
     if drawn:
         return prefixed(f"term {term}", drawn)
     words = TERM_LEGEND[term][1].split(",")[0] + (": switched off" if lacking else " ≈ 0")
@@ -59,7 +78,10 @@ def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Pict
     if not np.isfinite(vector).all() or np.linalg.norm(vector) < _MIN_LENGTH:
         return {}
     tip = at + vector * (1.0 + 0.1 * size / np.linalg.norm(vector))
-    return {f"/{name}": shapes.arrow(at, vector, COM, size), f"/{name} label": shapes.label(tip, words, _TEXT_SIZE * size)}
+    return {
+        f"/{name}": shapes.arrow(at, vector, COM, size),
+        f"/{name} label": shapes.label(tip, words, _TEXT_SIZE * size),
+    }
 
 
 def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
@@ -75,7 +97,11 @@ def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
 def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
     """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
-    words = shapes.label(at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))], "true m g", _TEXT_SIZE * size)
+    words = shapes.label(
+        at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))],
+        "true m g",
+        _TEXT_SIZE * size,
+    )
     return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
 
 
@@ -84,14 +110,20 @@ def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
     state = record.final
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
-    return _arrow("C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size)
+    return _arrow(
+        "C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size
+    )
 
 
 def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """A curled arrow around the axis of each joint, whose radius is that of the force with this torque at a lever of 0.3 m."""
+    """A curled arrow around the axis of each joint, whose radius is that of the force with this
+    torque at a lever of 0.3 m.
+    """
     state, first = record.final, record.robot.nv - record.robot.d
     picture: Picture = {}
-    for i, (joint, tau) in enumerate(zip(record.robot.joint_names, record.tau[-1].tolist(), strict=True)):
+    for i, (joint, tau) in enumerate(
+        zip(record.robot.joint_names, record.tau[-1].tolist(), strict=True)
+    ):
         axis = state.frame_jacobian(joint)[3:, first + i]
         moment = scale / _TORQUE_LEVER * tau * axis
         if np.linalg.norm(moment) > _MIN_LENGTH:
@@ -108,5 +140,7 @@ def _drift(record: fb.Rollout, scale: float, size: float) -> Picture:
     for name in contacts.names:
         if contacts[name].k == 3:
             at = contacts.only(name).positions(record.final)[0]
-            picture |= _arrow(name, at, -_ACCELERATION_SCALE * eom.b[contacts.force_slice(name)], "J̇ q̇", size)
+            picture |= _arrow(
+                name, at, -_ACCELERATION_SCALE * eom.b[contacts.force_slice(name)], "J̇ q̇", size
+            )
     return picture

@@ -1,4 +1,6 @@
-"""Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the course text)."""
+"""Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the
+course text).
+"""
 
 from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_constraints
@@ -9,7 +11,9 @@ from floatbase.qp.solution import Residuals, Solution
 from floatbase.qp.solve import check_solver, solve, solvers
 
 __all__ = [
-    "FEASIBILITY_TOLERANCE", "INFEASIBLE", "OPTIMAL", "QP", "UNBOUNDED", "ActiveSetRun", "ConstraintLabel", "Iteration",
-    "Residuals", "Solution", "active_set", "check_solver", "conflicting_constraints", "linear_program", "solve", "solvers",
+    "FEASIBILITY_TOLERANCE", "INFEASIBLE", "OPTIMAL", "QP", "UNBOUNDED", "ActiveSetRun",
+    "ConstraintLabel", "Iteration",
+    "Residuals", "Solution", "active_set", "check_solver", "conflicting_constraints",
+    "linear_program", "solve", "solvers",
     "table_top",
 ]  # fmt: skip

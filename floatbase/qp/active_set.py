@@ -2,31 +2,34 @@
 
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
-A row of G x ≤ h is a table top: at the optimum we either rest on it, and it may as well be an equality, or we do not
-touch it, and it may as well not be there. Knowing which is which, one linear system gives the answer. So guess, look at
-what the guess gives, and correct it by one row at a time. Every point on the way satisfies all rows.
+A row of G x ≤ h is a table top: at the optimum we either rest on it, and it may as well be an
+equality, or we do not touch it, and it may as well not be there. Knowing which is which, one linear
+system gives the answer. So guess, look at what the guess gives, and correct it by one row at a
+time. Every point on the way satisfies all rows.
 
 Symbols
-    β  coordinates in which the equalities always hold, x = x0 + Z β (13); a problem without equalities has β = x
-    W  working set: rows of G held with equality for now, linearly independent
-    p  direction from the point to the minimiser on the rows of W; α length of the step along it, 1 to arrive there
-    μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
+    β  coordinates in which the equalities always hold, x = x0 + Z β (13); a problem without
+    equalities has β = x W  working set: rows of G held with equality for now, linearly independent
+    p  direction from the point to the minimiser on the rows of W; α length of the step along it, 1
+    to arrive there μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
 
 Algorithm
-    0. `_feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem "least violation").
+    0. `_feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem
+       "least violation").
     1. `_direction`: p, in the null space of the rows of W.
     2. `_longest_step`: α = 1, unless a row outside W forbids it. Go there.
     3. Forbidden: that row blocks, it joins W; back to 1.
     4. Arrived: `_multipliers`. All ≥ 0: this is the optimum.
        Otherwise a multiplier is wrong-signed (μ < 0): its row, `_row_to_drop`, leaves W; back to 1.
 
-At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one another. As long as
-they do, both choices fall on the row with the least index (Bland's rule), which keeps a working set from coming back.
-A direction without curvature, along which the objective falls, has no minimiser: p then is the way down and α may be as
-long as it likes; if no row blocks, the objective has no minimum.
+At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one
+another. As long as they do, both choices fall on the row with the least index (Bland's rule), which
+keeps a working set from coming back. A direction without curvature, along which the objective
+falls, has no minimiser: p then is the way down and α may be as long as it likes; if no row blocks,
+the objective has no minimum.
 
-Source: [FBR], Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's rule on
-quadratic programs Chang and Cottle, Math. Programming 18 (1980).
+Source: [FBR], Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's
+rule on quadratic programs Chang and Cottle, Math. Programming 18 (1980).
 """
 
 from __future__ import annotations
@@ -38,16 +41,32 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_instance, as_integer, as_strings, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_integer,
+    as_strings,
+    read_only,
+)
 from floatbase.affine import Affine
 from floatbase.errors import SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
-from floatbase.qp.conflicts import MULTIPLIER_TOLERANCE, infeasible, not_convex, unbounded, violation_tolerance
+from floatbase.qp.conflicts import (
+    MULTIPLIER_TOLERANCE,
+    infeasible,
+    not_convex,
+    unbounded,
+    violation_tolerance,
+)
 from floatbase.qp.labels import ConstraintLabel
 from floatbase.qp.problem import QP, InequalityQP
 from floatbase.qp.solution import Solution
 
-_ROUNDING = 1e-13  # part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60 terms
+# part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60
+# terms
+_ROUNDING = 1e-13
 _SIGNIFICANT = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
 _UNLIMITED = 10**6  # iterations, beyond any count that the method would take
 _SLACK_CONSTRAINT = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
@@ -64,7 +83,8 @@ class Iteration(Value):
     blocking: name of the row that forbade a longer step and joins W, or None.
     multipliers: μ of the rows of W, by name, where the step arrived; empty when a row blocked.
     dropped: name of the row that leaves W, or None.
-    objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the largest violation at x, in units of the rows' length.
+    objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the largest violation at x, in units of the rows'
+        length.
     """
 
     working_set: tuple[str, ...]
@@ -86,12 +106,14 @@ class Iteration(Value):
 class ActiveSetRun(Value):
     """The answer of `active_set` and the way to it.
 
-    solution: the optimum, with its multipliers; where the run was stopped, the point it had come to, all multipliers 0.
+    solution: the optimum, with its multipliers; where the run was stopped, the point it had come
+        to, all multipliers 0.
     iterations: from a feasible point to the optimum, objective never rising.
-    phase_one: from the start to that feasible point, violation never rising; empty when the start was feasible.
+    phase_one: from the start to that feasible point, violation never rising; empty when the start
+        was feasible.
     working_set: names of the rows in W at the end, which the next problem can start from.
-    converged: whether the end is the optimum. A run that was stopped has a point that satisfies all rows once `iterations`
-        holds any; before, in phase 1, it may violate some.
+    converged: whether the end is the optimum. A run that was stopped has a point that satisfies all
+        rows once `iterations` holds any; before, in phase 1, it may violate some.
     """
 
     solution: Solution
@@ -107,38 +129,54 @@ def active_set(
     working_set: Sequence[str] = (),
     max_iterations: int | None = None,
 ) -> ActiveSetRun:
-    """App. C: solve a convex QP by the active-set method of this module, keeping a record of every iteration.
+    """App. C: solve a convex QP by the active-set method of this module, keeping a record of every
+    iteration.
 
     qp: the problem.
-    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default the minimiser on the rows
-        of `working_set`, as if there were no others.
-    working_set: names of inequality rows to start with in W, such as the last run's `working_set`; those that depend on earlier
-        ones are left out.
-    max_iterations: iterations after which to stop, those of phase 1 included, as a program in real time must; None does not
-        stop. A run that is stopped raises no error: `ActiveSetRun.converged` says so.
+    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default
+        the minimiser on the rows of `working_set`, as if there were no others.
+    working_set: names of inequality rows to start with in W, such as the last run's `working_set`;
+        those that depend on earlier ones are left out.
+    max_iterations: iterations after which to stop, those of phase 1 included, as a program in real
+        time must; None does not stop. A run that is stopped raises no error:
+        `ActiveSetRun.converged` says so.
 
-    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the objective has no minimum, is not
-    convex or does not let the method end on its rows, `UnknownNameError` for a row that does not exist, `InputError` for a
-    start of another shape or a `max_iterations` below 1.
+    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the
+    objective has no minimum, is not convex or does not let the method end on its rows,
+    `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape or a
+    `max_iterations` below 1.
     """
     space, problem = as_instance("qp", qp, QP).equality_space, qp.reduced
-    rows = _independent_rows(problem, [_index(qp, name) for name in as_strings("working_set", working_set)])
+    rows = _independent_rows(
+        problem, [_index(qp, name) for name in as_strings("working_set", working_set)]
+    )
     initial = None if start is None else space.A.T @ (as_array("start", start, (qp.n,)) - space.b)
-    budget = _UNLIMITED if max_iterations is None else as_integer("max_iterations", max_iterations, 1, _UNLIMITED)
+    budget = (
+        _UNLIMITED
+        if max_iterations is None
+        else as_integer("max_iterations", max_iterations, 1, _UNLIMITED)
+    )
     phase_one = _feasible_start(problem, _starting_point(problem, initial, rows), rows, budget)
     result = (
         _iterate(problem, phase_one.x, phase_one.rows, budget - len(phase_one.iterations))
         if phase_one.converged
         else replace(phase_one, iterations=[])
     )
-    if result.converged and np.any(_violated(problem, result.x)):  # rows so nearly parallel that the method takes them for one
-        raise SolverError(f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their scaling.")
+    if result.converged and np.any(
+        _violated(problem, result.x)
+    ):  # rows so nearly parallel that the method takes them for one
+        raise SolverError(
+            f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their "
+            f"scaling."
+        )
     mu = np.zeros(len(qp.G))
     mu[result.rows] = np.maximum(result.multipliers, 0.0)
     count = len(phase_one.iterations) + len(result.iterations)
     return ActiveSetRun(
         solution=Solution(qp, space(result.x), mu, "active_set", count),
-        iterations=tuple(_in_original_variables(step, space, qp.objective(space.b)) for step in result.iterations),
+        iterations=tuple(
+            _in_original_variables(step, space, qp.objective(space.b)) for step in result.iterations
+        ),
         phase_one=tuple(_in_original_variables(step, space, 0.0) for step in phase_one.iterations),
         working_set=tuple(qp.inequality_names[i] for i in result.rows),
         converged=result.converged,
@@ -146,19 +184,25 @@ def active_set(
 
 
 def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> QP:
-    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up), subject to up ≥ 0.
+    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up),
+    subject to up ≥ 0.
 
-    With the minimum above the table the row "table" is inactive and might not be there; with the minimum below it the
-    row is active and might be an equality.
+    With the minimum above the table the row "table" is inactive and might not be there; with the
+    minimum below it the row is active and might be an equality.
     """
-    centre, H = as_array("minimum", minimum, (2,), "m"), np.diag(as_array("curvature", curvature, (2,)))
+    centre, H = (
+        as_array("minimum", minimum, (2,), "m"),
+        np.diag(as_array("curvature", curvature, (2,))),
+    )
     G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
     return QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
 
 
 @dataclass(frozen=True, eq=False)
 class _Result:
-    """Where a walk ended: point, rows of W and their multipliers, the iterations that led there, and whether it was done."""
+    """Where a walk ended: point, rows of W and their multipliers, the iterations that led there,
+    and whether it was done.
+    """
 
     x: Array
     rows: list[int]
@@ -167,8 +211,12 @@ class _Result:
     converged: bool = True
 
 
-def _iterate(problem: QP, x: Array, rows: list[int], max_iterations: int, last: int | None = None) -> _Result:
-    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W, at most so often; row `last` ends it."""
+def _iterate(
+    problem: QP, x: Array, rows: list[int], max_iterations: int, last: int | None = None
+) -> _Result:
+    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W, at most so
+    often; row `last` ends it.
+    """
     rows, degenerate = list(rows), False
     iterations: list[Iteration] = []
     iteration_limit = 100 + 20 * (problem.n + len(problem.G))
@@ -190,7 +238,8 @@ def _iterate(problem: QP, x: Array, rows: list[int], max_iterations: int, last: 
     if max_iterations <= iteration_limit:
         return _Result(x, rows, np.zeros(len(rows)), iterations, converged=False)
     raise SolverError(
-        f"active_set did not converge: its rows still change after {len(iterations)} iterations on {problem!r}. "
+        f"active_set did not converge: its rows still change after {len(iterations)} iterations on "
+        f"{problem!r}. "
         "Check the scaling of the problem."
     )
 
@@ -205,10 +254,12 @@ def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
 
 
 def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int) -> _Result:
-    """Phase 1: a point that satisfies all rows, with rows of W that it lies on, in at most so many iterations.
+    """Phase 1: a point that satisfies all rows, with rows of W that it lies on, in at most so many
+    iterations.
 
-    Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on the others, by the
-    same method. s = 0 is reached exactly if all rows can hold; otherwise the rows that stop s above 0 are in conflict.
+    Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on
+    the others, by the same method. s = 0 is reached exactly if all rows can hold; otherwise the
+    rows that stop s above 0 are in conflict.
     """
     n, norms = problem.n, problem.row_norms
     violation = (problem.G @ y - problem.h) / norms
@@ -222,18 +273,29 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
         g=np.eye(n + 1)[-1],
         A=np.zeros((0, n + 1)),
         b=np.zeros(0),
-        G=np.block([[problem.G, -(norms * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]),
+        G=np.block(
+            [[problem.G, -(norms * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]
+        ),
         h=np.append(problem.h, 0.0),
         row_norms=np.append(norms, 1.0),
         inequality_names=(*problem.inequality_names, ConstraintLabel(_SLACK_CONSTRAINT)),
     )
     worst = int(np.argmax(violation))
-    result = _iterate(relaxed, np.append(y, violation[worst]), [*rows, worst], max_iterations, last=s_row)
+    result = _iterate(
+        relaxed, np.append(y, violation[worst]), [*rows, worst], max_iterations, last=s_row
+    )
     if result.converged and result.rows[-1] != s_row and np.any(_violated(problem, result.x[:-1])):
-        share = result.multipliers * relaxed.row_norms[result.rows]  # those of the violated rows add up to 1
-        raise infeasible(problem.inequality_names[i] for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE]))
+        share = (
+            result.multipliers * relaxed.row_norms[result.rows]
+        )  # those of the violated rows add up to 1
+        raise infeasible(
+            problem.inequality_names[i]
+            for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE])
+        )
     working = _independent_rows(problem, [i for i in result.rows if i != s_row])
-    return _Result(result.x[:-1], working, np.zeros(len(working)), result.iterations, result.converged)
+    return _Result(
+        result.x[:-1], working, np.zeros(len(working)), result.iterations, result.converged
+    )
 
 
 def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:
@@ -243,10 +305,11 @@ def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:
 
 
 def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
-    """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf where there is none.
+    """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf
+    where there is none.
 
-    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u,
-    whose curvatures are the eigenvalues of Zᵀ H Z.
+    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z)
+    u + (Zᵀ slope)ᵀ u, whose curvatures are the eigenvalues of Zᵀ H Z.
     """
     Z = null_space(problem.G[rows] / problem.row_norms[rows, None])
     curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
@@ -261,8 +324,12 @@ def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
     return -modes[:, curved] @ (slope[curved] / curvature[curved]), 1.0
 
 
-def _longest_step(problem: QP, x: Array, p: Array, max_length: float, rows: list[int]) -> tuple[float, int | None]:
-    """How far from x along p, at most `max_length`, all rows hold: the length α, and the (first) row that forbids more."""
+def _longest_step(
+    problem: QP, x: Array, p: Array, max_length: float, rows: list[int]
+) -> tuple[float, int | None]:
+    """How far from x along p, at most `max_length`, all rows hold: the length α, and the (first)
+    row that forbids more.
+    """
     norms = problem.row_norms
     rate, slack = problem.G @ p, problem.h - problem.G @ x
     approaching = rate > _ROUNDING * norms * np.linalg.norm(p)
@@ -281,12 +348,16 @@ def _longest_step(problem: QP, x: Array, p: Array, max_length: float, rows: list
 
 
 def _multipliers(problem: QP, x: Array, rows: list[int]) -> Array:
-    """μ of the rows of W at the minimiser on them, shape (len(rows),): solves Gᵀ μ = -(H x + g) in least squares."""
+    """μ of the rows of W at the minimiser on them, shape (len(rows),): solves Gᵀ μ = -(H x + g) in
+    least squares.
+    """
     return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 
 
 def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, degenerate: bool) -> int | None:
-    """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the first of wrong sign."""
+    """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the
+    first of wrong sign.
+    """
     force = mu * problem.row_norms[rows]
     negative = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
     if not negative:
@@ -322,7 +393,14 @@ def _index(qp: QP, name: str) -> int:
 
 
 def _iteration_record(
-    problem: QP, x: Array, rows: list[int], p: Array, length: float, blocking: int | None, mu: Array, drop: int | None
+    problem: QP,
+    x: Array,
+    rows: list[int],
+    p: Array,
+    length: float,
+    blocking: int | None,
+    mu: Array,
+    drop: int | None,
 ) -> Iteration:
     names = problem.inequality_names
     return Iteration(
@@ -338,7 +416,9 @@ def _iteration_record(
 
 
 def _in_original_variables(step: Iteration, space: Affine, offset: float) -> Iteration:
-    """The same iteration in the problem's own variables, objective raised by `offset`; phase 1's s falls away."""
+    """The same iteration in the problem's own variables, objective raised by `offset`; phase 1's s
+    falls away.
+    """
     n = space.n_in
     return replace(
         step,

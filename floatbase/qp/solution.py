@@ -11,7 +11,8 @@ from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_norms
 from floatbase.qp.problem import QP
 
-_ACTIVE_TOLERANCE = 1e-9  # part of the largest slope above which a multiplier counts: what solvers leave on rows that touch
+# part of the largest slope above which a multiplier counts: what solvers leave on rows that touch
+_ACTIVE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,9 @@ class Solution(Value):
         """ν, shape (m,): follows from stationarity, by least squares."""
         qp = self.qp
         slope, size = qp.H @ self.x + qp.g + qp.G.T @ self.inequality_multipliers, row_norms(qp.A)
-        return read_only(np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size)
+        return read_only(
+            np.linalg.lstsq((qp.A / size[:, None]).T, -slope, rcond=RANK_TOLERANCE)[0] / size
+        )
 
     @cached_property
     def residuals(self) -> Residuals:
@@ -76,7 +79,9 @@ class Solution(Value):
 
     @cached_property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequality rows: those whose multiplier counts beside the slopes that it balances."""
+        """Names of the active inequality rows: those whose multiplier counts beside the slopes that
+        it balances.
+        """
         qp, scaled = self.qp, self.inequality_multipliers * self.qp.row_norms
         slopes = np.concatenate([qp.g, qp.H @ self.x, scaled])
         is_active = scaled > _ACTIVE_TOLERANCE * np.max(np.abs(slopes), initial=0.0)
@@ -84,7 +89,9 @@ class Solution(Value):
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Multiplier of each active inequality row, by name: what one unit more in h would lower the objective by."""
+        """Multiplier of each active inequality row, by name: what one unit more in h would lower
+        the objective by.
+        """
         mu = dict(zip(self.qp.inequality_names, self.inequality_multipliers, strict=True))
         return {name: float(mu[name]) for name in self.active}
 
@@ -96,5 +103,7 @@ class Solution(Value):
     def __getitem__(self, block: str) -> Array:
         """One named block of x."""
         if not isinstance(block, str) or block not in self.qp.blocks:
-            raise InputError(f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}.")
+            raise InputError(
+                f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}."
+            )
         return self.x[self.qp.blocks[block]]

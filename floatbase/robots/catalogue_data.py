@@ -29,19 +29,26 @@ class CatalogueEntry:
     sources: Mapping[str, str] = field(default_factory=dict)
 
 
-def _ball_feet(frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Foot, ...]:
+def _ball_feet(
+    frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)
+) -> tuple[Foot, ...]:
     return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
 
 
-_TALOS_SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])  # of talos
-_G1_SOLE = np.array([[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]])
+_TALOS_SOLE = np.array(
+    [[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]]
+)  # of talos
+_G1_SOLE = np.array(
+    [[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]]
+)
 _solo = partial(
     CatalogueEntry,
     feet=_ball_feet(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
     torque_limit=2.7,
     sources={
         "foot radius": "half the width of the foot's mesh in example-robot-data",
-        "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular robot architecture, 2020 "
+        "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular "
+        "robot architecture, 2020 "
         "(the URDF says 1000 N·m, which no motor of this size gives)",
     },
 )
@@ -62,7 +69,10 @@ CATALOGUE: Mapping[str, CatalogueEntry] = {
     "talos": CatalogueEntry(
         "humanoid with flat feet: each foot carries a wrench through its corners",
         tuple(Foot(frame, corners=_TALOS_SOLE) for frame in ("left_sole_link", "right_sole_link")),
-        sources={"sole": "20 cm × 12 cm, within the ankle's collision mesh", "torque limits": "URDF"},
+        sources={
+            "sole": "20 cm × 12 cm, within the ankle's collision mesh",
+            "torque limits": "URDF",
+        },
     ),
     "hyq": CatalogueEntry(
         "hydraulic quadruped of 80 kg with 3 joints a leg",
@@ -71,7 +81,10 @@ CATALOGUE: Mapping[str, CatalogueEntry] = {
     ),
     "g1": CatalogueEntry(
         "humanoid of 33 kg with flat feet",
-        tuple(Foot(frame, corners=_G1_SOLE) for frame in ("left_ankle_roll_link", "right_ankle_roll_link")),
+        tuple(
+            Foot(frame, corners=_G1_SOLE)
+            for frame in ("left_ankle_roll_link", "right_ankle_roll_link")
+        ),
         joints={
             f"{side}_{joint}_joint": angle
             for side in ("left", "right")
@@ -85,7 +98,12 @@ CATALOGUE: Mapping[str, CatalogueEntry] = {
     ),
     "ur5": CatalogueEntry(
         "arm bolted to the ground: the fixed-base equations (1)",
-        joints={"shoulder_lift_joint": -1.3, "elbow_joint": 1.6, "wrist_1_joint": -0.3, "wrist_2_joint": 0.0},
+        joints={
+            "shoulder_lift_joint": -1.3,
+            "elbow_joint": 1.6,
+            "wrist_1_joint": -0.3,
+            "wrist_2_joint": 0.0,
+        },
         sources={"torque limits": "URDF"},
     ),
 }

@@ -19,11 +19,16 @@ _MAX_STEPS = 50  # the catalogue's robots take five
 _UP = (0.0, 0.0, 1.0)  # normal of the ground
 _LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
 
-_Planes: TypeAlias = tuple[Array, Array]  # normals, shape (n, 3), and offsets, shape (n,), m: normal · x = offset
+_Planes: TypeAlias = tuple[
+    Array, Array
+]  # normals, shape (n, 3), and offsets, shape (n,), m: normal · x = offset
 
 
 def find_standing_state(
-    robot: Robot, height: float | None = None, normal: npt.ArrayLike | None = None, offset: npt.ArrayLike | None = None
+    robot: Robot,
+    height: float | None = None,
+    normal: npt.ArrayLike | None = None,
+    offset: npt.ArrayLike | None = None,
 ) -> State:
     """The standing state nearest to `robot.posture`, at rest; see `Robot.standing`."""
     posture = State(robot, robot.posture)
@@ -33,7 +38,11 @@ def find_standing_state(
     if not robot.is_floating or not robot.feet:
         return posture
     q = posture.q.copy()
-    q[2] = height if height is not None else q[2] - min(_clearance(posture, foot, planes)[0] for foot in robot.feet)
+    q[2] = (
+        height
+        if height is not None
+        else q[2] - min(_clearance(posture, foot, planes)[0] for foot in robot.feet)
+    )
     state, (joints, index, lower, upper) = State(robot, q), joint_limits(robot.model)
     v_index = np.array(robot.model.idx_vs)[joints]
     for _ in range(_MAX_STEPS):
@@ -41,11 +50,14 @@ def find_standing_state(
         remaining = np.max(np.abs(error))
         if remaining < _TOLERANCE:
             return state
-        at_limit = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would take beyond it
+        at_limit = np.zeros(
+            len(joints), dtype=bool
+        )  # joints at a limit that the step would take beyond it
         while True:
             step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
             newly_at_limit = ~at_limit & (
-                (state.q[index] <= lower) & (step[v_index] < 0.0) | (state.q[index] >= upper) & (step[v_index] > 0.0)
+                (state.q[index] <= lower) & (step[v_index] < 0.0)
+                | (state.q[index] >= upper) & (step[v_index] > 0.0)
             )
             if not np.any(newly_at_limit):
                 break
@@ -62,14 +74,18 @@ def find_standing_state(
     reason = f", with joints at their limits: {', '.join(limited)}" if limited else ""
     advice = "Ask for another height, or load it with another posture."
     raise InputError(
-        f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m remain{reason}. {advice}"
+        f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m "
+        f"remain{reason}. {advice}"
     )
 
 
-def _standing_residual(state: State, posture: State, height: float | None, planes: _Planes) -> tuple[Array, Array]:
+def _standing_residual(
+    state: State, posture: State, height: float | None, planes: _Planes
+) -> tuple[Array, Array]:
     """What must be zero when the robot stands, and its Jacobian.
 
-    Soles on the ground and along it; the base where the posture has it, but for its height, which follows the feet or is given.
+    Soles on the ground and along it; the base where the posture has it, but for its height, which
+    follows the feet or is given.
     """
     errors, rows = [], []
     for foot in state.robot.feet:
@@ -82,13 +98,18 @@ def _standing_residual(state: State, posture: State, height: float | None, plane
             rows += [*(-pin.skew(n) @ pin.skew(R[:, 2]) @ J[3:])]  # d(up)/dt = ω × up
     R, J_base = state.frame_pose("base").rotation, np.eye(6, state.robot.nv)
     target = posture.q[:2] if height is None else [*posture.q[:2], height]
-    errors += [*pin.log3(posture.frame_pose("base").rotation.T @ R), *(state.q[: len(target)] - target)]
+    errors += [
+        *pin.log3(posture.frame_pose("base").rotation.T @ R),
+        *(state.q[: len(target)] - target),
+    ]
     rows += [*J_base[3:], *(R @ J_base[:3])[: len(target)]]
     return np.array(errors), np.array(rows)
 
 
 def _clearance(state: State, foot: Foot, planes: _Planes) -> tuple[float, Array]:
-    """Distance of the foot's lowest point from the nearest plane, m, negative below it, and that plane's normal, shape (3,)."""
+    """Distance of the foot's lowest point from the nearest plane, m, negative below it, and that
+    plane's normal, shape (3,).
+    """
     normals, offsets = planes
     distances = normals @ state.point(foot.frame, foot.middle) - offsets
     nearest = int(np.argmin(distances))

@@ -1,4 +1,6 @@
-"""`State(robot, q, v)`: where a robot is and how it moves; validated, immutable, kinematics computed once."""
+"""`State(robot, q, v)`: where a robot is and how it moves; validated, immutable, kinematics
+computed once.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_array, as_instance, cached_property, frozen, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    cached_property,
+    frozen,
+    read_only,
+)
 from floatbase.robots.robot import Robot, check_unit_norms
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -16,17 +26,19 @@ WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class State(Value):
-    """(2) A configuration q = (q_base, q_jnt) and a velocity v of a robot, and all that follows from them alone.
+    """(2) A configuration q = (q_base, q_jnt) and a velocity v of a robot, and all that follows
+    from them alone.
 
-    A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts of frames are given in the
-    world-aligned frame at the point requested.
+    A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts
+    of frames are given in the world-aligned frame at the point requested.
 
     robot: as from `fb.load`.
     q: shape (nq,): base position [m, world], base quaternion x y z w, joints [rad or m].
-    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities; 0 by default.
+    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint
+        velocities; 0 by default.
 
-    Raises `InputError` for wrong shapes, entries that are not finite, and quaternions (also (cos, sin) of joints without
-    limits) that are not of unit length.
+    Raises `InputError` for wrong shapes, entries that are not finite, and quaternions (also (cos,
+    sin) of joints without limits) that are not of unit length.
     """
 
     robot: Robot
@@ -36,7 +48,9 @@ class State(Value):
     def __init__(self, robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike | None = None):
         object.__setattr__(self, "robot", as_instance("robot", robot, Robot))
         object.__setattr__(self, "q", as_array("q", q, (robot.nq,)))
-        object.__setattr__(self, "v", as_array("v", np.zeros(robot.nv) if v is None else v, (robot.nv,)))
+        object.__setattr__(
+            self, "v", as_array("v", np.zeros(robot.nv) if v is None else v, (robot.nv,))
+        )
         check_unit_norms(robot.model, "q", self.q, ", or use robot.standing()")
 
     def _take_data(self) -> pin.Data:
@@ -47,12 +61,16 @@ class State(Value):
             return self.robot.model.createData()
 
     def __del__(self) -> None:
-        if "_data" in self.__dict__:  # nothing refers to this state any more, and what it handed out are copies
+        if (
+            "_data" in self.__dict__
+        ):  # nothing refers to this state any more, and what it handed out are copies
             self.robot._data_pool.append(self._data)
 
     @cached_property
     def _data(self) -> pin.Data:
-        """Pinocchio's results at (q, v), never handed out: kinematics, then what is asked for, which changes none of them."""
+        """Pinocchio's results at (q, v), never handed out: kinematics, then what is asked for,
+        which changes none of them.
+        """
         data = self._take_data()
         # accelerations at q̈ = 0 are the drifts J̇ v
         pin.forwardKinematics(self.robot.model, data, self.q, self.v, np.zeros(self.robot.nv))
@@ -60,12 +78,16 @@ class State(Value):
 
     @cached_property
     def M(self) -> Array:
-        """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite, rotor inertia included."""
+        """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite,
+        rotor inertia included.
+        """
         return frozen(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
 
     @cached_property
     def h(self) -> Array:
-        """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and gravity."""
+        """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and
+        gravity.
+        """
         return frozen(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
 
     @cached_property
@@ -98,7 +120,9 @@ class State(Value):
 
     @cached_property
     def joint_transforms(self) -> Array:
-        """World poses of Pinocchio's joints, shape (njoints, 4, 4), index = joint number (0 = the world)."""
+        """World poses of Pinocchio's joints, shape (njoints, 4, 4), index = joint number (0 = the
+        world).
+        """
         return read_only([placement.homogeneous for placement in self._data.oMi])
 
     @cached_property
@@ -116,17 +140,29 @@ class State(Value):
         return read_only(self.frame_pose(frame).act(as_array("offset", offset, (3,), "m")))
 
     def frame_jacobian(self, frame: str) -> Array:
-        """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows, world-aligned."""
-        J = pin.getFrameJacobian(self.robot.model, self._jacobians, self.robot.frame_id(frame), WORLD_ALIGNED)
+        """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows,
+        world-aligned.
+        """
+        J = pin.getFrameJacobian(
+            self.robot.model, self._jacobians, self.robot.frame_id(frame), WORLD_ALIGNED
+        )
         return read_only(J.reshape(6, self.robot.nv))  # of one joint Pinocchio gives (6,)
 
     def frame_velocity(self, frame: str) -> Array:
         """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world-aligned."""
-        return read_only(pin.getFrameVelocity(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED).vector)
+        return read_only(
+            pin.getFrameVelocity(
+                self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
+            ).vector
+        )
 
     def frame_drift(self, frame: str) -> Array:
-        """J̇ v of the frame named `frame`, shape (6,), world axes: its origin's acceleration when q̈ = 0, m/s² and rad/s²."""
-        motion = pin.getFrameClassicalAcceleration(self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED)
+        """J̇ v of the frame named `frame`, shape (6,), world axes: its origin's acceleration when
+        q̈ = 0, m/s² and rad/s².
+        """
+        motion = pin.getFrameClassicalAcceleration(
+            self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
+        )
         return read_only(motion.vector)
 
     def integrate(self, dv: npt.ArrayLike) -> Array:
@@ -134,11 +170,17 @@ class State(Value):
 
         dv: shape (nv,), velocity times time: base part, m and rad, in the base frame, then joints.
         """
-        return read_only(pin.integrate(self.robot.model, self.q, as_array("dv", dv, (self.robot.nv,))))
+        return read_only(
+            pin.integrate(self.robot.model, self.q, as_array("dv", dv, (self.robot.nv,)))
+        )
 
     def difference(self, q: npt.ArrayLike) -> Array:
-        """The dv, shape (nv,), that leads from configuration q to this state's: `State(robot, q).integrate(dv)` = self.q."""
-        return read_only(pin.difference(self.robot.model, as_array("q", q, (self.robot.nq,)), self.q))
+        """The dv, shape (nv,), that leads from configuration q to this state's:
+        `State(robot, q).integrate(dv)` = self.q.
+        """
+        return read_only(
+            pin.difference(self.robot.model, as_array("q", q, (self.robot.nq,)), self.q)
+        )
 
     def replace(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
         """A new state with q or v replaced."""

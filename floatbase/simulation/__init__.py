@@ -2,7 +2,13 @@
 
 from floatbase.simulation.build import Ground
 from floatbase.simulation.conversion import Conversion
-from floatbase.simulation.live import ACTIVE_STATUSES, AUTO_PAUSED, PUSH_DISPLAY_TIME, LiveSimulation, status_message
+from floatbase.simulation.live import (
+    ACTIVE_STATUSES,
+    AUTO_PAUSED,
+    PUSH_DISPLAY_TIME,
+    LiveSimulation,
+    status_message,
+)
 from floatbase.simulation.perturbed import Perturbation, PerturbedSimulation
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery

@@ -1,7 +1,7 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's planes and balls at the feet touch, or hulls of the other links, too, for a robot that falls. Links that are
-welded together are one body, which has all their inertia.
+Only the ground's planes and balls at the feet touch, or hulls of the other links, too, for a robot
+that falls. Links that are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -23,27 +23,46 @@ from floatbase.simulation.conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-_IMPEDANCE_RATIO = 100.0  # friction as stiff as the normal force: feet creep less under a steady load
-_CONTACT_TIME_CONSTANT = 0.004  # s, time constant of a critically damped contact: four of the default timesteps; two is the least
-_CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
+_IMPEDANCE_RATIO = (
+    100.0  # friction as stiff as the normal force: feet creep less under a steady load
+)
+# s, time constant of a critically damped contact: four of the default timesteps; two is the least
+_CONTACT_TIME_CONSTANT = 0.004
+_CONTACT_IMPEDANCE = (
+    0.95,
+    0.99,
+    0.001,
+    0.5,
+    2.0,
+)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-_PENETRATION_RECOVERY_TIME = 0.2  # s in which a link comes out that was in the ground before it touched
-_CORNER_BALL_RADIUS = 0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+_PENETRATION_RECOVERY_TIME = (
+    0.2  # s in which a link comes out that was in the ground before it touched
+)
+_CORNER_BALL_RADIUS = (
+    0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+)
 HULL_PREFIX = "hull of"  # so begin the names of the links' geoms
-_MIN_BALL_RADIUS = 1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+_MIN_BALL_RADIUS = (
+    1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+)
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
-_RELATIVE_ROUNDING = 1e-9  # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for rounding
+# relative: a thin plate meets the triangle inequality of principal inertias with equality, but for
+# rounding
+_RELATIVE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Ground(Value):
-    """The ground: a plane, or several planes that all are solid below, as the two sides of a valley.
+    """The ground: a plane, or several planes that all are solid below, as the two sides of a
+    valley.
 
         valley = fb.Ground(normal=[[0, -0.34, 0.94], [0, 0.34, 0.94]])
 
     mu: coefficient of friction with the feet.
     normal: world, out of the ground, made unit: (3,) for one plane, (n, 3) for several.
-    offset: m, of the points normal · x = offset of a plane: one number for all planes, or (n,); 0 goes through the origin.
+    offset: m, of the points normal · x = offset of a plane: one number for all planes, or (n,); 0
+        goes through the origin.
     """
 
     mu: float = 1.0
@@ -53,7 +72,9 @@ class Ground(Value):
     def __post_init__(self) -> None:
         normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
         single_plane = np.ndim(self.normal) == 1
-        object.__setattr__(self, "mu", as_positive("friction coefficient mu of the ground", self.mu))
+        object.__setattr__(
+            self, "mu", as_positive("friction coefficient mu of the ground", self.mu)
+        )
         object.__setattr__(self, "normal", normals[0] if single_plane else normals)
         object.__setattr__(self, "offset", float(offsets[0]) if single_plane else offsets)
 
@@ -68,14 +89,20 @@ class Ground(Value):
         return read_only(np.atleast_1d(self.offset))
 
     def clearances(self, points: npt.ArrayLike) -> Array:
-        """Distances of points from each plane, shape (…, n), m, negative below it. points: (…, 3), m, world."""
+        """Distances of points from each plane, shape (…, n), m, negative below it. points: (…, 3),
+        m, world.
+        """
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
-def build_model(robot: Robot, ground: Ground, timestep: float, link_collisions: bool = False) -> mujoco.MjModel:
-    """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact points, motors as joints.
+def build_model(
+    robot: Robot, ground: Ground, timestep: float, link_collisions: bool = False
+) -> mujoco.MjModel:
+    """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact
+    points, motors as joints.
 
-    link_collisions: whether the ground touches the links' hulls, too. Raises `SimulationError` when MuJoCo cannot build it.
+    link_collisions: whether the ground touches the links' hulls, too. Raises `SimulationError` when
+        MuJoCo cannot build it.
     """
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
@@ -83,13 +110,18 @@ def build_model(robot: Robot, ground: Ground, timestep: float, link_collisions: 
     spec.option.impratio = _IMPEDANCE_RATIO
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     contact = spec.default.geom
-    contact.condim, contact.friction = 3, [ground.mu, 0.0, 0.0]  # no resistance to spinning or rolling
+    contact.condim, contact.friction = (
+        3,
+        [ground.mu, 0.0, 0.0],
+    )  # no resistance to spinning or rolling
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
     for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
         joint = spec.joint(name)
-        joint.armature = float(robot.model.armature[robot.model.idx_vs[robot.model.getJointId(name)]])
+        joint.armature = float(
+            robot.model.armature[robot.model.idx_vs[robot.model.getJointId(name)]]
+        )
         joint.damping[:] = 0.0
         joint.frictionloss = 0.0
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
@@ -97,7 +129,9 @@ def build_model(robot: Robot, ground: Ground, timestep: float, link_collisions: 
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
     for normal, offset in zip(ground.normals, ground.offsets, strict=True):
-        plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal)
+        plane = spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal
+        )
         plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
@@ -110,14 +144,17 @@ def build_model(robot: Robot, ground: Ground, timestep: float, link_collisions: 
         raise SimulationError(f"MuJoCo cannot build {robot.name}: {error}") from None
     if model.nv != robot.nv:
         raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, which has {robot.nv}: "
+            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, which has "
+            f"{robot.nv}: "
             "its model was changed after it was read from the URDF."
         )
     return model
 
 
 def body_name(link: str) -> str:
-    """Name in MuJoCo of a floating robot's link: its own, but for "world": MuJoCo would weld it to the ground."""
+    """Name in MuJoCo of a floating robot's link: its own, but for "world": MuJoCo would weld it to
+    the ground.
+    """
     return "world of the robot" if link == "world" else link
 
 
@@ -138,37 +175,59 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         raise SimulationError(f"MuJoCo cannot read {robot.name}: {error}") from None
     spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
-    inertias = {body.name: _fused_inertia(body) for body in bodies if body.joints or (robot.is_floating and body.parent.name == "world")}
-    inconsistent = [body for body in bodies if body.name in inertias and not _is_physically_consistent(inertias[body.name])]
+    inertias = {
+        body.name: _fused_inertia(body)
+        for body in bodies
+        if body.joints or (robot.is_floating and body.parent.name == "world")
+    }
+    inconsistent = [
+        body
+        for body in bodies
+        if body.name in inertias and not _is_physically_consistent(inertias[body.name])
+    ]
     if inconsistent:
         raise SimulationError(_inertia_error(robot, inconsistent, inertias[inconsistent[0].name]))
     for body in bodies:
         inertia = inertias.get(body.name, pin.Inertia.Zero())
         tensor, body.explicitinertial = inertia.inertia, body.name in inertias
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.lever, [1.0, 0.0, 0.0, 0.0]
-        diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]  # MuJoCo's word for none
+        diagonal = (
+            tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
+        )  # MuJoCo's word for none
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
 
 
 def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
-    """The inertia of a body and of all that is welded to it from below, in its own frame, as the URDF gives it."""
-    inertia = pin.Inertia.Zero()  # the constructor refuses tensors that are not positive definite, and a sum may mend them
+    """The inertia of a body and of all that is welded to it from below, in its own frame, as the
+    URDF gives it.
+    """
+    inertia = (
+        pin.Inertia.Zero()
+    )  # the constructor refuses tensors that are not positive definite, and a sum may mend them
     if body.explicitinertial:  # else the URDF gives none
-        ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(body.fullinertia)  # MuJoCo notes NaN for a tensor of zeros
+        ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(
+            body.fullinertia
+        )  # MuJoCo notes NaN for a tensor of zeros
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
         tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
         inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
     for child in body.bodies:
         if not child.joints:
-            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(_fused_inertia(child))
+            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(
+                _fused_inertia(child)
+            )
     return inertia
 
 
 def _is_physically_consistent(inertia: pin.Inertia) -> bool:
     """Whether some mass distribution has this inertia; none at all does not count."""
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
-    return bool(inertia.mass > 0.0 and smallest > _MIN_INERTIA and smallest + middle >= largest * (1.0 - _RELATIVE_ROUNDING))
+    return bool(
+        inertia.mass > 0.0
+        and smallest > _MIN_INERTIA
+        and smallest + middle >= largest * (1.0 - _RELATIVE_ROUNDING)
+    )
 
 
 def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.Inertia) -> str:
@@ -176,35 +235,54 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
     others = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
     joints = [joint.name for body in bodies for joint in body.joints]
-    weld = f", or weld such links to the ones they hang from with locked={joints} of fb.load" if joints else ""
+    weld = (
+        f", or weld such links to the ones they hang from with locked={joints} of fb.load"
+        if joints
+        else ""
+    )
     return (
-        f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}: with all that is welded to it, it has "
-        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} kg m². They must be above "
+        f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}: with all that is "
+        f"welded to it, it has "
+        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} "
+        f"kg m². They must be above "
         f"zero, and none above the sum of the two others. Correct the URDF{weld}."
     )
 
 
 def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
-    """A ball for each of the foot's contact points, so that the ball's lowest point is the contact point."""
+    """A ball for each of the foot's contact points, so that the ball's lowest point is the contact
+    point.
+    """
     body = spec.body(body_name(foot.frame))
     if body is None:
-        raise SimulationError(f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links.")
+        raise SimulationError(
+            f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links."
+        )
     if foot.corners is None:
         centres, radius = foot.centre[None], max(foot.radius, _MIN_BALL_RADIUS)
     else:
         centres, radius = foot.corners + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
-        body.add_geom(name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1)
+        body.add_geom(
+            name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1
+        )
 
 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The hulls of links, without mass: they stop at once where they hit the ground, and come out of it slowly."""
+    """The hulls of links, without mass: they stop at once where they hit the ground, and come out
+    of it slowly.
+    """
     impact_time = max(_IMPACT_TIME, 4.0 * spec.option.timestep)
     for joint_id, points in link_hulls(robot):
         joint = spec.joint(robot.model.names[joint_id])  # the free base's has another name
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
         mesh = spec.add_mesh(name=f"{HULL_PREFIX} {body.name}", uservert=points.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-        hull = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0)
+        hull = body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0
+        )
         hull.contype, hull.conaffinity, hull.priority = 0, 1, 1
-        hull.solref = [-1.0 / (impact_time * _PENETRATION_RECOVERY_TIME), -1.0 / impact_time]  # stiffness and damping for 1 kg, overdamped
+        hull.solref = [
+            -1.0 / (impact_time * _PENETRATION_RECOVERY_TIME),
+            -1.0 / impact_time,
+        ]  # stiffness and damping for 1 kg, overdamped

@@ -1,7 +1,8 @@
 """From our convention for a state to MuJoCo's and back.
 
-Ours is Pinocchio's: quaternion x y z w, base velocity in the base frame, joints in Pinocchio's order. MuJoCo's: quaternion
-w x y z, linear base velocity in the world frame and angular in the base frame, joints in the URDF's order.
+Ours is Pinocchio's: quaternion x y z w, base velocity in the base frame, joints in Pinocchio's
+order. MuJoCo's: quaternion w x y z, linear base velocity in the world frame and angular in the base
+frame, joints in the URDF's order.
 """
 
 from __future__ import annotations
@@ -21,13 +22,20 @@ class Conversion:
         self._robot = robot
         self._n_base = 6 if robot.is_floating else 0
         mujoco_ids = [model.joint(name).id for name in robot.joint_names]
-        self._qpos_indices, self._qvel_indices = model.jnt_qposadr[mujoco_ids], model.jnt_dofadr[mujoco_ids]
+        self._qpos_indices, self._qvel_indices = (
+            model.jnt_qposadr[mujoco_ids],
+            model.jnt_dofadr[mujoco_ids],
+        )
         joint_ids = [robot.model.getJointId(name) for name in robot.joint_names]
         self._q_indices = np.array(robot.model.idx_qs)[joint_ids]
-        self._is_continuous = np.array(robot.model.nqs)[joint_ids] == 2  # Pinocchio stores the angle of such a joint as (cos, sin)
+        self._is_continuous = (
+            np.array(robot.model.nqs)[joint_ids] == 2
+        )  # Pinocchio stores the angle of such a joint as (cos, sin)
         self._cos_indices = self._q_indices[self._is_continuous]
         base = [0, 1, 2, 4, 5, 6, 3] if self._n_base else []
-        self._qpos_of_q = np.array(base + [0] * (robot.nq - len(base)), dtype=int)  # index in qpos of each entry of q
+        self._qpos_of_q = np.array(
+            base + [0] * (robot.nq - len(base)), dtype=int
+        )  # index in qpos of each entry of q
         self._qpos_of_q[self._q_indices] = self._qpos_indices
         self._qpos_of_q[self._cos_indices + 1] = self._qpos_indices[self._is_continuous]
         self._qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
@@ -36,7 +44,10 @@ class Conversion:
         """Our q, shape (nq,), for MuJoCo's qpos."""
         q = qpos[self._qpos_of_q]
         if self._cos_indices.size:
-            q[self._cos_indices], q[self._cos_indices + 1] = np.cos(q[self._cos_indices]), np.sin(q[self._cos_indices + 1])
+            q[self._cos_indices], q[self._cos_indices + 1] = (
+                np.cos(q[self._cos_indices]),
+                np.sin(q[self._cos_indices + 1]),
+            )
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
@@ -47,7 +58,9 @@ class Conversion:
         return v
 
     def joint_state(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
-        """Angles (of joints without limits beyond π too), rad or m, and velocities, in the order of τ, shape (d,) each."""
+        """Angles (of joints without limits beyond π too), rad or m, and velocities, in the order of
+        τ, shape (d,) each.
+        """
         return qpos[self._qpos_indices], qvel[self._qvel_indices]
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -57,7 +70,9 @@ class Conversion:
             qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
             qvel[:3], qvel[3:6] = rotation_matrix(qpos[3:7]) @ v[:3], v[3:6]
         qpos[self._qpos_indices], qvel[self._qvel_indices] = q[self._q_indices], v[self._n_base :]
-        qpos[self._qpos_indices[self._is_continuous]] = np.arctan2(q[self._cos_indices + 1], q[self._cos_indices])
+        qpos[self._qpos_indices[self._is_continuous]] = np.arctan2(
+            q[self._cos_indices + 1], q[self._cos_indices]
+        )
         return qpos, qvel
 
 

@@ -1,4 +1,5 @@
-"""A robot's two MuJoCo models: upright, where only feet touch the ground, and lying, where links do, too.
+"""A robot's two MuJoCo models: upright, where only feet touch the ground, and lying, where links
+do, too.
 
 The lying one is made at the first fall: a simulation without a fall costs nothing for it.
 """
@@ -24,7 +25,8 @@ _GEOM_FIELD_PREFIX = "geom_"  # so begin the names of a model's arrays with a ro
 class FallenModel:
     """The model in which links touch, its data, and how its geoms are numbered.
 
-    from_upright: its number of each of the upright model's geoms, which are the ground's planes and the feet's balls.
+    from_upright: its number of each of the upright model's geoms, which are the ground's planes and
+        the feet's balls.
     to_upright: the other way round, -1 for the hull of a link.
     shared_fields: names of the arrays that mean the same in both models: masses, gains, frictions.
     """
@@ -47,27 +49,49 @@ class FallenModel:
 
 
 def build_fallen_model(robot: Robot, ground: Ground, timestep: float) -> FallenModel | None:
-    """A robot's lying model; None for one without links that could touch, such as an arm that is bolted to the ground."""
+    """A robot's lying model; None for one without links that could touch, such as an arm that is
+    bolted to the ground.
+    """
     if not link_hulls(robot):
         return None
-    upright_model, model = build_model(robot, ground, timestep), build_model(robot, ground, timestep, link_collisions=True)
+    upright_model, model = (
+        build_model(robot, ground, timestep),
+        build_model(robot, ground, timestep, link_collisions=True),
+    )
     is_hull = np.array([model.geom(i).name.startswith(HULL_PREFIX) for i in range(model.ngeom)])
     from_upright = np.flatnonzero(~is_hull)
     to_upright = np.where(is_hull, -1, np.cumsum(~is_hull) - 1)
-    fields = tuple(name for name in dir(upright_model) if _is_shared_field(name, upright_model, model, from_upright))
+    fields = tuple(
+        name
+        for name in dir(upright_model)
+        if _is_shared_field(name, upright_model, model, from_upright)
+    )
     return FallenModel(model, mujoco.MjData(model), from_upright, to_upright, fields)
 
 
-def _is_shared_field(name: str, upright_model: mujoco.MjModel, model: mujoco.MjModel, from_upright: npt.NDArray[np.int_]) -> bool:
+def _is_shared_field(
+    name: str,
+    upright_model: mujoco.MjModel,
+    model: mujoco.MjModel,
+    from_upright: npt.NDArray[np.int_],
+) -> bool:
     """Whether an attribute is an array that has the same numbers in both models as they were built."""
     upright = getattr(upright_model, name)
     if name.startswith("_") or not isinstance(upright, np.ndarray) or not upright.size:
         return False
     fallen = getattr(model, name)
-    return np.array_equal(upright, fallen[from_upright] if name.startswith(_GEOM_FIELD_PREFIX) else fallen)
+    return np.array_equal(
+        upright, fallen[from_upright] if name.startswith(_GEOM_FIELD_PREFIX) else fallen
+    )
 
 
-def _copy_fields(fields: tuple[str, ...], source: mujoco.MjModel, source_geoms: Any, target: mujoco.MjModel, target_geoms: Any) -> None:
+def _copy_fields(
+    fields: tuple[str, ...],
+    source: mujoco.MjModel,
+    source_geoms: Any,
+    target: mujoco.MjModel,
+    target_geoms: Any,
+) -> None:
     """Copy fields and options; source_geoms and target_geoms: of the geoms that both models have."""
     for name in fields:
         a, b = getattr(source, name), getattr(target, name)
@@ -84,7 +108,9 @@ def _copy_fields(fields: tuple[str, ...], source: mujoco.MjModel, source_geoms: 
 
 
 def _copy_state(source: mujoco.MjData, model: mujoco.MjModel, target: mujoco.MjData) -> None:
-    """Put the source's state into the target, whose model this is, with contacts and all that follows from the state."""
+    """Put the source's state into the target, whose model this is, with contacts and all that
+    follows from the state.
+    """
     state = np.empty(mujoco.mj_stateSize(model, _STATE_SPEC))
     mujoco.mj_getState(model, source, state, _STATE_SPEC)
     mujoco.mj_resetData(model, target)

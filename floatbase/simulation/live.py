@@ -16,16 +16,22 @@ from floatbase.simulation.physics import Push, Simulation, active_pushes
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 
-_SLICE_DURATION = 1.0 / 30.0  # s of simulated time in a slice, about: as often as a picture is drawn
+_SLICE_DURATION = (
+    1.0 / 30.0
+)  # s of simulated time in a slice, about: as often as a picture is drawn
 _JOIN_TIMEOUT = 5.0  # s that `close` waits for a slice: far longer than one takes
 _MAX_SETTLING_TIME = 1.5  # s after a fall in which a robot comes to lie, at most
 AUTO_PAUSED = "paused by itself, untouched for long"  # a status
 ACTIVE_STATUSES = ("running", "paused", AUTO_PAUSED)  # the statuses of a run that nothing has ended
-PUSH_DISPLAY_TIME = 0.4  # s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a second
+# s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a
+# second
+PUSH_DISPLAY_TIME = 0.4
 
 
 def status_message(status: str) -> str:
-    """A status of `LiveSimulation` as a line for who watches: what stopped the run, in a sentence, and what to do about it."""
+    """A status of `LiveSimulation` as a line for who watches: what stopped the run, in a sentence,
+    and what to do about it.
+    """
     if as_string("status", status) in ACTIVE_STATUSES:
         return status if status != AUTO_PAUSED else f"{AUTO_PAUSED}: press run"
     reason = status.split("\n")[0].split(". ")[0].rstrip(".")
@@ -33,17 +39,22 @@ def status_message(status: str) -> str:
 
 
 class LiveSimulation:
-    """Runs `rollout` in slices of a 30th of a second, in a thread of its own, and hands each slice to `show`.
+    """Runs `rollout` in slices of a 30th of a second, in a thread of its own, and hands each slice
+    to `show`.
 
     sim, controller, control_period (s), actuators: as for `rollout`.
-    show: called with each slice's record, in that thread; its `pushes` are those that act or ended less than `PUSH_DISPLAY_TIME` s ago.
-    after_reset: called after each reset, in that thread, to reset what has a memory of its own, such as the actuators.
-    idle_timeout: s without any call here after which the run pauses by itself, so that a forgotten page costs nothing.
+    show: called with each slice's record, in that thread; its `pushes` are those that act or ended
+        less than `PUSH_DISPLAY_TIME` s ago.
+    after_reset: called after each reset, in that thread, to reset what has a memory of its own,
+        such as the actuators.
+    idle_timeout: s without any call here after which the run pauses by itself, so that a forgotten
+        page costs nothing.
 
-    `status` is "running", "paused", `AUTO_PAUSED` where it has paused by itself, or why the run stopped: "fell", "diverged",
-    "controller failed: …", "stopped: …" for an exception, which `error` holds. A fall or a failure is told at once; slices go
-    on with the controller off, as `settling_time` of `rollout` says, until the robot lies still, or for 1.5 s at most. Calls act
-    between slices, and none but `close` waits.
+    `status` is "running", "paused", `AUTO_PAUSED` where it has paused by itself, or why the run
+    stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an exception, which
+        `error` holds. A fall or a failure is told at once; slices go
+    on with the controller off, as `settling_time` of `rollout` says, until the robot lies still, or
+    for 1.5 s at most. Calls act between slices, and none but `close` waits.
     """
 
     def __init__(
@@ -64,7 +75,12 @@ class LiveSimulation:
         if after_reset is not None:
             as_callable("after_reset", after_reset, "after_reset()")
         self.error: Exception | None = None
-        self._controller, self._show, self._actuators, self._after_reset = controller, show, actuators, after_reset
+        self._controller, self._show, self._actuators, self._after_reset = (
+            controller,
+            show,
+            actuators,
+            after_reset,
+        )
         self._period = as_positive("control_period", control_period, "s")
         self._slice_duration = _slice_duration_for(self._period)  # s
         self._idle_timeout = as_positive("idle_timeout", idle_timeout, "s")
@@ -75,7 +91,9 @@ class LiveSimulation:
         self._reset_requested = False
         self._calls: list[Callable[[], None]] = []
         self._status = "paused"
-        self._last_record: Rollout | None = None  # the last slice where the controller is off; only the thread has to do with it
+        self._last_record: Rollout | None = (
+            None  # the last slice where the controller is off; only the thread has to do with it
+        )
         self._listener: Callable[[str], None] | None = None
         self._last_call = time.monotonic()
         self._stop = threading.Event()  # ends the present thread; set while paused
@@ -94,19 +112,25 @@ class LiveSimulation:
 
     @property
     def is_simulating(self) -> bool:
-        """Whether the thread moves the robot: while the status is "running", and a little longer after a fall or failure."""
+        """Whether the thread moves the robot: while the status is "running", and a little longer
+        after a fall or failure.
+        """
         return not self._stop.is_set()
 
     def on_status(self, listener: Callable[[str], None] | None) -> None:
         """Call `listener(status)` whenever the status changes, in the thread that changed it."""
-        self._listener = None if listener is None else as_callable("listener", listener, "listener(status)")
+        self._listener = (
+            None if listener is None else as_callable("listener", listener, "listener(status)")
+        )
 
     def start(self) -> None:
         """Run, or go on after a pause. A fallen robot is put back on its feet."""
         self._request_run()
 
     def pause(self) -> None:
-        """Stop after the present slice; `start` goes on from there. What has stopped already stays as it is, or in mid-fall."""
+        """Stop after the present slice; `start` goes on from there. What has stopped already stays
+        as it is, or in mid-fall.
+        """
         with self._lock:
             self._stop.set()
             changed = self._status == "running" and self._set_status("paused")
@@ -117,7 +141,9 @@ class LiveSimulation:
         self._request_run(reset=True)
 
     def push(self, force: npt.ArrayLike, duration: float = 0.1, frame: str = "base") -> None:
-        """Push now, and run: as `Push`. A fallen robot is put back on its feet first, and the push begins with it, at 0 s."""
+        """Push now, and run: as `Push`. A fallen robot is put back on its feet first, and the push
+        begins with it, at 0 s.
+        """
         self._request_run(push=Push(force, 0.0, duration, frame))  # type: ignore[arg-type]
 
     def set_controller(
@@ -136,7 +162,11 @@ class LiveSimulation:
         as_callable("the controller", controller, "controller(q, v, t)")
         if actuators is not ...:
             check_actuators(actuators)
-        period = self._period if control_period is None else as_positive("control_period", control_period, "s")
+        period = (
+            self._period
+            if control_period is None
+            else as_positive("control_period", control_period, "s")
+        )
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
             if sim is not None and sim is not self.sim and self._status != "running":
@@ -146,7 +176,8 @@ class LiveSimulation:
             self._period, self._slice_duration = period, _slice_duration_for(period)
 
     def call_soon(self, call: Callable[[], None]) -> None:
-        """Call `call()` in the run's thread before its next slice, where nothing else touches the simulation.
+        """Call `call()` in the run's thread before its next slice, where nothing else touches the
+        simulation.
 
         An exception of it ends the run, as one of the controller does.
         """
@@ -169,7 +200,9 @@ class LiveSimulation:
             thread.join(_JOIN_TIMEOUT)
 
     def _request_run(self, reset: bool = False, push: Push | None = None) -> None:
-        """Run, after a reset where it is requested or needed: all under one lock, so that no slice comes between."""
+        """Run, after a reset where it is requested or needed: all under one lock, so that no slice
+        comes between.
+        """
         with self._lock:
             self._last_call = time.monotonic()
             if reset or self._status not in ACTIVE_STATUSES:
@@ -179,7 +212,9 @@ class LiveSimulation:
             if self._stop.is_set():
                 self._stop = threading.Event()
                 args = (self._stop, self._thread)
-                self._thread = threading.Thread(target=self._loop, args=args, name="floatbase-live", daemon=True)
+                self._thread = threading.Thread(
+                    target=self._loop, args=args, name="floatbase-live", daemon=True
+                )
                 self._thread.start()
             changed = self._set_status("running")
         self._notify(changed)
@@ -202,11 +237,15 @@ class LiveSimulation:
         while not stop.is_set():
             self._run_slice(stop)
             # a machine that falls behind does not catch up by more than a slice
-            due = max(due + self._slice_duration / self._time_scale, time.monotonic() - _SLICE_DURATION)
+            due = max(
+                due + self._slice_duration / self._time_scale, time.monotonic() - _SLICE_DURATION
+            )
             stop.wait(max(0.0, due - time.monotonic()))
 
     def _run_slice(self, stop: threading.Event) -> None:
-        """One slice of physics, shown; then go on, or stop because of its outcome or because nobody has called for long."""
+        """One slice of physics, shown; then go on, or stop because of its outcome or because nobody
+        has called for long.
+        """
         with self._lock:
             calls, self._calls = self._calls, []
         try:
@@ -224,21 +263,34 @@ class LiveSimulation:
                 sim, controller, actuators = self.sim, self._controller, self._actuators
                 period, duration = self._period, self._slice_duration
             now = sim.time
-            self._pushes = tuple(p for p in self._pushes if now < p.start + p.duration + PUSH_DISPLAY_TIME)
+            self._pushes = tuple(
+                p for p in self._pushes if now < p.start + p.duration + PUSH_DISPLAY_TIME
+            )
             self._pushes += tuple(replace(push, start=now) for push in requested)
-            active = active_pushes(self._pushes, now, now + duration)  # the others are only listed, to be seen
+            active = active_pushes(
+                self._pushes, now, now + duration
+            )  # the others are only listed, to be seen
             if self._last_record is None:
                 record = rollout(sim, controller, duration, active, period, actuators)
             else:
                 substeps = round(period / sim.timestep)
-                record = settling_rollout(sim, self._last_record, round(duration / period), substeps, active)
+                record = settling_rollout(
+                    sim, self._last_record, round(duration / period), substeps, active
+                )
             record = replace(record, pushes=self._pushes)
             self._last_record = record if record.controller_off_time is not None else None
             if len(record):
                 self._show(record)
-            outcome = record.outcome if record.error is None else f"{record.outcome}: {record.error}"
-        except Exception as error:  # whatever a learner's controller raises must show, or the picture just stands still
-            outcome, self.error, self._last_record = f"stopped: {type(error).__name__}: {error}", error, None
+            outcome = (
+                record.outcome if record.error is None else f"{record.outcome}: {record.error}"
+            )
+        except Exception as error:
+            # whatever a learner's controller raises must show, or the picture just stands still
+            outcome, self.error, self._last_record = (
+                f"stopped: {type(error).__name__}: {error}",
+                error,
+                None,
+            )
         with self._lock:
             if self._reset_requested:  # the outcome is about a robot that is put back next
                 return
@@ -257,7 +309,11 @@ class LiveSimulation:
     @property
     def _has_settled(self) -> bool:
         """Whether a robot whose controller is off lies still, or has had its time."""
-        since = self.sim.time - (self._last_record.controller_off_time or 0.0) if self._last_record is not None else 0.0
+        since = (
+            self.sim.time - (self._last_record.controller_off_time or 0.0)
+            if self._last_record is not None
+            else 0.0
+        )
         return is_at_rest(self.sim) or since >= _MAX_SETTLING_TIME
 
 

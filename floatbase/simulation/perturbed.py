@@ -1,4 +1,6 @@
-"""A simulation in which terms of (7) can be changed or switched off while it runs, to see what each of them does."""
+"""A simulation in which terms of (7) can be changed or switched off while it runs, to see what each
+of them does.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,16 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_bool, as_instance, as_positive, as_strings, cross
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_bool,
+    as_instance,
+    as_positive,
+    as_strings,
+    cross,
+)
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground
@@ -18,15 +29,17 @@ from floatbase.simulation.physics import Push, Simulation
 
 @dataclass(frozen=True, eq=False)
 class Perturbation(Value):
-    """What holds in a `PerturbedSimulation` instead of (7), M q̈ + h = S τ + Jᵀ λ. The defaults are physics as it is.
+    """What holds in a `PerturbedSimulation` instead of (7), M q̈ + h = S τ + Jᵀ λ. The defaults are
+    physics as it is.
 
     mass: all masses and inertias as a multiple of the robot's own, M and h.
     gravity: whether there is gravity.
-    velocity_forces: whether there are Coriolis and centrifugal forces, the part of h that grows with the velocity, in the
-        coordinates of (7); else they are cancelled at every timestep.
+    velocity_forces: whether there are Coriolis and centrifugal forces, the part of h that grows
+        with the velocity, in the coordinates of (7); else they are cancelled at every timestep.
     friction: coefficient of all feet on the ground; None leaves the ground's.
     disabled_contacts: names of contact points that go through the ground, so that Jᵀ λ lacks them.
-    adhesion_force: N, with which the ground pulls each contact point that touches it: so much nᵀ λ may be negative.
+    adhesion_force: N, with which the ground pulls each contact point that touches it: so much nᵀ λ
+        may be negative.
     """
 
     mass: float = 1.0
@@ -37,28 +50,52 @@ class Perturbation(Value):
     adhesion_force: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", as_positive("mass of the perturbation, as a multiple of the robot's,", self.mass))
-        object.__setattr__(self, "disabled_contacts", as_strings("disabled_contacts", self.disabled_contacts))
-        object.__setattr__(self, "adhesion_force", as_positive("adhesion_force of the ground", self.adhesion_force, "N", allow_zero=True))
+        object.__setattr__(
+            self,
+            "mass",
+            as_positive("mass of the perturbation, as a multiple of the robot's,", self.mass),
+        )
+        object.__setattr__(
+            self, "disabled_contacts", as_strings("disabled_contacts", self.disabled_contacts)
+        )
+        object.__setattr__(
+            self,
+            "adhesion_force",
+            as_positive("adhesion_force of the ground", self.adhesion_force, "N", allow_zero=True),
+        )
         if self.friction is not None:
-            object.__setattr__(self, "friction", as_positive("friction coefficient of the perturbation", self.friction))
+            object.__setattr__(
+                self,
+                "friction",
+                as_positive("friction coefficient of the perturbation", self.friction),
+            )
         for name in ("gravity", "velocity_forces"):
             as_bool(name, getattr(self, name))
 
 
 class PerturbedSimulation(Simulation):
-    """A `Simulation` whose `perturbation` can be set at any time, and that can push the base as if it had motors of its own.
+    """A `Simulation` whose `perturbation` can be set at any time, and that can push the base as if
+    it had motors of its own.
 
     robot, ground, timestep: as for `Simulation`. perturbation: what holds at first.
     """
 
-    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3, perturbation: Perturbation | None = None):
+    def __init__(
+        self,
+        robot: Robot,
+        ground: Ground | float = 1.0,
+        timestep: float = 1e-3,
+        perturbation: Perturbation | None = None,
+    ):
         as_instance("robot", robot, Robot)
         self._perturbation = Perturbation()
         self._base_wrench: Array = np.zeros(6)
         super().__init__(robot, ground, timestep)
         model = self.model
-        self._nominal = {name: np.array(getattr(model, name)) for name in ("body_mass", "body_inertia", "dof_armature")}
+        self._nominal = {
+            name: np.array(getattr(model, name))
+            for name in ("body_mass", "body_inertia", "dof_armature")
+        }
         self._nominal_gravity = np.array(model.opt.gravity)
         self.perturbation = Perturbation() if perturbation is None else perturbation
 
@@ -77,20 +114,31 @@ class PerturbedSimulation(Simulation):
         for name, nominal in self._nominal.items():
             getattr(model, name)[:] = perturbation.mass * nominal
         model.opt.gravity[:] = perturbation.gravity * self._nominal_gravity
-        model.geom_friction[:, 0] = self.ground.mu if perturbation.friction is None else perturbation.friction
+        model.geom_friction[:, 0] = (
+            self.ground.mu if perturbation.friction is None else perturbation.friction
+        )
         model.geom_conaffinity[self._foot_geoms] = 1
-        model.geom_conaffinity[[self._foot_geoms[self.point_names.index(name)] for name in perturbation.disabled_contacts]] = 0
+        model.geom_conaffinity[
+            [
+                self._foot_geoms[self.point_names.index(name)]
+                for name in perturbation.disabled_contacts
+            ]
+        ] = 0
         mujoco.mj_setConst(model, self._scratch)
 
     @property
     def base_wrench(self) -> Array:
-        """Force and moment of motors that the base does not have, shape (6,), N and N·m, at its origin in its axes."""
+        """Force and moment of motors that the base does not have, shape (6,), N and N·m, at its
+        origin in its axes.
+        """
         return self._base_wrench
 
     @base_wrench.setter
     def base_wrench(self, wrench: npt.ArrayLike) -> None:
         if not self.robot.is_floating:
-            raise InputError(f"{self.robot.name} is bolted to the ground; only a floating base has a wrench.")
+            raise InputError(
+                f"{self.robot.name} is bolted to the ground; only a floating base has a wrench."
+            )
         self._base_wrench = as_array("base_wrench", wrench, (6,), "N and N·m")
 
     def reset(self, state: State | None = None) -> None:
@@ -109,15 +157,18 @@ class PerturbedSimulation(Simulation):
         if self._base_wrench.any():
             R = np.empty(9)
             mujoco.mju_quat2Mat(R, data.qpos[3:7])
-            applied[:3] += R.reshape(3, 3) @ self._base_wrench[:3]  # MuJoCo: linear in world axes, angular in the base's
+            applied[:3] += (
+                R.reshape(3, 3) @ self._base_wrench[:3]
+            )  # MuJoCo: linear in world axes, angular in the base's
             applied[3:6] += self._base_wrench[3:]
         super().advance(tau, pushes)
 
     def _velocity_compensation(self) -> Array:
         """The forces, as MuJoCo takes them, that cancel what h of (7) has because of the velocity.
 
-        MuJoCo's bias forces less those at rest are that for its own coordinates, in which the base's velocity is along world
-        axes. In (7) it is along the base's own, which turn: M times ω × v of the base comes to it.
+        MuJoCo's bias forces less those at rest are that for its own coordinates, in which the
+        base's velocity is along world axes. In (7) it is along the base's own, which turn: M times
+        ω × v of the base comes to it.
         """
         scratch = self._scratch
         scratch.qpos[:], scratch.qvel[:] = self.data.qpos, self.data.qvel
@@ -143,16 +194,22 @@ class PerturbedSimulation(Simulation):
             if ball in balls:
                 force = -self._perturbation.adhesion_force * self.ground.normals[plane]
                 position, body = self.data.geom_xpos[ball], int(self.model.geom_bodyid[ball])
-                mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), position, body, applied)
+                mujoco.mj_applyFT(
+                    self.model, self.data, force, np.zeros(3), position, body, applied
+                )
 
-    def _contact_forces_from(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
+    def _contact_forces_from(
+        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
+    ) -> Array:
         """As there, less the adhesion force: the force between ground and foot."""
         forces = super()._contact_forces_from(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
             rows, columns = np.nonzero(np.isin(foot_geoms, self._upright_foot_geoms))
             points = np.argmax(foot_geoms[rows, columns, None] == self._upright_foot_geoms, axis=1)
-            forces[rows, points] -= self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
+            forces[rows, points] -= (
+                self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
+            )
         return forces
 
     def _refresh_views(self) -> None:

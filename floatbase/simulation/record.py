@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_bool, as_integer, cached_property, frozen, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_bool,
+    as_integer,
+    cached_property,
+    frozen,
+    read_only,
+)
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -30,22 +38,26 @@ class Rollout(Value):
     Before the tick:
     time: (n,) s, the simulation's clock.
     q, v: (n, nq) and (n, nv), as in `State`.
-    foot_positions: (n, points, 3) m, world, of the contacts' points; NaN for points that the physics does not have.
+    foot_positions: (n, points, 3) m, world, of the contacts' points; NaN for points that the
+        physics does not have.
 
     During the tick:
     tau: (n, d) N·m, the torques applied, within the motors' limits; their mean.
     tau_desired: (n, d) N·m, the controller's.
-    planned: (n, k) N, world, the controller's forces at `contacts`: 0 at those that its stance did not have, NaN where it
-        gave no forces.
-    measured: (n, k) N, world, the physics' forces at `contacts`, whether or not the stance had them; their mean. NaN for
-        contacts that the physics does not have.
+    planned: (n, k) N, world, the controller's forces at `contacts`: 0 at those that its stance did
+        not have, NaN where it gave no forces.
+    measured: (n, k) N, world, the physics' forces at `contacts`, whether or not the stance had
+        them; their mean. NaN for contacts that the physics does not have.
 
     pushes: those handed to `rollout`.
-    outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or "controller failed".
-    error: of a controller that failed: the exception it raised, or one that names the NaN or infinite torque it gave.
+    outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or
+        "controller failed".
+    error: of a controller that failed: the exception it raised, or one that names the NaN or
+        infinite torque it gave.
     stances: the controller's contacts at each row; empty where they were `contacts` throughout.
-    controller_off_time: s, from when on the controller is off, since the robot fell or the controller failed; None in other cases. A rollout
-        that settles has rows from then on: τ_desired is that of the joint damping, planned forces are NaN.
+    controller_off_time: s, from when on the controller is off, since the robot fell or the
+        controller failed; None in other cases. A rollout that settles has rows from then on:
+        τ_desired is that of the joint damping, planned forces are NaN.
     """
 
     robot: Robot
@@ -78,10 +90,14 @@ class Rollout(Value):
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
-        """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a flat foot the resultant."""
+        """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a
+        flat foot the resultant.
+        """
         if not isinstance(kind, str) or kind not in ("measured", "planned"):
             raise unknown_name("kind of force", kind, ("measured", "planned"))
-        return self.contacts.force_of(self.measured if kind == "measured" else self.planned, contact)
+        return self.contacts.force_of(
+            self.measured if kind == "measured" else self.planned, contact
+        )
 
     @property
     def final(self) -> State:
@@ -90,8 +106,12 @@ class Rollout(Value):
         return self.state(-1)
 
     def plot(self) -> Figure:
-        """A figure of the record: centre of mass, normal forces, friction used, torques. More: `floatbase.viewer.plots`."""
-        figure: Figure = import_module("floatbase.viewer").plots.plot_run(self)  # a floor above, which loads when first used
+        """A figure of the record: centre of mass, normal forces, friction used, torques. More:
+        `floatbase.viewer.plots`.
+        """
+        figure: Figure = import_module("floatbase.viewer").plots.plot_run(
+            self
+        )  # a floor above, which loads when first used
         return figure
 
     @cached_property
@@ -103,11 +123,13 @@ class Rollout(Value):
         return read_only(com)
 
     def slip(self, include_rolling: bool = True) -> Array:
-        """How far each contact point strayed, at most, from where it began to stand, shape (points,), m.
+        """How far each contact point strayed, at most, from where it began to stand, shape
+        (points,), m.
 
         It stands while the controller's stance has it; 0 where it never did.
 
-        include_rolling: whether the way that a ball rolls counts, too: its lowest point moves with it, and nothing slides.
+        include_rolling: whether the way that a ball rolls counts, too: its lowest point moves with
+            it, and nothing slides.
         """
         self._check_not_empty()
         positions = (
@@ -119,12 +141,16 @@ class Rollout(Value):
         for contact in self.contacts:
             points = slice(first, first := first + len(contact.point_names))
             for begin, end in self._stance_intervals(contact.name):
-                distance = np.linalg.norm(positions[begin:end, points] - positions[begin, points], axis=2).max(axis=0)
+                distance = np.linalg.norm(
+                    positions[begin:end, points] - positions[begin, points], axis=2
+                ).max(axis=0)
                 max_distance[points] = np.maximum(max_distance[points], distance)
         return read_only(max_distance)
 
     def _stance_intervals(self, contact: str) -> list[tuple[int, int]]:
-        """First row, and the row after the last, of each time that the controller's stance has a contact."""
+        """First row, and the row after the last, of each time that the controller's stance has a
+        contact.
+        """
         if not self.stances:
             return [(0, len(self))]
         in_stance = {stance: contact in stance.names for stance in dict.fromkeys(self.stances)}
@@ -133,7 +159,9 @@ class Rollout(Value):
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
     def rolling_displacement(self) -> Array:
-        """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω × radius · normal."""
+        """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω ×
+        radius · normal.
+        """
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
             for contact in self.contacts
@@ -143,13 +171,19 @@ class Rollout(Value):
         if any(np.any(arm) for _, arm in arms):
             for rate, q, v in zip(rates, self.q, self.v, strict=True):
                 state = State(self.robot, q, v)
-                rate[:] = [np.cross(state.frame_velocity(name)[3:], arm) if np.any(arm) else np.zeros(3) for name, arm in arms]
+                rate[:] = [
+                    np.cross(state.frame_velocity(name)[3:], arm) if np.any(arm) else np.zeros(3)
+                    for name, arm in arms
+                ]
         steps = np.diff(self.time)[:, None, None] * (rates[1:] + rates[:-1]) / 2.0
         return np.concatenate([np.zeros((1, len(arms), 3)), np.cumsum(steps, axis=0)])
 
     def _check_not_empty(self) -> None:
         if not len(self):
-            raise InputError(f"this record is empty: {self.outcome}{'' if self.error is None else f', {self.error}'}")
+            raise InputError(
+                f"this record is empty: "
+                f"{self.outcome}{'' if self.error is None else f', {self.error}'}"
+            )
 
     def __repr__(self) -> str:
         span = f"{len(self)} rows to {self.time[-1]:.3f} s" if len(self) else "no row"
@@ -157,7 +191,8 @@ class Rollout(Value):
 
 
 class Recorder:
-    """Collects the rows of a rollout that begins in a stance: `before_tick`, `after_step` and `complete_tick` in each tick.
+    """Collects the rows of a rollout that begins in a stance: `before_tick`, `after_step` and
+    `complete_tick` in each tick.
 
     ticks: at most so many rows. substeps: timesteps in each.
     """
@@ -165,7 +200,11 @@ class Recorder:
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
         self._sim, self._initial_stance, self._substeps, self._n = sim, stance, substeps, 0
         d, points = sim.robot.d, len(sim.point_names)
-        self._time, self._q, self._v = np.empty(ticks), np.empty((ticks, sim.robot.nq)), np.empty((ticks, sim.robot.nv))
+        self._time, self._q, self._v = (
+            np.empty(ticks),
+            np.empty((ticks, sim.robot.nq)),
+            np.empty((ticks, sim.robot.nv)),
+        )
         self._tau_desired = np.empty((ticks, d))
         # MuJoCo's own numbers, which `to_rollout` turns into ours, all rows at once
         self._refresh_views()
@@ -180,10 +219,15 @@ class Recorder:
 
     def _refresh_views(self) -> None:
         """Views into the memory of MuJoCo's data."""
-        self._geom_positions, self._actuator_forces = self._sim.data.geom_xpos, self._sim.data.actuator_force
+        self._geom_positions, self._actuator_forces = (
+            self._sim.data.geom_xpos,
+            self._sim.data.actuator_force,
+        )
 
     def enable_link_collisions(self) -> None:
-        """Go on with links that touch. Timesteps of a tick that was begun and is not completed are forgotten."""
+        """Go on with links that touch. Timesteps of a tick that was begun and is not completed are
+        forgotten.
+        """
         self._sim.link_collisions = True
         self._refresh_views()
         first = self._n * self._substeps
@@ -195,17 +239,24 @@ class Recorder:
         """Keep clock, state and feet before a tick. They count when `complete_tick` does."""
         n = self._n
         self._time[n], self._q[n], self._v[n] = t, q, v
-        self._geom_positions.take(self._sim._foot_geoms, 0, self._foot_centres[n], "clip")  # "clip": it is the fastest
+        self._geom_positions.take(
+            self._sim._foot_geoms, 0, self._foot_centres[n], "clip"
+        )  # "clip": it is the fastest
 
     def after_step(self) -> None:
         """Keep what motors and ground did in a timestep of the tick."""
         i, (geoms, forces) = self._n_steps, self._sim._raw_contacts()
         self._step_actuator_forces[i] = self._actuator_forces
-        self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = geoms, forces
+        self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = (
+            geoms,
+            forces,
+        )
         self._n_steps += 1
 
     def complete_tick(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
-        """Complete the row: the controller's torques (d,), N·m, its stance, and the forces (k,), N, it planned there."""
+        """Complete the row: the controller's torques (d,), N·m, its stance, and the forces (k,), N,
+        it planned there.
+        """
         n = self._n
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
@@ -224,14 +275,17 @@ class Recorder:
         error: FloatbaseError | None = None,
         controller_off_time: float | None = None,
     ) -> Rollout:
-        """The record. Raises `InputError` where a contact was of one kind in one stance and of another in a later one."""
+        """The record. Raises `InputError` where a contact was of one kind in one stance and of
+        another in a later one.
+        """
         contacts = self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
             if contact.name not in contacts.names:
                 contacts += Contacts([contact])
             elif contact.k != contacts[contact.name].k:
                 raise InputError(
-                    f"contact {contact.name} had {contacts[contact.name].k} force numbers at first and now has {contact.k}; "
+                    f"contact {contact.name} had {contacts[contact.name].k} force numbers at first "
+                    f"and now has {contact.k}; "
                     "in one rollout it must stay a point, or a flat foot."
                 )
         measured, positions = self._measured_at(contacts)
@@ -241,7 +295,9 @@ class Recorder:
             time=self._complete_rows(self._time),
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
-            tau=self._mean_over_substeps(self._sim._torques_from(self._step_actuator_forces[: self._n * self._substeps])),
+            tau=self._mean_over_substeps(
+                self._sim._torques_from(self._step_actuator_forces[: self._n * self._substeps])
+            ),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
             measured=measured,
@@ -249,7 +305,9 @@ class Recorder:
             pushes=pushes,
             outcome=outcome,
             error=error,
-            stances=() if all(stance is contacts for stance in self._stances) else tuple(self._stances),
+            stances=()
+            if all(stance is contacts for stance in self._stances)
+            else tuple(self._stances),
             controller_off_time=controller_off_time,
         )
 
@@ -260,7 +318,10 @@ class Recorder:
     def _mean_over_substeps(self, steps: Array) -> Array:
         """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""
         if self._substeps > 1:
-            steps = steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1) / self._substeps
+            steps = (
+                steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1)
+                / self._substeps
+            )
         return read_only(steps)
 
     def _planned_at(self, contacts: Contacts) -> Array:
@@ -270,25 +331,34 @@ class Recorder:
         for i in self._rows_with_plan:
             rows[self._stances[i]].append(i)
         for stance, stance_rows in rows.items():
-            entries = [i for name in stance.names for i in entries_of_all[contacts.force_slice(name)]]
+            entries = [
+                i for name in stance.names for i in entries_of_all[contacts.force_slice(name)]
+            ]
             forces[stance_rows] = 0.0
             forces[np.ix_(stance_rows, entries)] = self._planned_forces[stance_rows, : stance.k]
         return read_only(forces)
 
     def _measured_at(self, contacts: Contacts) -> tuple[Array, Array]:
-        """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics' feet; NaN where it has none.
+        """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics'
+        feet; NaN where it has none.
 
-        A point contact in the middle of a flat foot takes the sum of its corners' forces and the mean of their positions.
+        A point contact in the middle of a flat foot takes the sum of its corners' forces and the
+        mean of their positions.
         """
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
-            sim._contact_forces_from(self._step_contact_geoms[steps], self._step_contact_forces[steps])
+            sim._contact_forces_from(
+                self._step_contact_geoms[steps], self._step_contact_forces[steps]
+            )
         )
         lowest = sim._lowest_points(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
-            forces, positions = np.full((n, contact.k), np.nan), np.full((n, len(contact.point_names), 3), np.nan)
+            forces, positions = (
+                np.full((n, contact.k), np.nan),
+                np.full((n, len(contact.point_names), 3), np.nan),
+            )
             if contact.name in feet.names:
                 part = feet.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
@@ -299,4 +369,6 @@ class Recorder:
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)
             all_positions.append(positions)
-        return read_only(np.concatenate(all_forces, axis=1)), read_only(np.concatenate(all_positions, axis=1))
+        return read_only(np.concatenate(all_forces, axis=1)), read_only(
+            np.concatenate(all_positions, axis=1)
+        )

@@ -24,12 +24,20 @@ from floatbase._validation import signature_error
 from floatbase.errors import InputError, SimulationError
 from floatbase.simulation.table import RESERVED_NAMES, Row, RowStore, Table, as_json_value
 
-_WORKER_IDLE_TIMEOUT = 60.0  # s after which a worker without work ends; the next sweep within them saves its start
-_PARENT_CHECK_PERIOD = 1.0  # s between a worker's looks whether the program that started it is still there
+_WORKER_IDLE_TIMEOUT = (
+    60.0  # s after which a worker without work ends; the next sweep within them saves its start
+)
+_PARENT_CHECK_PERIOD = (
+    1.0  # s between a worker's looks whether the program that started it is still there
+)
 _POINTS_PER_WORKER = 2  # points handed out for each worker: one that it is at, and the next
-_MIN_CLUSTER_THREADS = 32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
+_MIN_CLUSTER_THREADS = (
+    32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
+)
 _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
-_SINGLE_THREAD_ENV = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1")
+_SINGLE_THREAD_ENV = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
 
 
 def sweep(
@@ -42,53 +50,74 @@ def sweep(
     cluster: Any = None,
     progress: bool = True,
 ) -> Table:
-    """Call a function at every point of a grid, in several processes, and collect what it returns in a table.
+    """Call a function at every point of a grid, in several processes, and collect what it returns
+    in a table.
 
         def setup():                                         # heavy things, made once in each process
             robot = fb.load("go2")
-            controller = fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7), fb.standing_tasks(robot.standing()))
-            return fb.Simulation(robot), controller
+            controller = fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7),
+            fb.standing_tasks(robot.standing())) return fb.Simulation(robot), controller
 
         def push(made, force, angle):
             sim, controller = made
             sim.reset()
-            run = fb.rollout(sim, controller, 0.6, [fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0])])
-            return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
+            run = fb.rollout(sim, controller, 0.6, [fb.Push([force * np.cos(angle), force *
+            np.sin(angle), 0.0])]) return {"outcome": run.outcome, "moved": run.com[-1] -
+            run.com[0]}
 
         grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
         table = fb.sweep(push, grid, setup=setup, file="pushes.jsonl")
 
-    function: takes the parameters by their names, after what `setup` returned where there is one. It returns a dict, a column
-        for each name, or one value, the column "result": numbers, texts, booleans, lists and numpy arrays. An exception makes
-        the row's "error", and the sweep goes on.
-    grid: name -> values, for all combinations, the last name the fastest; or a list of dicts, one for each point.
-    setup: called once in each process (on Dask in each thread), for what is heavy or cannot be sent.
-    file: path of a file that keeps each row as it comes. The same sweep into the same file goes on where it was ended, however
-        it was; two points for each worker are lost at most. The function is known by its name: after changing what it does,
-        give another file. A file of another function or grid is refused. `Table.read` reads a file.
-    workers: how many processes, by default as many as the machine has cores for this program. Each uses one thread for
-        linear algebra, so that the rows are the same, bit for bit, whatever their number.
-    cluster: a `dask.distributed.Client`, or the address of a scheduler, to work there: pip install "floatbase[cluster]".
+    function: takes the parameters by their names, after what `setup` returned where there is one.
+        It returns a dict, a column for each name, or one value, the column "result": numbers,
+        texts, booleans, lists and numpy arrays. An exception makes the row's "error", and the sweep
+        goes on.
+    grid: name -> values, for all combinations, the last name the fastest; or a list of dicts, one
+        for each point.
+    setup: called once in each process (on Dask in each thread), for what is heavy or cannot be
+        sent.
+    file: path of a file that keeps each row as it comes. The same sweep into the same file goes on
+        where it was ended, however it was; two points for each worker are lost at most. The
+        function is known by its name: after changing what it does, give another file. A file of
+        another function or grid is refused. `Table.read` reads a file.
+    workers: how many processes, by default as many as the machine has cores for this program. Each
+        uses one thread for linear algebra, so that the rows are the same, bit for bit, whatever
+        their number.
+    cluster: a `dask.distributed.Client`, or the address of a scheduler, to work there: pip install
+        "floatbase[cluster]".
     progress: whether to show a bar.
 
-    Functions, lambdas and classes of a notebook or script can be used: they are sent by value. What is imported must be
-    importable by the workers.
-    Raises `InputError` for a grid that does not fit the function, for an answer that cannot be stored, for a file of
-    something else or that takes no more, as on a full disc; `SimulationError` when a process or the cluster breaks down; and
-    what `setup` raises. What is in the file stays there, after an interrupt too.
+    Functions, lambdas and classes of a notebook or script can be used: they are sent by value. What
+    is imported must be importable by the workers.
+    Raises `InputError` for a grid that does not fit the function, for an answer that cannot be
+    stored, for a file of something else or that takes no more, as on a full disc; `SimulationError`
+    when a process or the cluster breaks down; and what `setup` raises. What is in the file stays
+    there, after an interrupt too.
     """
     points = _grid_points(grid)
-    json_points = [{name: as_json_value(f"parameter {name}", value) for name, value in point.items()} for point in points]
+    json_points = [
+        {name: as_json_value(f"parameter {name}", value) for name, value in point.items()}
+        for point in points
+    ]
     name = _function_name(function, file)
     _check_function(function, setup, points)
     if cluster is not None and workers is not None:
-        raise InputError("workers counts processes on this machine; a cluster has its own. Leave one of the two out.")
+        raise InputError(
+            "workers counts processes on this machine; a cluster has its own. Leave one of the two "
+            "out."
+        )
     workers = _worker_count(workers)
     job = _make_job(function, setup)
     with closing(RowStore(file, name, json_points)) as store:
         pending = [i for i in range(len(points)) if i not in store.rows]
         failed = sum(row["error"] is not None for row in store.rows.values())
-        bar = tqdm(total=len(points), initial=len(store.rows), desc=name, unit="point", disable=not progress)
+        bar = tqdm(
+            total=len(points),
+            initial=len(store.rows),
+            desc=name,
+            unit="point",
+            disable=not progress,
+        )
         with bar, _open_pool(workers, cluster, bool(pending)) as pool:
             for i, answer in _completed_points(pool, job, points, pending):
                 store.add(i, json_points[i] | answer)
@@ -100,7 +129,9 @@ def sweep(
 
 
 class _Job(NamedTuple):
-    """What a worker needs for all points: `payload` is function and setup, pickled, and `token` says of which sweep."""
+    """What a worker needs for all points: `payload` is function and setup, pickled, and `token`
+    says of which sweep.
+    """
 
     token: str
     payload: bytes
@@ -112,24 +143,39 @@ def _grid_points(grid: Any) -> list[Row]:
         axes = {}
         for name, values in grid.items():
             if isinstance(values, str) or not isinstance(values, Iterable):
-                raise InputError(f"the grid's {name!r} must be a list of values, not {values!r}; for one value, [{values!r}].")
+                raise InputError(
+                    f"the grid's {name!r} must be a list of values, not {values!r}; for one value, "
+                    f"[{values!r}]."
+                )
             axes[name] = list(values)
             if not axes[name]:
                 raise InputError(f"the grid's {name!r} has no values, so the grid has no points.")
-        points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())] if axes else []
+        points = (
+            [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+            if axes
+            else []
+        )
     elif isinstance(grid, Iterable) and not isinstance(grid, str):
         points = list(grid)
         for point in points:
             if not isinstance(point, Mapping):
-                raise InputError(f"a grid that is a list holds a dict for each point, name -> value; it has {point!r}.")
+                raise InputError(
+                    f"a grid that is a list holds a dict for each point, name -> value; it has "
+                    f"{point!r}."
+                )
         points = [dict(point) for point in points]
     else:
-        raise InputError(f"the grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}.")
+        raise InputError(
+            f"the grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
+        )
     if not points:
         raise InputError("the grid has no points.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
-            raise InputError(f"a parameter cannot be called {name!r}; {' and '.join(RESERVED_NAMES)} are the table's own names.")
+            raise InputError(
+                f"a parameter cannot be called {name!r}; {' and '.join(RESERVED_NAMES)} are the "
+                f"table's own names."
+            )
     return points
 
 
@@ -140,27 +186,36 @@ def _function_name(function: Any, file: Any) -> str:
     name = getattr(function, "__qualname__", None)
     if file is not None and (name is None or name.endswith("<lambda>")):
         raise InputError(
-            f"a file knows its function by its name, and {function!r} has none: write it as a def, and its constants as "
+            f"a file knows its function by its name, and {function!r} has none: write it as a def, "
+            f"and its constants as "
             "parameters of the grid."
         )
     return type(function).__name__ if name is None else name.rpartition("<locals>.")[2]
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
-    """Raise `InputError` for parameters that the function does not take, and for a setup that is no function."""
+    """Raise `InputError` for parameters that the function does not take, and for a setup that is no
+    function.
+    """
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)
     for names in dict.fromkeys(tuple(point) for point in points):
         if fault := signature_error(function, *made, **dict.fromkeys(names)):
-            raise InputError(f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; {fault}.")
+            raise InputError(
+                f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; "
+                f"{fault}."
+            )
 
 
 def _worker_count(workers: Any) -> int:
     if workers is None:
         return int(loky.cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
-        raise InputError(f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one on each core.")
+        raise InputError(
+            f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
+            f"on each core."
+        )
     return int(workers)
 
 
@@ -169,13 +224,16 @@ def _make_job(function: Any, setup: Any) -> _Job:
         return _Job(uuid.uuid4().hex, cloudpickle.dumps((function, setup)))
     except Exception as error:
         raise InputError(
-            f"the function cannot be sent to other processes ({type(error).__name__}: {error}). Make what it uses in a "
+            f"the function cannot be sent to other processes ({type(error).__name__}: {error}). "
+            f"Make what it uses in a "
             "function, and hand that in as setup."
         ) from error
 
 
 class _Pool(NamedTuple):
-    """Who computes: an executor, and how many points it is given at a time; no others are lost when the program is killed."""
+    """Who computes: an executor, and how many points it is given at a time; no others are lost when
+    the program is killed.
+    """
 
     executor: Executor
     max_pending: int
@@ -183,12 +241,18 @@ class _Pool(NamedTuple):
 
 @contextmanager
 def _open_pool(workers: int, cluster: Any, needed: bool) -> Iterator[_Pool | None]:
-    """Processes on this machine or the cluster's; what is not done when an exception comes is dropped."""
+    """Processes on this machine or the cluster's; what is not done when an exception comes is
+    dropped.
+    """
     if not needed:
         yield None
     elif cluster is None:
         executor = loky.get_reusable_executor(
-            workers, timeout=_WORKER_IDLE_TIMEOUT, initializer=_exit_with_parent, initargs=(os.getpid(),), env=_SINGLE_THREAD_ENV
+            workers,
+            timeout=_WORKER_IDLE_TIMEOUT,
+            initializer=_exit_with_parent,
+            initargs=(os.getpid(),),
+            env=_SINGLE_THREAD_ENV,
         )
         try:
             yield _Pool(executor, _POINTS_PER_WORKER * workers)
@@ -199,7 +263,10 @@ def _open_pool(workers: int, cluster: Any, needed: bool) -> Iterator[_Pool | Non
         with _dask_client(cluster) as client:
             executor = client.get_executor(pure=False)
             try:
-                yield _Pool(executor, _POINTS_PER_WORKER * max(sum(client.nthreads().values()), _MIN_CLUSTER_THREADS))
+                yield _Pool(
+                    executor,
+                    _POINTS_PER_WORKER * max(sum(client.nthreads().values()), _MIN_CLUSTER_THREADS),
+                )
             finally:
                 executor.shutdown(wait=False)
 
@@ -218,20 +285,25 @@ def _dask_client(cluster: Any) -> Iterator[Any]:
         yield cluster
         return
     if not isinstance(cluster, str):
-        raise InputError(f"cluster must be a dask.distributed.Client or a scheduler's address, not {cluster!r}.")
+        raise InputError(
+            f"cluster must be a dask.distributed.Client or a scheduler's address, not {cluster!r}."
+        )
     try:
         parse_host_port(cluster)
         client = Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {cluster} ({error}). An address looks like tcp://127.0.0.1:8786; "
+            f"no Dask scheduler answers at {cluster} ({error}). An address looks like "
+            f"tcp://127.0.0.1:8786; "
             "`dask scheduler` prints its own."
         ) from None
     with client:
         yield client
 
 
-def _completed_points(pool: _Pool | None, job: _Job, points: list[Row], pending: list[int]) -> Iterator[tuple[int, Row]]:
+def _completed_points(
+    pool: _Pool | None, job: _Job, points: list[Row], pending: list[int]
+) -> Iterator[tuple[int, Row]]:
     """Number and answer of each open point, as they come."""
     if pool is None:
         return
@@ -250,7 +322,8 @@ def _completed_points(pool: _Pool | None, job: _Job, points: list[Row], pending:
                 yield indices.pop(future), answer
     except BrokenExecutor as error:
         raise SimulationError(
-            "a worker process ended in the middle of a point: it was out of memory, where fewer workers help, or compiled "
+            "a worker process ended in the middle of a point: it was out of memory, where fewer "
+            "workers help, or compiled "
             "code crashed."
         ) from error
 
@@ -262,15 +335,21 @@ def _future_result(future: Future[Row | Exception]) -> Row | Exception:
     except BrokenExecutor:
         raise
     except Exception as error:
-        raise SimulationError(f"the cluster broke down at a point ({type(error).__name__}: {error}).") from error
+        raise SimulationError(
+            f"the cluster broke down at a point ({type(error).__name__}: {error})."
+        ) from error
 
 
 _parent_pid: int | None = None  # in a process of this machine: the program that started it
-_this_thread = threading.local()  # of a worker's thread: function and token of the sweep that it works for
+_this_thread = (
+    threading.local()
+)  # of a worker's thread: function and token of the sweep that it works for
 
 
 def _run_point(job: _Job, point: Row) -> Row | Exception:
-    """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would log it for each point."""
+    """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would
+    log it for each point.
+    """
     _exit_if_orphaned()
     try:
         return _evaluate(job, point)
@@ -287,20 +366,31 @@ def _evaluate(job: _Job, point: Row) -> Row:
             function, setup = pickle.loads(job.payload)
         except (ImportError, AttributeError) as error:
             raise InputError(
-                f"a worker cannot load the function: {error}. The workers must be able to import the module that it is "
-                "from. Functions of a notebook or a script are sent whole, but for those that lru_cache wraps: use setup."
+                f"a worker cannot load the function: {error}. The workers must be able to import "
+                f"the module that it is "
+                "from. Functions of a notebook or a script are sent whole, but for those that "
+                "lru_cache wraps: use setup."
             ) from error
         _this_thread.function = function if setup is None else partial(function, setup())
         _this_thread.token = job.token
     try:
         answer = _this_thread.function(**point)
-    except (Exception, SystemExit) as error:  # sys.exit would end the program that sweeps, without a word
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # sys.exit would end the program that sweeps, without a word
         return {"error": f"{type(error).__name__}: {error}"}
     results = answer if isinstance(answer, Mapping) else {"result": answer}
     for name in results:
         if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
-            raise InputError(f"the function's result {name!r} must be called otherwise: a text that names no parameter.")
-    return {name: as_json_value(f"the function's result {name!r}", value) for name, value in results.items()} | {"error": None}
+            raise InputError(
+                f"the function's result {name!r} must be called otherwise: a text that names no "
+                f"parameter."
+            )
+    return {
+        name: as_json_value(f"the function's result {name!r}", value)
+        for name, value in results.items()
+    } | {"error": None}
 
 
 def _exit_with_parent(parent: int) -> None:

@@ -25,8 +25,9 @@ Row = dict[str, Any]
 class Table(Value):
     """Rows with named columns: one row for each point of a sweep's grid, in the grid's order.
 
-    rows: name -> value, for each point: its parameters, then what the function returned, then "error": None, or type and
-        message of the exception that ended this point. Values are numbers, texts, booleans, lists and None.
+    rows: name -> value, for each point: its parameters, then what the function returned, then
+        "error": None, or type and message of the exception that ended this point. Values are
+            numbers, texts, booleans, lists and None.
 
     `table["force"]` is a column as an array, `table.to_pandas()` a DataFrame.
     """
@@ -35,7 +36,9 @@ class Table(Value):
 
     @classmethod
     def read(cls, path: str | Path) -> Table:
-        """The table in the file of a sweep, also while the sweep goes on: the points that are done. `InputError` for others."""
+        """The table in the file of a sweep, also while the sweep goes on: the points that are done.
+        `InputError` for others.
+        """
         try:
             content = Path(path).read_bytes()
         except OSError as error:
@@ -58,7 +61,9 @@ class Table(Value):
         return len(self.rows)
 
     def __getitem__(self, column: str) -> npt.NDArray[Any]:
-        """A column as a read-only array; where a row has no number there is NaN, where it has nothing else None."""
+        """A column as a read-only array; where a row has no number there is NaN, where it has
+        nothing else None.
+        """
         if not isinstance(column, str) or column not in self.columns:
             raise unknown_name("column", column, self.columns, "table.rows are its rows.")
         values = [row.get(column) for row in self.rows]
@@ -80,24 +85,34 @@ class Table(Value):
         try:
             import pandas
         except ImportError:
-            raise InputError('a DataFrame needs pandas: pip install pandas. Without it, table["name"] is a column.') from None
+            raise InputError(
+                'a DataFrame needs pandas: pip install pandas. Without it, table["name"] is a '
+                "column."
+            ) from None
         return pandas.DataFrame(list(self.rows), columns=list(self.columns))
 
     def __repr__(self) -> str:
-        failed = f"; {len(self.errors)} failed, the first with {self.errors[0]['error']}" if self.errors else ""
+        failed = (
+            f"; {len(self.errors)} failed, the first with {self.errors[0]['error']}"
+            if self.errors
+            else ""
+        )
         return f"Table({len(self)} rows: {', '.join(self.columns)}{failed})"
 
 
 class RowStore:
-    """The rows of a sweep, number of the point -> row; with a path, also in a file, to which they are added as they come.
+    """The rows of a sweep, number of the point -> row; with a path, also in a file, to which they
+    are added as they come.
 
-    The file is JSON Lines: first a line that says what is swept, then a line for each point that is done. It is locked while
-    the store is open. A last line that was not written to its end is cut off.
+    The file is JSON Lines: first a line that says what is swept, then a line for each point that is
+    done. It is locked while the store is open. A last line that was not written to its end is cut
+    off.
 
     path: of the file; None keeps nothing.
     name: of the function.
     points: parameters of all points, in plain values.
-    Raises `InputError` for a file that holds something else, that another sweep is writing to, or that cannot be written to.
+    Raises `InputError` for a file that holds something else, that another sweep is writing to, or
+    that cannot be written to.
     """
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
@@ -106,14 +121,18 @@ class RowStore:
         if path is None:
             return
         if not isinstance(path, str | os.PathLike):
-            raise InputError(f'file must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.')
+            raise InputError(
+                f'file must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.'
+            )
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._resume(path, _header(name, points))
         except BlockingIOError:
             self.close()
-            raise InputError(f"another sweep is writing to {path}; wait for its end, or give another file.") from None
+            raise InputError(
+                f"another sweep is writing to {path}; wait for its end, or give another file."
+            ) from None
         except OSError as error:
             self.close()
             raise InputError(f"{path} cannot be written to: {error.strerror}.") from None
@@ -122,7 +141,8 @@ class RowStore:
             raise
 
     def add(self, i: int, row: Row) -> None:
-        """Keep the row of point i. A row is written at once and whole: what ends the program loses no earlier one.
+        """Keep the row of point i. A row is written at once and whole: what ends the program loses
+        no earlier one.
 
         Raises `InputError` where the file takes no more.
         """
@@ -139,7 +159,9 @@ class RowStore:
             self._file = -1
 
     def _resume(self, path: str | Path, header: Row) -> None:
-        """Read what the file holds, after checking that it is of this sweep; begin it where it is empty."""
+        """Read what the file holds, after checking that it is of this sweep; begin it where it is
+        empty.
+        """
         content = Path(path).read_bytes()
         complete_lines = content[: content.rfind(b"\n") + 1]
         if not complete_lines and json.dumps(header).encode().startswith(content):
@@ -147,16 +169,26 @@ class RowStore:
             self._write(json.dumps(header))
             return
         found = _read_header(path, content)
-        for key, what in (("sweep", "the function"), ("parameters", "the parameters"), ("points", "the number of points")):
+        for key, what in (
+            ("sweep", "the function"),
+            ("parameters", "the parameters"),
+            ("points", "the number of points"),
+        ):
             if found[key] != header[key]:
-                raise _wrong_file_error(path, f"of {what} {_joined(found[key])}, this sweep has {_joined(header[key])}")
+                raise _wrong_file_error(
+                    path, f"of {what} {_joined(found[key])}, this sweep has {_joined(header[key])}"
+                )
         if found["grid"] != header["grid"]:
             raise _wrong_file_error(path, "of the same parameters at other values")
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
-            if not point or _as_json_text({name: row.get(name) for name in point}) != _as_json_text(point):
-                raise _wrong_file_error(path, f"where point {i} has other parameters: it was changed by hand")
+            if not point or _as_json_text({name: row.get(name) for name in point}) != _as_json_text(
+                point
+            ):
+                raise _wrong_file_error(
+                    path, f"where point {i} has other parameters: it was changed by hand"
+                )
         os.ftruncate(self._file, len(complete_lines))
 
     def _write(self, line: str) -> None:
@@ -165,12 +197,18 @@ class RowStore:
             while data:  # what a full disc takes is a part: the next attempt says why
                 data = data[os.write(self._file, data) :]
         except OSError as error:
-            again = "The rows before are kept: once the file takes more, the same sweep goes on from them."
-            raise InputError(f"{self._path} cannot be written to: {error.strerror}. {again}") from None
+            again = (
+                "The rows before are kept: once the file takes more, the same sweep goes on "
+                "from them."
+            )
+            raise InputError(
+                f"{self._path} cannot be written to: {error.strerror}. {again}"
+            ) from None
 
 
 def as_json_value(what: str, value: Any) -> Any:
-    """A value as JSON gives it back: numbers, texts, booleans, None, lists and dicts of them; numpy's become Python's.
+    """A value as JSON gives it back: numbers, texts, booleans, None, lists and dicts of them;
+    numpy's become Python's.
 
     Raises `InputError` with `what`, a name, for anything else.
     """
@@ -196,7 +234,9 @@ def _is_number(value: Any) -> bool:
 def _header(name: str, points: Sequence[Row]) -> Row:
     """The first line of a file: what is swept."""
     parameters = list(dict.fromkeys(name for point in points for name in point))
-    digest = hashlib.sha256("\n".join(_as_json_text(point) for point in points).encode()).hexdigest()
+    digest = hashlib.sha256(
+        "\n".join(_as_json_text(point) for point in points).encode()
+    ).hexdigest()
     return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
 
 
@@ -221,7 +261,9 @@ def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
             rows[int(row.pop("point"))] = row
         except (ValueError, TypeError, KeyError, AttributeError):
             advice = "Remove it, and sweep again."
-            raise InputError(f"line {number} of {path} is no row of a sweep: {line[:80]!r}. {advice}") from None
+            raise InputError(
+                f"line {number} of {path} is no row of a sweep: {line[:80]!r}. {advice}"
+            ) from None
     return rows
 
 
@@ -234,4 +276,6 @@ def _joined(value: Any) -> str:
 
 
 def _wrong_file_error(path: str | Path, what: str) -> InputError:
-    return InputError(f"{path} is a file {what}; it is left as it is. Give another file, or remove this one.")
+    return InputError(
+        f"{path} is a file {what}; it is left as it is. Give another file, or remove this one."
+    )

@@ -1,7 +1,9 @@
-"""The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and saves them.
+"""The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and
+saves them.
 
-`Viewer` draws. `View` says from where it looks. `shapes` and `markers` make further items for a picture, in the `colours`
-of all pictures; `prefixed` puts several items below one path. `plots` makes figures of a rollout and of push recovery.
+`Viewer` draws. `View` says from where it looks. `shapes` and `markers` make further items for a
+picture, in the `colours` of all pictures; `prefixed` puts several items below one path. `plots`
+makes figures of a rollout and of push recovery.
 """
 
 from floatbase.viewer import plots

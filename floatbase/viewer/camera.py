@@ -20,9 +20,10 @@ class View:
     distance: 1 fills the picture; 2 is twice as far away.
     angle: vertical field of view, degrees.
     feet: whether the robot's feet fill the picture, instead of the whole robot.
-    around: a point, (3,), m, world, and a radius, m: this ball fills the picture, instead of the robot.
-    Raises `InputError` for an elevation beyond ±90, an angle not between 0 and 180, a distance or radius that is not
-    positive, and numbers that are not finite.
+    around: a point, (3,), m, world, and a radius, m: this ball fills the picture, instead of the
+        robot.
+    Raises `InputError` for an elevation beyond ±90, an angle not between 0 and 180, a distance or
+    radius that is not positive, and numbers that are not finite.
     """
 
     azimuth: float = 40.0
@@ -38,9 +39,14 @@ class View:
             as_number(f"{name} of a View", getattr(self, name), "degrees")
         as_bool("feet of a View", self.feet)
         if abs(self.elevation) > 90.0:
-            raise InputError(f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 (above) degrees.")
+            raise InputError(
+                f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 "
+                f"(above) degrees."
+            )
         if as_positive("angle of a View", self.angle, "degrees") >= 180.0:
-            raise InputError(f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual.")
+            raise InputError(
+                f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual."
+            )
         if self.around is not None:
             _check_around(self.around)
 
@@ -49,7 +55,10 @@ def _check_around(around: Any) -> None:
     try:
         point, radius = around
     except (TypeError, ValueError):
-        raise InputError(f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), 0.5).") from None
+        raise InputError(
+            f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), "
+            f"0.5)."
+        ) from None
     as_array("point in around of a View", point, (3,), "m")
     as_positive("radius in around of a View", radius, "m")
 
@@ -76,5 +85,9 @@ def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
         target, radius = np.array(view.around[0]), view.around[1]
     distance = view.distance * radius / np.sin(np.radians(view.angle) / 2)
     azimuth, elevation = np.radians([view.azimuth, view.elevation])
-    direction = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    direction = [
+        np.cos(elevation) * np.cos(azimuth),
+        np.cos(elevation) * np.sin(azimuth),
+        np.sin(elevation),
+    ]
     return target, target + distance * np.array(direction)

@@ -1,4 +1,6 @@
-"""`Viewer(robot)`: draws a robot with its contacts, forces and friction cones in a web page, still or moving."""
+"""`Viewer(robot)`: draws a robot with its contacts, forces and friction cones in a web page, still
+or moving.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,10 @@ if TYPE_CHECKING:
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
-ROBOT, FOLLOWED = "robot", "followed"  # in the picture: the robot, and where it is on average of a stride
+ROBOT, FOLLOWED = (
+    "robot",
+    "followed",
+)  # in the picture: the robot, and where it is on average of a stride
 _MOST_PIXELS = 10_000  # of a picture's height
 
 
@@ -55,20 +60,25 @@ class Viewer(Controls):
 
     robot: the robot to draw.
     height: height of the picture in a notebook, pixels.
-    background: "white" or "light", both of which are dark where the page around the picture is, or the browser; or "dark".
-    scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's weight about twice as long as
-        its centre of mass is high.
+    background: "white" or "light", both of which are dark where the page around the picture is, or
+        the browser; or "dark".
+    scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's
+        weight about twice as long as its centre of mass is high.
     facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
     inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
-    ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin; None takes the plane that the
-        contacts stand on when they share a normal, else a level ground.
-    follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it otherwise.
-    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook has none.
+    ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin;
+        None takes the plane that the contacts stand on when they share a normal, else a level
+        ground.
+    follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it
+        otherwise.
+    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook
+        has none.
     Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
 
-    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs: its frames come as a slider's
-    values do. Elsewhere, open `viewer.url` in a browser. The newest display in a notebook is live; earlier ones keep their
-    pictures. So give each interactive part its own `Viewer`.
+    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
+    its frames come as a slider's values do. Elsewhere, open `viewer.url` in a browser. The newest
+    display in a notebook is live; earlier ones keep their pictures. So give each interactive part
+    its own `Viewer`.
     """
 
     def __init__(
@@ -87,9 +97,14 @@ class Viewer(Controls):
     ):
         as_instance("robot", robot, Robot)
         if not isinstance(background, str) or background not in BACKGROUNDS:
-            raise InputError(f"background is {short_repr(background)}; it must be one of {', '.join(BACKGROUNDS)}.")
+            raise InputError(
+                f"background is {short_repr(background)}; it must be one of "
+                f"{', '.join(BACKGROUNDS)}."
+            )
         # raises for wrong ones
-        polyhedron = FrictionPolyhedron(np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation)
+        polyhedron = FrictionPolyhedron(
+            np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation
+        )
         self.robot, self.background = robot, background
         self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
@@ -110,15 +125,19 @@ class Viewer(Controls):
         self._is_playing, self._follow = False, as_bool("follow", follow)
         self._last: State | None = None
         self._camera_state: State | None = None  # where the robot was when the camera was set
-        self._legend_entries: dict[str, tuple[RGB, str]] = {}  # kinds of items that the legend explains beside its own
+        self._legend_entries: dict[
+            str, tuple[RGB, str]
+        ] = {}  # kinds of items that the legend explains beside its own
         super().__init__()
         self._set_stage(background)
 
     @property
     def url(self) -> str:
-        """Address of the live page. It can be opened on the machine of this process only, by every user of it.
+        """Address of the live page. It can be opened on the machine of this process only, by every
+        user of it.
 
-        The page has no port before this is asked for. Raises `ViewerError` when the viewer was closed before.
+        The page has no port before this is asked for. Raises `ViewerError` when the viewer was
+        closed before.
         """
         return self.window.web_url
 
@@ -151,33 +170,38 @@ class Viewer(Controls):
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
     ) -> Viewer:
-        """Draw the robot and what the arguments ask for, and remove everything else. Returns this viewer.
+        """Draw the robot and what the arguments ask for, and remove everything else. Returns this
+        viewer.
 
         state: the state of the robot.
         contacts: its contacts; each gets a patch and a friction cone.
-        forces: measured forces of the ground on the robot, shape (3 n,) or (n, 3) for the n points of `contacts`, N, world.
-        planned: the same as a controller plans them. A cone's colour says where its force lies, of `forces` if given, else of
-            `planned`.
+        forces: measured forces of the ground on the robot, shape (3 n,) or (n, 3) for the n points
+            of `contacts`, N, world.
+        planned: the same as a controller plans them. A cone's colour says where its force lies, of
+            `forces` if given, else of `planned`.
         com: whether to draw the centre of mass and its projection on the ground.
         cones: whether to draw the friction cones.
         arrows: whether to draw the forces; where not, they still colour the cones.
         support: whether to draw the convex hull of the contact points.
-        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a ring around its axis; its
-            radius is that of a force which has this moment at a lever of half the diagonal of the robot's bounding box.
+        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a
+            ring around its axis; its radius is that of a force which has this moment at a lever of
+            half the diagonal of the robot's bounding box.
         push: name of a frame, and the force that acts at its origin, shape (3,), N, world.
         ghost: another state of the robot, drawn translucent.
         frames: names of frames whose axes to draw.
         labels: whether to write the names of the contact points.
-        extra: path -> item, more items from `floatbase.viewer.shapes` or `floatbase.viewer.markers`.
+        extra: path -> item, more items from `floatbase.viewer.shapes` or
+            `floatbase.viewer.markers`.
         title: a line in the corner.
         ghost_name: what the legend calls the ghost.
-        Raises `InputError` for a state of another robot, a wrong number of forces, forces without contacts, and NaN;
-        `ViewerError` when the window is closed.
+        Raises `InputError` for a state of another robot, a wrong number of forces, forces without
+        contacts, and NaN; `ViewerError` when the window is closed.
         """
         _check_flags(com=com, cones=cones, arrows=arrows, support=support, labels=labels)
         _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(
-            state, contacts, forces, planned, com=com, cones=cones, arrows=arrows, support=support, wrench=wrench, push=push,
+            state, contacts, forces, planned, com=com, cones=cones, arrows=arrows, support=support,
+            wrench=wrench, push=push,
             ghost=ghost, frames=frames, labels=labels, extra=extra,
         )  # fmt: skip
         self.draw(picture, title, ghost_name)
@@ -193,31 +217,45 @@ class Viewer(Controls):
         kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
         """
         red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
-        self._legend_entries[as_string("kind", kind)] = (red, green, blue), as_string("meaning", meaning)
+        self._legend_entries[as_string("kind", kind)] = (
+            (red, green, blue),
+            as_string("meaning", meaning),
+        )
 
     def multiplier_labels(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
-        """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle, of a normal force on top.
+        """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle,
+        of a normal force on top.
 
             view.show(state, contacts, planned=command.forces, extra=view.multiplier_labels(state, contacts, command.solution))
 
-        A multiplier is what one newton more of room would lower the objective by; two significant digits are shown.
+        A multiplier is what one newton more of room would lower the objective by; two significant
+        digits are shown.
         state, contacts: those that the controller was given.
         solution: its answer: `command.solution`, or that of `solve(controller.qp(state))`.
         Raises `InputError` for a solution of other contacts.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
-        positions, height = as_instance("contacts", contacts, Contacts).positions(state), self.painter.cone_height(contacts)
+        positions, height = (
+            as_instance("contacts", contacts, Contacts).positions(state),
+            self.painter.cone_height(contacts),
+        )
         drawn = markers.multiplier_labels(
-            positions, contacts, as_instance("solution", solution, Solution), height, self.painter.size
+            positions,
+            contacts,
+            as_instance("solution", solution, Solution),
+            height,
+            self.painter.size,
         )
         return prefixed("multiplier", drawn)
 
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
-        """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the planned ZMP of a `Walk`.
+        """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the
+        planned ZMP of a `Walk`.
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
-        walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of the robot, then.
+        walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of
+            the robot, then.
         Raises `InputError` for those of another robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
@@ -225,16 +263,24 @@ class Viewer(Controls):
         return gait_overlay.walk_overlay(walk, state, self._overlay_style)
 
     def step_overlay(self, step: StepPlan, t: float, state: State) -> Picture:
-        """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s. state: of the robot, then."""
+        """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s.
+        state: of the robot, then.
+        """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.step_overlay(step, t, state, self._overlay_style)
 
     @property
     def _overlay_style(self) -> gait_overlay.Style:
-        return gait_overlay.Style(self.painter.size, self.painter.drawn_ground, self.painter.text_colour)
+        return gait_overlay.Style(
+            self.painter.size, self.painter.drawn_ground, self.painter.text_colour
+        )
 
-    def draw(self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME) -> None:
-        """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove everything else."""
+    def draw(
+        self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME
+    ) -> None:
+        """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove
+        everything else.
+        """
         if self._is_playing:
             self.window.put([self._following(ROBOT), *protocol.end_animation()])
             self._is_playing = False
@@ -261,23 +307,29 @@ class Viewer(Controls):
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
     ) -> Viewer:
-        """Play a rollout in the page, again and again, with a time slider and a choice of speeds. Returns at once.
+        """Play a rollout in the page, again and again, with a time slider and a choice of speeds.
+        Returns at once.
 
-        A foot that swings, which is not among the controller's contacts just then, has no cone; its measured force is drawn.
+        A foot that swings, which is not among the controller's contacts just then, has no cone; its
+        measured force is drawn.
         rollout: the record to play.
         speed: 1 for real time, 0.25 for slow motion.
         rate: pictures drawn for each second of the record.
         planned: whether to draw the planned forces too.
         com, cones, support, ghost, title, ghost_name: as for `show`.
-        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay` makes them.
-        follow: whether the camera goes with the robot, smoothly and at one height over the viewer's ground; afterwards, too.
+        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay`
+            makes them.
+        follow: whether the camera goes with the robot, smoothly and at one height over the viewer's
+            ground; afterwards, too.
         paused: whether the reader must press play first.
         Raises `InputError` for a record of another robot or without rows.
         """
         self.painter.check_robot("record", recording.as_rollout(rollout).robot)
         if not len(rollout.time):
             raise InputError("the record has no rows, so there is nothing to play.")
-        _check_flags(planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused)
+        _check_flags(
+            planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused
+        )
         _check_texts(title=title, ghost_name=ghost_name)
         rows, planned_steps = (
             recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
@@ -292,22 +344,31 @@ class Viewer(Controls):
                 contacts,
                 rollout.measured[i, columns],
                 rollout.planned[i, columns] if planned and np.isfinite(rollout.planned[i, columns]).all() else None,
-                com=com, cones=cones, support=support, ghost=ghost, push=recording.push_at(rollout, i),
+                com=com, cones=cones, support=support, ghost=ghost,
+                push=recording.push_at(rollout, i),
                 swing_feet=recording.swing_feet_at(rollout, i),
                 extra=None if (step := gait_overlay.step_at(planned_steps, t)) is None else self.step_overlay(step, t, state),
             )
             for i, t, state in zip(rows, times, states, strict=True)
         ]  # fmt: skip
         if follow and self.robot.is_floating:
-            places = recording.smoothed(times, np.array([state.joint_transforms[1][:3, 3] for state in states]))
-            pictures = [picture | {FOLLOWED: shapes.invisible_point(at)} for picture, at in zip(pictures, places, strict=True)]
-        self.play_pictures(times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name)
+            places = recording.smoothed(
+                times, np.array([state.joint_transforms[1][:3, 3] for state in states])
+            )
+            pictures = [
+                picture | {FOLLOWED: shapes.invisible_point(at)}
+                for picture, at in zip(pictures, places, strict=True)
+            ]
+        self.play_pictures(
+            times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name
+        )
         self._last, self._follow = states[0], follow
         self.renderer.set(*self._camera_commands(View(), FOLLOWED))
         return self
 
     def play_pictures(
-        self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0, paused: bool = False,
+        self, times: npt.ArrayLike, pictures: Sequence[Picture], *, speed: float = 1.0,
+        paused: bool = False,
         title: str | None = None, ghost_name: str = GHOST_NAME,
     ) -> Viewer:  # fmt: skip
         """Play pictures, made by `painter.picture` or of your own items. Returns at once.
@@ -318,79 +379,118 @@ class Viewer(Controls):
         """
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
-        self.renderer.set(*self._caption(set[str]().union(*map(legend_kinds, pictures)), title, ghost_name))
+        self.renderer.set(
+            *self._caption(set[str]().union(*map(legend_kinds, pictures)), title, ghost_name)
+        )
         self.window.put([moving.command])
         self._is_playing = True
         return self
 
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
-        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a `View`.
+        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a
+        `View`.
 
-        follow: whether the camera goes with the robot when it walks away, smoothly and at one height over the viewer's
-            ground; None leaves it so.
-        Every call undoes how the reader has turned the view, so do not call it each time a slider moves.
-        Raises `InputError` for another name.
+        follow: whether the camera goes with the robot when it walks away, smoothly and at one
+            height over the viewer's ground; None leaves it so.
+        Every call undoes how the reader has turned the view, so do not call it each time a slider
+        moves. Raises `InputError` for another name.
         """
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
         if not isinstance(view, View):
-            raise InputError(f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a View.")
+            raise InputError(
+                f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a "
+                f"View."
+            )
         self._follow = self._follow if follow is None else as_bool("follow", follow)
-        self.renderer.force_set(*self._camera_commands(view, FOLLOWED if self._is_playing else ROBOT))
+        self.renderer.force_set(
+            *self._camera_commands(view, FOLLOWED if self._is_playing else ROBOT)
+        )
         return self
 
     def _camera_commands(self, view: View, followed: str = ROBOT) -> tuple[protocol.Update, ...]:
-        """The commands for a view of the robot where it is now, for what the camera follows from there, and for the presets."""
+        """The commands for a view of the robot where it is now, for what the camera follows from
+        there, and for the presets.
+        """
         self._camera_state = self._last
-        presets = protocol.set_views({name: self._position_target_angle(preset) for name, preset in PRESETS.items()})
-        return protocol.set_camera(*self._position_target_angle(view)), self._following(followed), presets
+        presets = protocol.set_views(
+            {name: self._position_target_angle(preset) for name, preset in PRESETS.items()}
+        )
+        return (
+            protocol.set_camera(*self._position_target_angle(view)),
+            self._following(followed),
+            presets,
+        )
 
     def _position_target_angle(self, view: View) -> tuple[Array, Array, float]:
-        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a view of the robot
-        `_camera_state`.
+        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a
+        view of the robot `_camera_state`.
         """
         low, high = self.painter.feet_box if view.feet else self.painter.box
-        moved = self._displacement + [0.0, 0.0, self.painter.drawn_ground.height(self.painter.standing.com)]
+        moved = self._displacement + [
+            0.0,
+            0.0,
+            self.painter.drawn_ground.height(self.painter.standing.com),
+        ]
         target, eye = target_and_eye(view, low + moved, high + moved)
         return eye, target, view.angle
 
     def _following(self, followed: str) -> protocol.Update:
-        """The command that lets the camera follow the robot, or what stands for it in a recording, if it is to follow."""
+        """The command that lets the camera follow the robot, or what stands for it in a recording,
+        if it is to follow.
+        """
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self._follow and self.robot.is_floating
         start = (self._camera_state or self.painter.standing).joint_transforms[1][:3, 3]
-        return protocol.set_follow(ROOT + base if follows else "", start, self._displacement, smooth=followed == ROBOT)
+        return protocol.set_follow(
+            ROOT + base if follows else "", start, self._displacement, smooth=followed == ROBOT
+        )
 
     @property
     def _displacement(self) -> Array:
-        """How far the robot was from where it stands at home when the camera was set, (3,), m, along the ground."""
+        """How far the robot was from where it stands at home when the camera was set, (3,), m,
+        along the ground.
+        """
         return displacement(
-            self.painter.drawn_ground, self.painter.standing.com, (self._camera_state or self.painter.standing).com
+            self.painter.drawn_ground,
+            self.painter.standing.com,
+            (self._camera_state or self.painter.standing).com,
         )
 
-    def save(self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)) -> Path:
+    def save(
+        self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
+    ) -> Path:
         """Write the scene to a file, by its name's ending, and return its path.
 
-        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and .gif are the recording at
-            the speed of `play`, .png its first picture; these need a browser and `pip install "floatbase[video]"`.
+        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and
+            .gif are the recording at the speed of `play`, .png its first picture; these need a
+            browser and `pip install "floatbase[video]"`.
         title: of the page.
         size: (width, height) of films and images in pixels, even numbers.
 
-        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be written.
+        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be
+        written.
         """
         target = Path(path if isinstance(path, Path) else as_string("path", path))
         if self.window.scene.is_empty:
-            raise ViewerError("nothing is drawn yet, so there is nothing to save; call show(state) or play(rollout) first.")
+            raise ViewerError(
+                "nothing is drawn yet, so there is nothing to save; call show(state) or "
+                "play(rollout) first."
+            )
         size = film.checked_size(size)
         if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
-            raise ViewerError(f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png.")
+            raise ViewerError(
+                f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png."
+            )
         try:
             if target.suffix.lower() in film.FRAME_RATES:
                 film.capture(self.static_html(title), target, size)
             else:
                 target.write_text(self.static_html(title), encoding="utf-8")
         except OSError as error:
-            raise ViewerError(f"cannot write {target} ({error.strerror}); choose a folder that exists.") from None
+            raise ViewerError(
+                f"cannot write {target} ({error.strerror}); choose a folder that exists."
+            ) from None
         return target
 
     def static_html(self, title: str | None = None) -> str:
@@ -400,28 +500,34 @@ class Viewer(Controls):
 
     def set_disconnect_message(self, words: str) -> None:
         """What the page says when this viewer has been closed. words: the text."""
-        self.renderer.set(protocol.page_command("set_disconnect_message", text=as_string("words", words)))
+        self.renderer.set(
+            protocol.page_command("set_disconnect_message", text=as_string("words", words))
+        )
 
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
         self.window.close()
 
     def widget(self) -> Widget:
-        """A widget that shows the picture, for panels: live, until the viewer is displayed again; then it keeps its picture.
+        """A widget that shows the picture, for panels: live, until the viewer is displayed again;
+        then it keeps its picture.
 
-        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a still copy of the scene.
+        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a
+        still copy of the scene.
         """
         if self._is_static:
             import ipywidgets
 
             return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
         return self.window.widget(
-            self.robot.name, self.height, thumbnail.render_png(self.renderer.picture, self.window.scene, self.height)
+            self.robot.name,
+            self.height,
+            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
         )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be; a program that stores notebooks may have
-        another, see `MIMEBUNDLES`.
+        """The live picture, and an image of it for wherever no widget can be; a program that stores
+        notebooks may have another, see `MIMEBUNDLES`.
         """
         if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             return bundle(self)
@@ -438,8 +544,14 @@ class Viewer(Controls):
 
     def _static_frame(self) -> str:
         """HTML of the scene as it is now, which needs no kernel."""
-        name, style = html.escape(self.robot.name), f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
-        return f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" style="{style}"></iframe>'
+        name, style = (
+            html.escape(self.robot.name),
+            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
+        )
+        return (
+            f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
+            f'style="{style}"></iframe>'
+        )
 
     def __repr__(self) -> str:
         address = f", {self.url}" if self.window.is_listening else ""
@@ -456,7 +568,9 @@ class Viewer(Controls):
             protocol.page_command("set_theme", name=background),
         )
 
-    def _caption(self, shown: set[str], title: str | None, ghost_name: str) -> tuple[protocol.Update, protocol.Update]:
+    def _caption(
+        self, shown: set[str], title: str | None, ghost_name: str
+    ) -> tuple[protocol.Update, protocol.Update]:
         """The commands for the title, and for the legend of the colours in the picture."""
         return protocol.page_command("set_title", text=title or ""), legend.command(
             frozenset(shown),
@@ -480,12 +594,17 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
     """The ground as it is drawn; None for None."""
     if ground is None:
         return None
-    from floatbase.simulation import Ground  # loads MuJoCo, which no picture of a level ground needs
+    from floatbase.simulation import (
+        Ground,
+    )  # loads MuJoCo, which no picture of a level ground needs
 
     made = ground if isinstance(ground, Ground) else Ground(normal=unit_vector("ground", ground))
     planes = []
     for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
         if z < MIN_VERTICAL:
-            raise InputError(f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] does.")
+            raise InputError(
+                f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] "
+                f"does."
+            )
         planes.append(Plane((x, y, z), offset))
     return planes[0] if len(planes) == 1 else Planes(tuple(planes))

@@ -1,4 +1,6 @@
-"""App. B: cylinder, valve, lever and force loop, judged by closed forms, power and a tight integrator."""
+"""App. B: cylinder, valve, lever and force loop, judged by closed forms, power and a tight
+integrator.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def joints(hydraulics: Hydraulics = HYQ) -> HydraulicActuators:
     return HydraulicActuators(judges.load("go2"), hydraulics)
 
 
-def run(actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3) -> np.ndarray:
+def run(
+    actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3
+) -> np.ndarray:
     """Torques at the end of each step while the joints are held at their best angles, shape (n, d)."""
     q, v = actuators.cylinders.max_lever_angle, np.zeros(actuators.cylinders.d)
     return np.array([actuators.step(tau, q, v, dt) for _ in range(round(time / dt))])
@@ -56,10 +60,14 @@ def test_the_length_is_the_distance_between_the_two_pivots() -> None:
     for q in np.linspace(-4.0, 4.0, 33):
         gamma = np.arccos(HYQ.crank / HYQ.base) + q
         foot, rod = np.array([HYQ.base, 0.0]), HYQ.crank * np.array([np.cos(gamma), np.sin(gamma)])
-        assert cylinder.geometry([q]).length[0] == pytest.approx(np.linalg.norm(rod - foot), rel=1e-12)
+        assert cylinder.geometry([q]).length[0] == pytest.approx(
+            np.linalg.norm(rod - foot), rel=1e-12
+        )
 
 
-def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_both_sides() -> None:
+def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_both_sides() -> (
+    None
+):
     cylinder = one()
     for q in np.linspace(-4.0, 4.0, 33):
         slope = (cylinder.geometry([q + 1e-6]).length - cylinder.geometry([q - 1e-6]).length) / 2e-6
@@ -71,7 +79,9 @@ def test_the_lever_is_longest_at_the_centre_and_zero_where_crank_and_cylinder_li
     levers = np.array([cylinder.geometry([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
     assert levers.max() == pytest.approx(HYQ.crank, rel=1e-6)
     assert cylinder.geometry([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
-    assert cylinder.geometry([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(0.0, abs=1e-12)
+    assert cylinder.geometry([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_chambers_take_up_what_the_piston_leaves_and_never_vanish() -> None:
@@ -79,7 +89,11 @@ def test_chambers_take_up_what_the_piston_leaves_and_never_vanish() -> None:
     for q in np.linspace(-np.pi, np.pi, 50):
         before, after = cylinder.geometry([q - 1e-6]), cylinder.geometry([q + 1e-6])
         moved = after.length - before.length
-        assert np.allclose(after.volumes - before.volumes, cylinder.areas * np.array([[1.0], [-1.0]]) * moved, atol=1e-18)
+        assert np.allclose(
+            after.volumes - before.volumes,
+            cylinder.areas * np.array([[1.0], [-1.0]]) * moved,
+            atol=1e-18,
+        )
         assert np.all(before.volumes >= HYQ.dead_volume * (1.0 - 1e-9))
 
 
@@ -97,7 +111,9 @@ def test_the_open_valve_passes_its_rated_flow_at_its_rated_pressure_drop() -> No
 def test_flow_grows_with_the_root_of_the_drop_and_with_its_sign() -> None:
     cylinder = one()
     flow = cylinder.orifice_flow(np.array([[40e5], [-10e5]]))[:, 0]
-    assert flow == pytest.approx(HYQ.valve_gain * np.array([np.sqrt(40e5), -np.sqrt(10e5)]), rel=3e-3)
+    assert flow == pytest.approx(
+        HYQ.valve_gain * np.array([np.sqrt(40e5), -np.sqrt(10e5)]), rel=3e-3
+    )
     slope = cylinder.orifice_flow(np.array([[1.0], [-1.0]]))[:, 0]
     assert np.all(np.isfinite(slope)) and slope[0] == -slope[1] > 0.0
 
@@ -123,8 +139,12 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
     end = solve_ivp(rates, (0.0, 2.0), [50e5, 50e5], method="LSODA", rtol=1e-9, atol=1.0).y[:, -1]
     # equal drops s² at both edges: K x s = c (p_s - p_t - 2 s²)
     a, b = 2.0 * leaky.leakage, leaky.valve_gain * 0.3
-    s = (-b + np.sqrt(b**2 + 4.0 * a * leaky.leakage * (leaky.supply_pressure - leaky.tank_pressure))) / (2.0 * a)
-    assert end == pytest.approx([leaky.supply_pressure - s**2, leaky.tank_pressure + s**2], rel=1e-3)
+    s = (
+        -b + np.sqrt(b**2 + 4.0 * a * leaky.leakage * (leaky.supply_pressure - leaky.tank_pressure))
+    ) / (2.0 * a)
+    assert end == pytest.approx(
+        [leaky.supply_pressure - s**2, leaky.tank_pressure + s**2], rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("q", [-0.8, 0.0, 0.5])
@@ -133,7 +153,9 @@ def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> No
     cylinder, mass = one(replace(HYQ, leakage=0.0)), 60.0
     geometry = cylinder.geometry([q])
     volume, area = geometry.volumes[:, 0], HYQ.areas
-    expected = np.sqrt(HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass)
+    expected = np.sqrt(
+        HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass
+    )
     balanced = np.array([60e5, 60e5 * area[0] / area[1]])
 
     def motion(t: float, y: np.ndarray) -> np.ndarray:
@@ -142,7 +164,9 @@ def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q: float) -> No
         return np.concatenate([rates.ravel(), cylinder.force(p) / mass])
 
     time = np.linspace(0.0, 20.0 * 2.0 * np.pi / expected, 20001)
-    speed = solve_ivp(motion, (0.0, time[-1]), [*balanced, 1e-3], t_eval=time, rtol=1e-9, atol=1e-9).y[2]
+    speed = solve_ivp(
+        motion, (0.0, time[-1]), [*balanced, 1e-3], t_eval=time, rtol=1e-9, atol=1e-9
+    ).y[2]
     rising = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] >= 0.0))
     frequency = 2.0 * np.pi * (rising.size - 1) / (time[rising[-1]] - time[rising[0]])
     assert frequency == pytest.approx(expected, rel=1e-3)
@@ -177,7 +201,9 @@ def test_the_pumps_power_is_work_and_heat_and_compressed_oil() -> None:
 
 
 def judge(tau: float, q: float, v: float, time: np.ndarray) -> np.ndarray:
-    """The torque of HyQ's joint, from rest with zero torque, by a tight integrator and the equations written out."""
+    """The torque of HyQ's joint, from rest with zero torque, by a tight integrator and the
+    equations written out.
+    """
     b, a, h = HYQ.crank, HYQ.base, HYQ
     gamma = np.arccos(b / a) + q
     length = np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(gamma))
@@ -193,10 +219,16 @@ def judge(tau: float, q: float, v: float, time: np.ndarray) -> np.ndarray:
         x, pA, pB, integral = y
         error = tau / lever - (A * pA - B * pB)
         desired = w * error + 0.05 * w * w * integral + beta * (A * A / VA + B * B / VB) * speed
-        high_A, high_B = (h.supply_pressure, h.tank_pressure) if desired >= 0 else (h.tank_pressure, h.supply_pressure)
+        high_A, high_B = (
+            (h.supply_pressure, h.tank_pressure)
+            if desired >= 0
+            else (h.tank_pressure, h.supply_pressure)
+        )
         full = beta * (A / VA * edge(high_A - pA) - B / VB * edge(high_B - pB))
         u = desired / abs(full)
-        line_A, line_B = (h.supply_pressure, h.tank_pressure) if x >= 0 else (h.tank_pressure, h.supply_pressure)
+        line_A, line_B = (
+            (h.supply_pressure, h.tank_pressure) if x >= 0 else (h.tank_pressure, h.supply_pressure)
+        )
         leak = h.leakage * (pA - pB)
         return [
             2.0 * np.pi * h.valve_bandwidth * (np.clip(u, -1.0, 1.0) - x),
@@ -207,7 +239,9 @@ def judge(tau: float, q: float, v: float, time: np.ndarray) -> np.ndarray:
 
     lines = h.supply_pressure + h.tank_pressure
     start = [0.0, B * lines / (A + B), A * lines / (A + B), 0.0]
-    y = solve_ivp(rates, (0.0, time[-1]), start, t_eval=time, method="LSODA", rtol=1e-8, atol=1e-8).y
+    y = solve_ivp(
+        rates, (0.0, time[-1]), start, t_eval=time, method="LSODA", rtol=1e-8, atol=1e-8
+    ).y
     return lever * (A * y[1] - B * y[2])
 
 
@@ -216,7 +250,13 @@ def test_the_integrator_agrees_with_a_tight_one() -> None:
     limit = HYQ.weakest_torque
     centre = judges.load("ur5").standing().q
     time = np.arange(1, 81) * 1e-3
-    for tau, q, v in ((0.2, 0.0, 0.0), (-0.2, 0.3, 0.0), (0.8, 0.0, 0.0), (-0.7, -0.4, 0.0), (0.3, 0.0, 1.0)):
+    for tau, q, v in (
+        (0.2, 0.0, 0.0),
+        (-0.2, 0.3, 0.0),
+        (0.8, 0.0, 0.0),
+        (-0.7, -0.4, 0.0),
+        (0.3, 0.0, 1.0),
+    ):
         robot = fb.load("ur5", torque_limits=limit)
         actuators = HydraulicActuators(robot)
         angles, speeds, desired = centre + q, np.full(6, v), np.full(6, tau * limit)
@@ -228,8 +268,12 @@ def test_the_integrator_agrees_with_a_tight_one() -> None:
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 100.0])
-def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_the_end(bandwidth: float) -> None:
-    """10 to 90 % within 0.35 / bandwidth, as a first-order lag would; less than 10 % too much; no error that stays."""
+def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_the_end(
+    bandwidth: float,
+) -> None:
+    """10 to 90 % within 0.35 / bandwidth, as a first-order lag would; less than 10 % too much; no
+    error that stays.
+    """
     actuators = joints(replace(HYQ, loop_bandwidth=bandwidth))
     step = 0.3 * judges.load("go2").torque_limits
     dt = 0.01 / bandwidth
@@ -241,7 +285,9 @@ def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 50.0, 150.0])
-def test_a_sine_at_the_bandwidth_keeps_0_7_of_its_size_and_a_much_faster_one_does_not(bandwidth: float) -> None:
+def test_a_sine_at_the_bandwidth_keeps_0_7_of_its_size_and_a_much_faster_one_does_not(
+    bandwidth: float,
+) -> None:
     def gain(frequency: float) -> float:
         actuators = joints(replace(HYQ, loop_bandwidth=bandwidth))
         dt, n = 1.0 / (200.0 * frequency), 200
@@ -256,7 +302,9 @@ def test_a_sine_at_the_bandwidth_keeps_0_7_of_its_size_and_a_much_faster_one_doe
 
 
 def test_leakage_leaves_no_error_behind() -> None:
-    """A seal ten times worse takes a tenth off the torque at first; the integral finds the opening that makes up for it."""
+    """A seal ten times worse takes a tenth off the torque at first; the integral finds the opening
+    that makes up for it.
+    """
     actuators = joints(replace(HYQ, leakage=2e-13))
     step = -0.4 * judges.load("go2").torque_limits
     part = run(actuators, step, 1.0) / step
@@ -266,7 +314,9 @@ def test_leakage_leaves_no_error_behind() -> None:
 
 
 def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward() -> None:
-    """±0.3 rad at 2 Hz, 3.8 rad/s: within 6 % of the torque limit; a spring of oil alone would give 100 times that."""
+    """±0.3 rad at 2 Hz, 3.8 rad/s: within 6 % of the torque limit; a spring of oil alone would give
+    100 times that.
+    """
     actuators = joints()
     robot, cylinders = judges.load("go2"), actuators.cylinders
     tau = 0.3 * robot.torque_limits
@@ -274,11 +324,19 @@ def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward(
     worst, dt = np.zeros(12), 1e-3
     for i in range(1000):
         phase = 2.0 * np.pi * 2.0 * i * dt
-        q, v = cylinders.max_lever_angle + 0.3 * np.sin(phase), np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase))
+        q, v = (
+            cylinders.max_lever_angle + 0.3 * np.sin(phase),
+            np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase)),
+        )
         ramp = min(1.0, i / 100.0)  # set off gently
         q, v = cylinders.max_lever_angle + ramp * (q - cylinders.max_lever_angle), ramp * v
         worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / robot.torque_limits)
-    spring = 0.3 * cylinders.crank**2 * cylinders.geometry(cylinders.max_lever_angle).stiffness / robot.torque_limits
+    spring = (
+        0.3
+        * cylinders.crank**2
+        * cylinders.geometry(cylinders.max_lever_angle).stiffness
+        / robot.torque_limits
+    )
     assert np.max(worst) < 0.06
     assert np.min(spring / worst) > 100.0
 
@@ -302,9 +360,13 @@ def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) 
     q, still = actuators.cylinders.max_lever_angle + turn, np.zeros(12)
     high, low = HYQ.supply_pressure, HYQ.tank_pressure
     A, B = actuators.cylinders.areas
-    limits = actuators.cylinders.geometry(q).lever * np.array([A * low - B * high, A * high - B * low])
+    limits = actuators.cylinders.geometry(q).lever * np.array(
+        [A * low - B * high, A * high - B * low]
+    )
     for sign, limit in zip((-1.0, 1.0), limits, strict=True):
-        out = np.array([actuators.step(sign * 5.0 * np.abs(limits[1]), q, still, 1e-3) for _ in range(300)])
+        out = np.array(
+            [actuators.step(sign * 5.0 * np.abs(limits[1]), q, still, 1e-3) for _ in range(300)]
+        )
         assert np.allclose(out[-1], limit, rtol=2e-3)
         assert np.all(sign * out <= sign * limit * (1.0 + 1e-9))
 
@@ -312,7 +374,9 @@ def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn: float) 
 def test_where_crank_and_cylinder_line_up_there_is_no_torque() -> None:
     actuators = joints()
     q = actuators.cylinders.max_lever_angle - np.arccos(HYQ.crank / HYQ.base)
-    out = np.array([actuators.step(judges.load("go2").torque_limits, q, np.zeros(12), 1e-3) for _ in range(50)])
+    out = np.array(
+        [actuators.step(judges.load("go2").torque_limits, q, np.zeros(12), 1e-3) for _ in range(50)]
+    )
     assert np.all(np.isfinite(out))
     assert np.max(np.abs(out)) < 1e-6
 
@@ -341,7 +405,10 @@ def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
 def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest() -> None:
     robot, actuators = judges.load("go2"), joints()
     run(actuators, robot.torque_limits, 0.02)
-    tau, q = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12), actuators.cylinders.max_lever_angle + 0.3
+    tau, q = (
+        0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12),
+        actuators.cylinders.max_lever_angle + 0.3,
+    )
     actuators.reset(tau, q)
     assert np.allclose(actuators.torques(q), tau)
     assert not np.any(actuators.state.opening) and not np.any(actuators.state.integral)
@@ -378,7 +445,9 @@ def test_two_steps_are_one_step_after_another_and_the_same_every_time() -> None:
         ("loop_bandwidth", np.inf, (np.inf,)),
     ],
 )
-def test_parameters_that_make_no_cylinder_are_refused(part: str, value: float, named: tuple[str | float, ...]) -> None:
+def test_parameters_that_make_no_cylinder_are_refused(
+    part: str, value: float, named: tuple[str | float, ...]
+) -> None:
     refused(lambda: replace(HYQ, **{part: value}), InputError, *named)
 
 
@@ -388,7 +457,9 @@ def test_robots_that_cannot_have_cylinders_are_refused() -> None:
     panda = fb.load("panda", locked=["panda_finger_joint2"])
     refused(lambda: HydraulicActuators(endless), InputError, "RR_calf_joint", "go2")
     refused(lambda: HydraulicActuators(go2, 20.0), InputError, "hydraulics", 20.0)  # type: ignore[arg-type]
-    refused(lambda: HydraulicActuators(go2, max_lever_angle=np.zeros(3)), InputError, "centre", 3, 12)
+    refused(
+        lambda: HydraulicActuators(go2, max_lever_angle=np.zeros(3)), InputError, "centre", 3, 12
+    )
     refused(lambda: Cylinders(HYQ, [0.0], [0.0]), InputError, 0)
     refused(lambda: HydraulicActuators(panda), InputError, "panda_finger_joint1")  # it slides
 

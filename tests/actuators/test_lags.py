@@ -1,4 +1,6 @@
-"""App. B: the pure delay is a shift, the first-order lag its closed form; both take their place in a rollout."""
+"""App. B: the pure delay is a shift, the first-order lag its closed form; both take their place in
+a rollout.
+"""
 
 from __future__ import annotations
 
@@ -35,14 +37,18 @@ def test_a_delay_of_whole_steps_shifts_the_torques_and_changes_no_digit(steps: i
 
 def test_a_delay_of_a_quarter_step_mixes_the_last_torques_with_the_new_ones() -> None:
     old = np.vstack([np.zeros(12), WANTED[:-1]])
-    assert np.allclose(got(Delay(ROBOT, 0.25e-3), WANTED), 0.25 * old + 0.75 * WANTED, atol=ROUNDING)
+    assert np.allclose(
+        got(Delay(ROBOT, 0.25e-3), WANTED), 0.25 * old + 0.75 * WANTED, atol=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("delay", [0.7e-3, 3e-3, 1e-2 / 3.0])
 def test_the_length_of_the_steps_changes_nothing_but_the_grid(delay: float) -> None:
     """Four steps of 0.25 ms have the mean of one of 1 ms, with as many different torques under way."""
     fine = got(Delay(ROBOT, delay), np.repeat(WANTED, 4, axis=0), 0.25e-3)
-    assert np.allclose(fine.reshape(40, 4, 12).mean(axis=1), got(Delay(ROBOT, delay), WANTED), atol=ROUNDING)
+    assert np.allclose(
+        fine.reshape(40, 4, 12).mean(axis=1), got(Delay(ROBOT, delay), WANTED), atol=ROUNDING
+    )
 
 
 def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps() -> None:
@@ -50,7 +56,9 @@ def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps() -> Non
     for _ in range(100_000):
         late.step(STILL, STILL, STILL, dt)
     came = got(late, np.ones((100, 12)), dt)[:, 0]
-    assert np.sum(1.0 - came) * dt == pytest.approx(0.02, abs=1e-7)  # s: missing under a step of 1; 1 ns a step
+    assert np.sum(1.0 - came) * dt == pytest.approx(
+        0.02, abs=1e-7
+    )  # s: missing under a step of 1; 1 ns a step
 
 
 # first-order lag
@@ -60,7 +68,11 @@ def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps() -> Non
 def test_a_lags_step_response_is_its_closed_form(bandwidth: float) -> None:
     times = 1e-3 * np.arange(1, 301)
     closed = 12.0 * (1.0 - np.exp(-2.0 * np.pi * bandwidth * times))
-    assert np.allclose(got(FirstOrderLag(ROBOT, bandwidth), np.full((300, 12), 12.0)).T, closed, atol=12.0 * ROUNDING)
+    assert np.allclose(
+        got(FirstOrderLag(ROBOT, bandwidth), np.full((300, 12), 12.0)).T,
+        closed,
+        atol=12.0 * ROUNDING,
+    )
 
 
 def test_a_lag_takes_three_decibels_and_45_degrees_off_a_sine_of_its_bandwidth() -> None:
@@ -106,7 +118,11 @@ def test_a_rollout_through_a_delay_gets_the_torques_of_earlier_ticks() -> None:
 
 
 def test_go2_stands_live_through_a_lag() -> None:
-    sim, controller, lag = fb.Simulation(ROBOT), judges.controller_of("go2"), FirstOrderLag(ROBOT, 20.0)
+    sim, controller, lag = (
+        fb.Simulation(ROBOT),
+        judges.controller_of("go2"),
+        FirstOrderLag(ROBOT, 20.0),
+    )
     lag.reset(controller(sim.q, sim.v).tau)
     records: list[fb.Rollout] = []
     live = LiveSimulation(sim, controller, records.append, actuators=lag)
@@ -132,4 +148,9 @@ def test_go2_stands_live_through_a_lag() -> None:
 
 def test_actuators_of_another_robot_are_refused() -> None:
     with raises(InputError, "actuators", "solo12", "go2"):
-        fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.01, actuators=Delay(judges.load("solo12"), 0.0))
+        fb.rollout(
+            fb.Simulation(ROBOT),
+            judges.controller_of("go2"),
+            0.01,
+            actuators=Delay(judges.load("solo12"), 0.0),
+        )

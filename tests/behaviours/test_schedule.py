@@ -1,4 +1,6 @@
-"""Gaits, swings, the pendulum and footholds: what their definitions promise, by finite differences and closed forms."""
+"""Gaits, swings, the pendulum and footholds: what their definitions promise, by finite differences
+and closed forms.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,23 @@ from messages import refused
 from scipy.spatial import ConvexHull
 
 import floatbase as fb
-from floatbase.behaviours import LIPM, Gait, Swing, capture_point, neutral_point, step_adjustment, support_margin
+from floatbase.behaviours import (
+    LIPM,
+    Gait,
+    Swing,
+    capture_point,
+    neutral_point,
+    step_adjustment,
+    support_margin,
+)
 from floatbase.errors import InputError, UnknownNameError
 
 STEP = 1e-5  # s to each side of central differences
-QUADRUPED = {"go2": ("FL", "RR", "FR", "RL"), "solo12": ("FL", "HR", "FR", "HL"), "anymal_kinova": ("LF", "RH", "RF", "LH")}
+QUADRUPED = {
+    "go2": ("FL", "RR", "FR", "RL"),
+    "solo12": ("FL", "HR", "FR", "HL"),
+    "anymal_kinova": ("LF", "RH", "RF", "LH"),
+}
 
 
 @pytest.mark.parametrize("name", QUADRUPED)
@@ -50,7 +64,9 @@ def test_phases_follow_one_another_and_agree_with_the_stance() -> None:
         phases = gait.phases(t, 12)
         assert phases[0][0] == t and all(a[1] == b[0] for a, b in itertools.pairwise(phases))
         for begin, end, stance in phases:
-            assert end > begin and all(gait.stance(begin + part * (end - begin)) == stance for part in (0.01, 0.5, 0.99))
+            assert end > begin and all(
+                gait.stance(begin + part * (end - begin)) == stance for part in (0.01, 0.5, 0.99)
+            )
 
 
 def test_no_foot_lifts_from_the_stop_on_and_endless_standing_is_cut() -> None:
@@ -68,7 +84,9 @@ def test_stance_times_bear_the_rounding_of_the_clock() -> None:
     for _ in range(20_000):  # as a simulation adds up its steps: 20 s
         stances.append(gait.stance(t))
         t += timestep
-    changes = [i for i, (before, after) in enumerate(itertools.pairwise(stances), 1) if before != after]
+    changes = [
+        i for i, (before, after) in enumerate(itertools.pairwise(stances), 1) if before != after
+    ]
     assert changes == list(range(250, 20_000, 250))
 
 
@@ -91,7 +109,9 @@ def test_a_swing_leads_from_rest_to_rest_over_its_height() -> None:
     assert np.allclose(middle, (swing.start + swing.end) / 2.0 + [0.0, 0.0, 0.05])
     for t in np.linspace(0.31, 0.79, 25):
         (x0, v0, _), (x1, v1, _), (_, v, a) = swing(t - STEP), swing(t + STEP), swing(t)
-        assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6) and np.allclose((v1 - v0) / (2 * STEP), a, atol=1e-4)
+        assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6) and np.allclose(
+            (v1 - v0) / (2 * STEP), a, atol=1e-4
+        )
     refused(lambda: replace(swing, touchdown=0.3), InputError, 0.3)
 
 
@@ -99,7 +119,9 @@ def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp() -> None:
     rng, omega = np.random.default_rng(2), 3.4
     times = np.cumsum(rng.uniform(0.2, 0.8, 6))
     places = rng.normal(0.0, 0.1, (6, 2))
-    pieces = [(a, b, p0, p1) for a, b, p0, p1 in zip(times, times[1:], places, places[1:], strict=False)]
+    pieces = [
+        (a, b, p0, p1) for a, b, p0, p1 in zip(times, times[1:], places, places[1:], strict=False)
+    ]
     plan = LIPM(pieces, rng.normal(0.0, 0.1, 2), omega)
     assert np.allclose(plan(times[0])[0], plan.com)
     assert np.allclose(plan.dcm(times[-1]), places[-1], atol=1e-12)
@@ -114,13 +136,21 @@ def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp() -> None:
             assert np.allclose((after[1] - before[1]) / (2 * STEP), a, atol=1e-4)
     for edge in times[1:]:  # position and velocity do not jump where the ZMP turns
         before, after = plan(edge - 1e-9), plan(edge + 1e-9)
-        assert np.allclose(before[0], after[0], atol=1e-7) and np.allclose(before[1], after[1], atol=1e-7)
+        assert np.allclose(before[0], after[0], atol=1e-7) and np.allclose(
+            before[1], after[1], atol=1e-7
+        )
     assert np.allclose(plan(times[-1] + 20.0)[0], places[-1], atol=1e-9)  # at rest on the last ZMP
 
 
 def test_a_pendulum_refuses_gaps_and_what_is_no_plan() -> None:
     zero = np.zeros(2)
-    refused(lambda: LIPM([(0.0, 1.0, zero, zero), (1.5, 2.0, zero, zero)], zero, 3.0), InputError, "ZMP", 1.5, 2)
+    refused(
+        lambda: LIPM([(0.0, 1.0, zero, zero), (1.5, 2.0, zero, zero)], zero, 3.0),
+        InputError,
+        "ZMP",
+        1.5,
+        2,
+    )
     refused(lambda: LIPM([], zero, 3.0), InputError, "ZMP")
     refused(lambda: LIPM([(0.0, 1e3, zero, zero)], zero, 3.0), InputError, "omega", 1000)
 
@@ -151,10 +181,15 @@ def test_the_support_margin_is_the_distance_to_the_hull() -> None:
         else:  # the nearest point of an edge, sampled
             corners = feet[hull.vertices]
             share = np.linspace(0.0, 1.0, 2001)[:, None]
-            edges = [a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+            edges = [
+                a + share * (b - a)
+                for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+            ]
             nearest = min(np.linalg.norm(point - edge, axis=1).min() for edge in edges)
             assert margin < 0.0 and np.isclose(-margin, nearest, atol=2e-3)
-    assert np.isclose(support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0)  # two feet: a line
+    assert np.isclose(
+        support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0
+    )  # two feet: a line
     assert np.isclose(support_margin([0.0, 1.0], [[0.0, 0.0]]), -1.0)
     refused(lambda: support_margin([0.0, 0.0], np.zeros((0, 2))), InputError, "feet")
 
@@ -167,10 +202,18 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
     rng = np.random.default_rng(4)
     for _ in range(20):
         period, start = rng.uniform(0.2, 2.0), rng.uniform(-1.0, 1.0)
-        gait = Gait({foot: rng.uniform(0.0, 0.99) for foot in "abcd"}, period, rng.uniform(0.05, 0.9) * period, start, stop=9.0)
+        gait = Gait(
+            {foot: rng.uniform(0.0, 0.99) for foot in "abcd"},
+            period,
+            rng.uniform(0.05, 0.9) * period,
+            start,
+            stop=9.0,
+        )
         late = start + rng.uniform(0.0, 5.0)
         after = gait.starting_at(late)
-        assert gait.starting_at(start) is gait and not any(after.swing_at(foot, late - 1e-6) for foot in "abcd")
+        assert gait.starting_at(start) is gait and not any(
+            after.swing_at(foot, late - 1e-6) for foot in "abcd"
+        )
         for t in rng.uniform(late, 12.0, 20):
             for foot in "abcd":
                 times, found = gait.swing_at(foot, t), after.swing_at(foot, t)
@@ -179,4 +222,6 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
                 else:
                     assert found is not None and np.allclose(times, found, atol=1e-9)
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
-    assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx((3.0, 3.25))  # 30 · 0.1 is not 3: the rounding lifts it
+    assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx(
+        (3.0, 3.25)
+    )  # 30 · 0.1 is not 3: the rounding lifts it

@@ -1,6 +1,8 @@
-"""`Walk` and `Stand` on MuJoCo: the figures that were reached, and the falls on the way there, each with its name.
+"""`Walk` and `Stand` on MuJoCo: the figures that were reached, and the falls on the way there, each
+with its name.
 
-All run with a control period of 2 ms; `benchmarks/walking.py` has the long runs, 1 ms, and thirty pushes each.
+All run with a control period of 2 ms; `benchmarks/walking.py` has the long runs, 1 ms, and thirty
+pushes each.
 """
 
 from __future__ import annotations
@@ -24,7 +26,12 @@ from floatbase.simulation import Rollout
 PERIOD = 2e-3  # s
 
 
-def walk_of(name: str, gait: Callable[[Any], Gait], velocity: tuple[float, float] = (0.0, 0.0), **options: Any) -> Walk:
+def walk_of(
+    name: str,
+    gait: Callable[[Any], Gait],
+    velocity: tuple[float, float] = (0.0, 0.0),
+    **options: Any,
+) -> Walk:
     robot = judges.load(name)
     return Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait(robot), velocity, **options)
 
@@ -65,10 +72,14 @@ def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
     rows = (record.time > 2.0) & (record.time < 4.0)
     time, forces = record.time[rows], record.measured[rows].reshape(rows.sum(), -1, 3).sum(axis=1)
     gravity = np.array([0.0, 0.0, -walk.robot.weight])
-    ends = [record.state(int(np.searchsorted(record.time, t))).com_velocity for t in (time[0], time[-1])]
+    ends = [
+        record.state(int(np.searchsorted(record.time, t))).com_velocity for t in (time[0], time[-1])
+    ]
     impulse = (forces[:-1] + gravity).sum(axis=0) * PERIOD
     assert np.allclose(
-        impulse, walk.robot.mass * (ends[1] - ends[0]), atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5
+        impulse,
+        walk.robot.mass * (ends[1] - ends[0]),
+        atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5,
     )
 
 
@@ -84,7 +95,10 @@ def test_every_tick_of_a_walk_is_compiled() -> None:
             backends.append(command.backend)
             return command
 
-    assert fb.rollout(fb.Simulation(walk.robot), Told(), 2.0, control_period=PERIOD).outcome == "completed"
+    assert (
+        fb.rollout(fb.Simulation(walk.robot), Told(), 2.0, control_period=PERIOD).outcome
+        == "completed"
+    )
     assert set(backends) == {"compiled"}
 
 
@@ -107,11 +121,19 @@ def test_each_foot_is_lifted_in_turn_while_the_robot_stands() -> None:
 def test_a_ramp_takes_the_jumps_out_of_the_torques() -> None:
     jumps = {}
     for ramp in (0.0, 0.1):
-        walk = walk_of("go2", lambda robot: Gait.crawl(robot, swing=0.3, pause=0.3), (0.05, 0.0), ramp=ramp)
+        walk = walk_of(
+            "go2", lambda robot: Gait.crawl(robot, swing=0.3, pause=0.3), (0.05, 0.0), ramp=ramp
+        )
         record = run(walk, 4.0)
         assert record.outcome == "completed"
-        changes = [i for i, (a, b) in enumerate(zip(record.stances, record.stances[1:], strict=False), 1) if a is not b]
-        jumps[ramp] = np.median([np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in changes])
+        changes = [
+            i
+            for i, (a, b) in enumerate(zip(record.stances, record.stances[1:], strict=False), 1)
+            if a is not b
+        ]
+        jumps[ramp] = np.median(
+            [np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in changes]
+        )
     assert jumps[0.1] < 1.5 and jumps[0.1] < 0.5 * jumps[0.0]  # N·m
 
 
@@ -128,7 +150,9 @@ def test_it_turns_on_the_spot_and_goes_sideways() -> None:
     assert record.outcome == "completed"
     q = record.q[-1]
     yaw = np.arctan2(2.0 * (q[6] * q[5] + q[3] * q[4]), 1.0 - 2.0 * (q[4] ** 2 + q[5] ** 2))
-    assert np.isclose(yaw, 0.5 * (3.0 - 0.25), atol=0.1)  # half a second of it speeds up by 1 rad/s²
+    assert np.isclose(
+        yaw, 0.5 * (3.0 - 0.25), atol=0.1
+    )  # half a second of it speeds up by 1 rad/s²
 
 
 def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew() -> None:
@@ -151,26 +175,41 @@ def test_steps_save_a_robot_that_would_fall() -> None:
     standing, stepping = Stand(robot, contacts), Stand(robot, contacts, Gait.trot(robot, swing=0.2))
     assert run(standing, 2.5, push).outcome != "completed"
     record = run(stepping, 4.0, push)
-    assert record.outcome == "completed" and np.linalg.norm(record.final.com_velocity) < 0.1 and not stepping.stepping
+    assert (
+        record.outcome == "completed"
+        and np.linalg.norm(record.final.com_velocity) < 0.1
+        and not stepping.stepping
+    )
     assert any(len(step.stance) < 4 for step in stepping.history)
 
 
 @pytest.mark.parametrize("towards", [(1.0, 1.0), (-1.0, -1.0)])
 def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float, float]) -> None:
     robot = judges.load("go2")
-    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot))  # whose first pair stands along this diagonal
+    stand = Stand(
+        robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot)
+    )  # whose first pair stands along this diagonal
     push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
-    assert run(stand, 2.0, push).outcome == "completed"  # it fell at 230 N, which standing alone survives
-    assert next(step.stance for step in stand.history if len(step.stance) == 2) == ("FL_foot", "RR_foot")
+    assert (
+        run(stand, 2.0, push).outcome == "completed"
+    )  # it fell at 230 N, which standing alone survives
+    assert next(step.stance for step in stand.history if len(step.stance) == 2) == (
+        "FL_foot",
+        "RR_foot",
+    )
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side: str) -> None:
     robot = judges.load("talos")
-    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot))  # whose first foot is the left one
+    stand = Stand(
+        robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot)
+    )  # whose first foot is the left one
     push = fb.Push([0.0, 400.0 if side == "left" else -400.0, 0.0], start=0.1)
     assert run(stand, 1.3, push).outcome == "completed"
-    assert next(step.stance for step in stand.history if len(step.stance) == 1) == (f"{side}_sole_link",)
+    assert next(step.stance for step in stand.history if len(step.stance) == 1) == (
+        f"{side}_sole_link",
+    )
 
 
 def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_then() -> None:
@@ -178,7 +217,9 @@ def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_
     gait = Gait({"FL_foot": 0.8, "RR_foot": 0.8, "FR_foot": 0.1 + 0.2, "RL_foot": 0.3}, 0.5, 0.2)
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), gait)
     for towards in (1.0, -1.0):
-        assert run(stand, 0.7, fb.Push([0.0, 250.0 * towards, 0.0], start=0.2)).outcome == "completed"
+        assert (
+            run(stand, 0.7, fb.Push([0.0, 250.0 * towards, 0.0], start=0.2)).outcome == "completed"
+        )
         assert next(len(step.stance) for step in stand.history if len(step.stance) < 4) == 2
 
 
@@ -197,7 +238,9 @@ def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
     moving = state.replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
     with pytest.raises(fb.InfeasibleError):
         hard(moving.q, moving.v)
-    soft = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), contact_weight=1e4, **weak)
+    soft = fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(state), contact_weight=1e4, **weak
+    )
     command = soft(moving.q, moving.v)
     assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6)
     held = fb.equations_of_motion(moving, contacts)
@@ -209,10 +252,15 @@ def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
 def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
     robot = judges.load("go2")
     state, contacts = robot.standing(), judges.stance(robot)
-    held, soft = (fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), contact_weight=w) for w in (None, 1e6))
+    held, soft = (
+        fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), contact_weight=w)
+        for w in (None, 1e6)
+    )
     assert np.allclose(held(state.q, state.v).tau, soft(state.q, state.v).tau, atol=1e-3)
     other = soft.replace(contacts=contacts.without("FL_foot"))
-    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(soft.tasks)
+    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(
+        soft.tasks
+    )
 
 
 def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
@@ -223,7 +271,9 @@ def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
     with pytest.raises(fb.InfeasibleError):
         fb.WholeBodyController(robot, judges.stance(robot), (), **weak)(moving.q, moving.v)
     command = walk(moving.q, moving.v)
-    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6) and command.forces.shape == (walk.contacts.k,)
+    assert np.all(
+        np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6
+    ) and command.forces.shape == (walk.contacts.k,)
 
 
 def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
@@ -233,21 +283,28 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         q = np.array(robot.standing().q)
-        q[:3], q[3:7] = turn @ q[:3] + [1.0, -2.0, 0.0], [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        q[:3], q[3:7] = (
+            turn @ q[:3] + [1.0, -2.0, 0.0],
+            [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)],
+        )
         sim = fb.Simulation(robot)
         sim.reset(robot.standing().replace(q=q))
-        walk = walk_of("go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw)  # of the facets of friction
+        walk = walk_of(
+            "go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw
+        )  # of the facets of friction
         record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
         assert record.outcome == "completed"
         ways.append((record.com - record.com[0]) @ turn)
         for step in walk.history:  # no foot lands on the other side of the body
             i = int(np.searchsorted(record.time, step.time))
             at = {foot: (record.state(i).point(foot) - record.com[i]) @ turn for foot in feet}
-            assert all(np.sign(at[foot][1]) == np.sign(robot.standing().point(foot)[1]) for foot in feet)
+            assert all(
+                np.sign(at[foot][1]) == np.sign(robot.standing().point(foot)[1]) for foot in feet
+            )
     assert np.abs(ways[0] - ways[1]).max() < 0.02  # m, of 0.3: what rounds otherwise grows
 
 
-# the falls on the way, each a test ------------------------------------------------------------------------------------------
+# the falls on the way, each a test ----------------------------------------------------------------
 
 
 def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
@@ -258,7 +315,9 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
     )  # fmt: skip
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
     assert record.outcome == "completed"  # limited about the plan it falls
-    assert reach < leg + walk.reach + 0.05  # from the body; from the plan they would be where the push has led it
+    assert (
+        reach < leg + walk.reach + 0.05
+    )  # from the body; from the plan they would be where the push has led it
 
 
 def test_a_stance_with_area_does_not_throw_its_feet_away() -> None:
@@ -283,7 +342,9 @@ def test_feet_aim_at_the_ground_and_not_below_it() -> None:
 def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot() -> None:
     record = run(walk_of("go2", Gait.trot, (0.9, 0.0)), 3.5)
     assert record.outcome == "completed"
-    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1)
+    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(
+        speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1
+    )
 
 
 def test_endless_standing_has_an_end_to_plan_for() -> None:
@@ -299,7 +360,9 @@ def test_the_path_gives_way_after_a_long_step() -> None:
     (calm, _), (record, _) = trot(), trot(200.0)
     moved = record.com[-1, 1] - calm.com[-1, 1]
     assert moved > 0.1  # it goes on where it was pushed to, and does not run back
-    assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1)
+    assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(
+        speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1
+    )
 
 
 def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> None:
@@ -309,11 +372,13 @@ def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> 
         row = np.searchsorted(record.time, step.time + 0.05)
         for foot in step.stance:
             place = record.state(int(row)).point(foot)
-            assert np.linalg.norm(place - step.feet[foot]) < radius / 4  # a ball that rolls moves less than that in 50 ms
+            assert (
+                np.linalg.norm(place - step.feet[foot]) < radius / 4
+            )  # a ball that rolls moves less than that in 50 ms
             assert place[2] - radius < 2e-3
 
 
-# when it begins, ends, and begins anew ----------------------------------------------------------------------------------------
+# when it begins, ends, and begins anew ------------------------------------------------------------
 
 
 def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
@@ -321,15 +386,22 @@ def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
     steps, times = list(walk.history), [step.time for step in walk.history]
     rows = np.flatnonzero(record.time >= begin)
     plans = np.searchsorted(times, record.time[rows] + 1e-9) - 1
-    return max(np.linalg.norm(steps[p].plan(record.time[i])[0] - record.com[i, :2]) for p, i in zip(plans, rows, strict=True))
+    return max(
+        np.linalg.norm(steps[p].plan(record.time[i])[0] - record.com[i, :2])
+        for p, i in zip(plans, rows, strict=True)
+    )
 
 
 def test_the_load_shifts_before_a_first_step_that_is_far_away() -> None:
-    walk = walk_of("talos", lambda robot: Gait.walk(robot, start=5.5))  # beyond the 5 s that a plan looks ahead
+    walk = walk_of(
+        "talos", lambda robot: Gait.walk(robot, start=5.5)
+    )  # beyond the 5 s that a plan looks ahead
     sim = fb.Simulation(walk.robot)
     assert fb.rollout(sim, walk, 4.0, control_period=PERIOD).outcome == "completed"
     record = fb.rollout(sim, walk, 2.4, control_period=PERIOD)
-    assert record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02  # it was 7 cm
+    assert (
+        record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02
+    )  # it was 7 cm
 
 
 def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_stands() -> None:
@@ -338,15 +410,23 @@ def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_st
     fb.rollout(sim, walk, 0.5, control_period=PERIOD)
     walk.gait = Gait.crawl(walk.robot, swing=0.5, pause=0.3, start=1.5)
     record = fb.rollout(sim, walk, 2.0, control_period=PERIOD)
-    assert record.outcome == "completed" and farthest_from_plan(record, walk, 1.4) < 0.02 and tilt(record) < 0.3
-    assert record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight  # its foot is unloaded
+    assert (
+        record.outcome == "completed"
+        and farthest_from_plan(record, walk, 1.4) < 0.02
+        and tilt(record) < 0.3
+    )
+    assert (
+        record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight
+    )  # its foot is unloaded
 
 
 def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=-0.15))
     record = run(walk, 1.0)
     assert record.outcome == "completed" and len(walk.history[0].stance) == 4
-    assert [step.time for step in walk.history][1] == pytest.approx(0.1, abs=PERIOD)  # the next lift-off of the schedule
+    assert [step.time for step in walk.history][1] == pytest.approx(
+        0.1, abs=PERIOD
+    )  # the next lift-off of the schedule
     assert record.measured[:, 2::3].max() < walk.robot.weight
 
 
@@ -390,7 +470,11 @@ def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
     other = Stand(walk.robot, fb.Contacts.feet(walk.robot))
     fb.rollout(sim, other, 3.0, control_period=PERIOD)
     record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # 3 s went by without it
-    assert record.outcome == "completed" and tilt(record) < 0.5 and walk.history[0].time == pytest.approx(4.0)
+    assert (
+        record.outcome == "completed"
+        and tilt(record) < 0.5
+        and walk.history[0].time == pytest.approx(4.0)
+    )
 
 
 def test_a_copy_of_a_robot_that_steps_stands() -> None:
@@ -411,7 +495,7 @@ def test_a_least_normal_force_bounds_the_ramps() -> None:
     assert planned[planned > 0.0].min() == pytest.approx(5.0, abs=1e-3)
 
 
-# what it is -----------------------------------------------------------------------------------------------------------------
+# what it is ---------------------------------------------------------------------------------------
 
 
 def test_a_foothold_of_ones_own_is_taken() -> None:
@@ -435,7 +519,9 @@ def test_a_walk_on_a_slope_follows_it() -> None:
     normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
     ground = fb.Ground(normal=normal)
     sim = fb.Simulation(robot, ground=ground)
-    walk = Walk(robot, fb.Contacts.points(robot, mu=0.6, normals=normal), Gait.trot(robot), (0.2, 0.0))
+    walk = Walk(
+        robot, fb.Contacts.points(robot, mu=0.6, normals=normal), Gait.trot(robot), (0.2, 0.0)
+    )
     record = fb.rollout(sim, walk, 4.0, control_period=PERIOD)
     assert record.outcome == "completed"
     climbed = record.com[-1] - record.com[0]
@@ -472,7 +558,13 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: Walk(robot, contacts, flying), 0),
         (lambda: Stand(robot, contacts, flying), 0),
         (lambda: walk.nominal_foothold("FL_foot", 1.0), "Walk"),
-        (lambda: Walk(robot, contacts, trot, foothold=lambda foot: np.zeros(2)), "foothold", "foot", "land", "walk"),
+        (
+            lambda: Walk(robot, contacts, trot, foothold=lambda foot: np.zeros(2)),
+            "foothold",
+            "foot",
+            "land",
+            "walk",
+        ),
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),
         (lambda: setattr(walk, "velocty", 0.2), "velocty"),
         (lambda: setattr(walk, "clearance", 0.2), "clearance"),
@@ -485,4 +577,6 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
 def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
     record = run(walk_of(name, Gait.walk if name == "g1" else Gait.trot, (0.2, 0.0)), 3.0)
     assert record.outcome == "completed"
-    assert np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1  # 2 s, in which it speeds up at 1 m/s²
+    assert (
+        np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
+    )  # 2 s, in which it speeds up at 1 m/s²

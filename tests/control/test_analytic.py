@@ -1,4 +1,6 @@
-"""The controller of objectives alone (§3.1): it stands, it is the optimum it claims, and it fails as §4 says it must."""
+"""The controller of objectives alone (§3.1): it stands, it is the optimum it claims, and it fails
+as §4 says it must.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def controller_of(name: str) -> AnalyticController:
 
 @cache
 def standing(name: str) -> fb.Rollout:
-    return fb.rollout(fb.Simulation(judges.load(name)), controller_of(name), 1.5, control_period=PERIOD)
+    return fb.rollout(
+        fb.Simulation(judges.load(name)), controller_of(name), 1.5, control_period=PERIOD
+    )
 
 
 def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State:
@@ -43,7 +47,9 @@ def inertia_about_com(state: fb.State) -> Array:
     """Σ R I Rᵀ + m (‖r‖² 1 - r rᵀ) over MuJoCo's bodies about their common centre."""
     judge = judges.mujoco_of(state.robot.name).move_to(state)
     total = np.zeros((3, 3))
-    centre = (judge.model.body_mass[:, None] * judge.data.xipos).sum(axis=0) / judge.model.body_mass.sum()
+    centre = (judge.model.body_mass[:, None] * judge.data.xipos).sum(
+        axis=0
+    ) / judge.model.body_mass.sum()
     for i in range(1, judge.model.nbody):
         R, r = judge.data.ximat[i].reshape(3, 3), judge.data.xipos[i] - centre
         total += R @ np.diag(judge.model.body_inertia[i]) @ R.T
@@ -52,9 +58,11 @@ def inertia_about_com(state: fb.State) -> Array:
 
 
 def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]:
-    """q̈, τ, λ and the value of the controller's objective, minimised by cvxpy over all three with (7) as equalities.
+    """q̈, τ, λ and the value of the controller's objective, minimised by cvxpy over all three with
+    (7) as equalities.
 
-    Every term is written from its formula: (22), (23), posture and torque with the default gains and weights.
+    Every term is written from its formula: (22), (23), posture and torque with the default gains
+    and weights.
     """
     robot, held = state.robot, judges.load(name).standing()
     contacts = judges.stance(robot)
@@ -74,24 +82,32 @@ def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]
     share = mass * g / contacts.n_points
     joints = -kp * (state.q[7:] - held.q[7:]) - kd * state.v[6:]
     cost = 0.5 * cp.sum_squares(cp.sum(f, axis=0) - force) + 0.5 * cp.sum_squares(tau_c - moment)
-    cost += weights["bias"] * 0.5 * (cp.sum_squares(f[:, :2]) + alpha * cp.sum_squares(f[:, 2] - share))
-    cost += weights["posture"] * 0.5 * cp.sum_squares(qdd[6:] - joints) + weights["torque"] * 0.5 * cp.sum_squares(tau)
+    cost += (
+        weights["bias"] * 0.5 * (cp.sum_squares(f[:, :2]) + alpha * cp.sum_squares(f[:, 2] - share))
+    )
+    cost += weights["posture"] * 0.5 * cp.sum_squares(qdd[6:] - joints) + weights[
+        "torque"
+    ] * 0.5 * cp.sum_squares(tau)
     U, s, Vt = np.linalg.svd(eom.A)
     r = int(np.sum(s > 1e-9 * s[0]))
     rows = [judge.M @ qdd + judge.h == eom.S @ tau + eom.J.T @ cp.vec(f, order="C")]
     rows.append(Vt[:r] @ qdd == (U.T @ eom.b)[:r] / s[:r])
     problem = cp.Problem(cp.Minimize(cost), rows)
-    problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200)
+    problem.solve(
+        solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12, max_iter=200
+    )
     assert problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
     return qdd.value, tau.value, f.value.ravel(), float(problem.value)
 
 
-# standing ----------------------------------------------------------------------------------------------------------------
+# standing -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
 def test_robots_of_every_kind_stand_on_objectives_alone(name: str) -> None:
-    """1.5 s in MuJoCo: too few torques (solo8), enough (go2, solo12), redundant ones (anymal_kinova), flat feet (talos)."""
+    """1.5 s in MuJoCo: too few torques (solo8), enough (go2, solo12), redundant ones
+    (anymal_kinova), flat feet (talos).
+    """
     run, start = standing(name), judges.load(name).standing()
     assert run.outcome == "completed"
     assert np.linalg.norm(run.com[-1] - start.com) < 1e-4
@@ -102,9 +118,15 @@ def test_robots_of_every_kind_stand_on_objectives_alone(name: str) -> None:
 @pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
 def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(name: str) -> None:
     run, robot = standing(name), judges.load(name)
-    assert np.allclose(run.planned[-1].reshape(-1, 3).sum(axis=0), [0.0, 0.0, robot.weight], atol=1e-3 * robot.weight)
+    assert np.allclose(
+        run.planned[-1].reshape(-1, 3).sum(axis=0),
+        [0.0, 0.0, robot.weight],
+        atol=1e-3 * robot.weight,
+    )
     planned, measured = (
-        np.array([x[run.contacts.force_slice(c.name)].reshape(-1, 3).sum(axis=0) for c in run.contacts])
+        np.array(
+            [x[run.contacts.force_slice(c.name)].reshape(-1, 3).sum(axis=0) for c in run.contacts]
+        )
         for x in (run.planned[-1], run.measured[-1])
     )
     assert np.max(np.abs(planned - measured)) < 1e-4 * robot.weight
@@ -121,27 +143,42 @@ def test_it_goes_where_its_centre_of_mass_is_to_be() -> None:
 
 
 @pytest.mark.parametrize("exponent", [3, 4, 6, 8])
-def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(exponent: int) -> None:
-    """solo8 with joint angles off by 1e-6 rad and 0.1 rad/s of noise: rows taken to the letter need thousands of N·m."""
+def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(
+    exponent: int,
+) -> None:
+    """solo8 with joint angles off by 1e-6 rad and 0.1 rad/s of noise: rows taken to the letter need
+    thousands of N·m.
+    """
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
-    state = judges.along(robot.standing(), np.append(np.zeros(6), rng.normal(size=8)), 10.0**-exponent)
+    state = judges.along(
+        robot.standing(), np.append(np.zeros(6), rng.normal(size=8)), 10.0**-exponent
+    )
     command = controller_of("solo8")(state.q, 0.1 * rng.normal(size=robot.nv))
     assert np.max(np.abs(command.tau)) < 1.2  # N·m; 0.9 at the singular stance itself
     assert np.max(np.abs(command.forces)) < robot.weight
 
 
-# the optimum -------------------------------------------------------------------------------------------------------------
+# the optimum --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(name: str, seed: int) -> None:
-    """Value to 1e-6 everywhere; the answer itself too where weights of 1e-6 do not leave it to rounding."""
+def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(
+    name: str, seed: int
+) -> None:
+    """Value to 1e-6 everywhere; the answer itself too where weights of 1e-6 do not leave it to
+    rounding.
+    """
     state, controller = near(name, seed), controller_of(name)
     command = controller(state.q, state.v)
     eom = fb.equations_of_motion(state, controller.contacts)
-    value = sum(cost(x) for cost, x in zip(controller.objective(eom), (command.qdd, command.tau, command.forces), strict=True))
+    value = sum(
+        cost(x)
+        for cost, x in zip(
+            controller.objective(eom), (command.qdd, command.tau, command.forces), strict=True
+        )
+    )
     qdd, tau, forces, best = written_out(name, state)
     assert value == pytest.approx(best, rel=1e-5, abs=1e-6)
     scale = max(1.0, float(np.abs(forces).max()))
@@ -157,13 +194,18 @@ def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
         command = controller(state.q, state.v)
         eom = fb.equations_of_motion(state, controller.contacts)
         scale = max(1.0, float(np.abs(command.forces).max()))
-        assert np.max(np.abs(judges.aba(eom, command.tau, command.forces) - command.qdd)) < 1e-6 * scale
+        assert (
+            np.max(np.abs(judges.aba(eom, command.tau, command.forces) - command.qdd))
+            < 1e-6 * scale
+        )
         held = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=1e-9)[0]
         assert np.max(np.abs(eom.A @ command.qdd - held)) < 1e-7 * scale
 
 
 def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same() -> None:
-    """§4: the QP is a strict generalisation. The same terms as tasks, limits far away: the same torques."""
+    """§4: the QP is a strict generalisation. The same terms as tasks, limits far away: the same
+    torques.
+    """
     from floatbase.control import Limits, build_qp
     from floatbase.qp import QP, solve
 
@@ -198,12 +240,20 @@ def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
     leaning = judges.along(state, lean, 1.0)
     expected = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
     for controller, gained in (
-        (AnalyticController(state.robot, contacts, state, posture_weight=1e-7), pytest.approx(expected, rel=0.02)),
-        (controller_of("go2"), pytest.approx(0.65 * expected, rel=0.55)),  # the default posture term takes its share
+        (
+            AnalyticController(state.robot, contacts, state, posture_weight=1e-7),
+            pytest.approx(expected, rel=0.02),
+        ),
+        (
+            controller_of("go2"),
+            pytest.approx(0.65 * expected, rel=0.55),
+        ),  # the default posture term takes its share
     ):
         command = controller(leaning.q, leaning.v)
         model, data = state.robot.model, state.robot.model.createData()
-        rate = pin.computeCentroidalMomentumTimeVariation(model, data, leaning.q, leaning.v, command.qdd).angular
+        rate = pin.computeCentroidalMomentumTimeVariation(
+            model, data, leaning.q, leaning.v, command.qdd
+        ).angular
         assert rate[axis] == gained
 
 
@@ -217,7 +267,9 @@ def turned(state: fb.State, yaw: float) -> fb.State:
 
 
 def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
-    """Errors of rotation are world vectors: with the held posture and the state turned together nothing changes."""
+    """Errors of rotation are world vectors: with the held posture and the state turned together
+    nothing changes.
+    """
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot)
     state = near("go2", 3, far=0.2)
@@ -225,15 +277,19 @@ def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
     for yaw in (0.5, 1.6, 3.0):
         facing = AnalyticController(robot, contacts, turned(robot.standing(), yaw))
         there = turned(state, yaw)
-        assert np.allclose(facing(there.q, there.v).tau, expected, atol=1e-6 * np.abs(expected).max())
+        assert np.allclose(
+            facing(there.q, there.v).tau, expected, atol=1e-6 * np.abs(expected).max()
+        )
 
 
-# the failure that §4 is for ----------------------------------------------------------------------------------------------
+# the failure that §4 is for -----------------------------------------------------------------------
 
 
 @cache
 def pushed(controller: str, weights: float) -> fb.Rollout:
-    """go2 pushed sideways for 0.1 s with a part of its weight, by the analytic or the QP controller."""
+    """go2 pushed sideways for 0.1 s with a part of its weight, by the analytic or the QP
+    controller.
+    """
     robot = judges.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     program = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
@@ -250,12 +306,16 @@ def test_a_light_push_costs_it_nothing() -> None:
 
 
 def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> None:
-    """A foot is told to hold on by more than 1 N; MuJoCo's ground never does, and within half a second the robot is down."""
+    """A foot is told to hold on by more than 1 N; MuJoCo's ground never does, and within half a
+    second the robot is down.
+    """
     run = pushed("analytic", 0.5)
     asks = np.flatnonzero(run.planned[:, 2::3].min(axis=1) < -1.0)
     assert run.outcome == "fell" and run.time[-1] < 0.6
     assert len(asks) > 0
-    assert 0.1 < run.time[asks[0]] < 0.2, "the plan pulls while the push still acts, before the fall"
+    assert 0.1 < run.time[asks[0]] < 0.2, (
+        "the plan pulls while the push still acts, before the fall"
+    )
     assert run.measured[:, 2::3].min() >= 0.0
 
 

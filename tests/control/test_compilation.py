@@ -44,7 +44,7 @@ def tick_of(robot: Robot) -> CompiledTick:
     return compiled
 
 
-# when it runs --------------------------------------------------------------------------------------------------------------
+# when it runs -------------------------------------------------------------------------------------
 
 
 WITHOUT_NUMBA = """
@@ -65,7 +65,11 @@ except fb.FloatbaseError as error:
 @pytest.mark.parametrize(
     ("obstacle", "environment", "reason"),
     [
-        ('sys.modules["numba"] = None', {}, "numba cannot be loaded (.*); pip install numba may mend it"),
+        (
+            'sys.modules["numba"] = None',
+            {},
+            "numba cannot be loaded (.*); pip install numba may mend it",
+        ),
         ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, and numba compiles nothing"),
     ],
 )
@@ -73,28 +77,46 @@ def test_without_numba_the_reference_backend_answers_and_says_why(
     obstacle: str, environment: dict[str, str], reason: str
 ) -> None:
     command = [sys.executable, "-c", WITHOUT_NUMBA.format(obstacle=obstacle)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | environment)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=os.environ | environment
+    )
     said = done.stdout.splitlines()
     reason = reason.replace("(.*)", r"\(.*\)")
     assert re.fullmatch(f"reference reference {reason}", said[0])
     assert re.match(f'backend="compiled" is not possible: {reason}. backend="auto"', said[1])
 
 
-def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = fb.load("go2", torque_limits=20.0)  # one that no other test has: what fits is remembered for each robot
+def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = fb.load(
+        "go2", torque_limits=20.0
+    )  # one that no other test has: what fits is remembered for each robot
     monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "layout_supported", False)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()))
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot), fb.standing_tasks(robot.standing())
+    )
     assert controller.backend == "reference"
     assert "Pinocchio" in controller.backend_reason
 
 
 def test_threads_may_share_a_controller() -> None:
-    controller, states = judges.controller_of("go2", backend="compiled"), judges.states("go2", 40, 0.3)
-    expected, interval = [controller(state.q, state.v).tau for state in states], sys.getswitchinterval()
+    controller, states = (
+        judges.controller_of("go2", backend="compiled"),
+        judges.states("go2", 40, 0.3),
+    )
+    expected, interval = (
+        [controller(state.q, state.v).tau for state in states],
+        sys.getswitchinterval(),
+    )
 
     def wrong(shift: int) -> list[int]:
         order = (np.arange(400) + shift) % len(states)
-        return [i for i in order if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])]
+        return [
+            i
+            for i in order
+            if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])
+        ]
 
     sys.setswitchinterval(1e-6)  # s: threads take turns in the middle of a tick
     try:
@@ -109,7 +131,10 @@ def test_threads_may_share_a_controller() -> None:
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
     """The other threads, and the locks that they hold, stay behind in the middle of a tick."""
-    controller, state = judges.controller_of("go2", backend=backend), judges.load("go2").random_state(3, 0.1)
+    controller, state = (
+        judges.controller_of("go2", backend=backend),
+        judges.load("go2").random_state(3, 0.1),
+    )
     expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
 
     def answer(out: Any) -> None:
@@ -126,7 +151,9 @@ def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
     for _ in range(20):
         child = multiprocessing.get_context("fork").Process(target=answer, args=(out,))
         child.start()
-        answers.append(into.recv() if into.poll(10.0) else "nothing")  # s: a tick takes some milliseconds at most
+        answers.append(
+            into.recv() if into.poll(10.0) else "nothing"
+        )  # s: a tick takes some milliseconds at most
         child.kill()
         child.join()
         if answers[-1] == "nothing":
@@ -142,7 +169,9 @@ def test_a_replaced_controller_compiles_nothing() -> None:
     controller = judges.controller_of(robot.name, facets=6)
     with event.install_recorder("numba:compile") as recorder:
         for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
-            controller.replace(contacts=fb.Contacts.points(robot, frames=frames))(robot.posture, np.zeros(robot.nv))
+            controller.replace(contacts=fb.Contacts.points(robot, frames=frames))(
+                robot.posture, np.zeros(robot.nv)
+            )
     assert not recorder.buffer
 
 
@@ -151,7 +180,9 @@ def test_the_tick_can_be_compiled_before_it_is_needed(capsys: pytest.CaptureFixt
     assert "compiled" in capsys.readouterr().out
 
 
-def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_long_compilation_is_announced_and_a_short_one_is_not(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     with announce_if_slow("this takes long", after=0.0):
         time.sleep(0.2)
     assert capsys.readouterr().err == "this takes long\n"
@@ -160,17 +191,23 @@ def test_a_long_compilation_is_announced_and_a_short_one_is_not(capsys: pytest.C
     assert capsys.readouterr().err == ""
 
 
-# what is kept on disk ------------------------------------------------------------------------------------------------------
+# what is kept on disk -----------------------------------------------------------------------------
 
 
-def test_an_edit_in_any_file_of_the_tick_changes_the_key_of_its_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_in_any_file_of_the_tick_changes_the_key_of_its_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     copy = shutil.copytree(TICK, tmp_path / "tick", ignore=shutil.ignore_patterns("__pycache__"))
     key, files = jit.source_digest(copy), sorted(copy.glob("*.py"))
     assert len(files) == len(list(TICK.glob("*.py"))) and key == jit.source_digest()
-    assert inspect.getclosurevars(tick.tick.py_func).nonlocals == {"digest": key}  # numba's key holds the closure
+    assert inspect.getclosurevars(tick.tick.py_func).nonlocals == {
+        "digest": key
+    }  # numba's key holds the closure
     for file in files:
         text = file.read_text(encoding="utf-8")
-        file.write_text(text.replace("0", "1", 1) if "0" in text else text + "x = 1\n", encoding="utf-8")
+        file.write_text(
+            text.replace("0", "1", 1) if "0" in text else text + "x = 1\n", encoding="utf-8"
+        )
         assert jit.source_digest(copy) != key, file.name
         file.write_text(text, encoding="utf-8")
     assert jit.source_digest(copy) == key
@@ -218,19 +255,25 @@ jit.WritableCache = nowhere"""
 def copied(tmp_path: Path) -> Path:
     """The folder of a copy of the package with a small entry point."""
     package = TICK.parents[1]
-    copy = shutil.copytree(package, tmp_path / "floatbase", ignore=shutil.ignore_patterns("__pycache__", "_assets"))
+    copy = shutil.copytree(
+        package, tmp_path / "floatbase", ignore=shutil.ignore_patterns("__pycache__", "_assets")
+    )
     (copy / TICK.relative_to(package) / "tick.py").write_text(ENTRY, encoding="utf-8")
     return copy
 
 
 def run_copied(copy: Path, cache: Path | str = "", before: str = "") -> list[str]:
-    """A process on that copy: what it computes, how often it loaded code, what prevented it from keeping that.
+    """A process on that copy: what it computes, how often it loaded code, what prevented it from
+    keeping that.
 
-    cache: numba's folder, "" where numba looks for one, and that is beside the source. before: code.
+    cache: numba's folder, "" where numba looks for one, and that is beside the source. before:
+        code.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
     command = [sys.executable, "-c", f"from floatbase.control.tick import jit{before}{HITS}"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=copy.parent, env=environment, check=True)
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=copy.parent, env=environment, check=True
+    )
     return done.stdout.split(maxsplit=2)
 
 
@@ -238,17 +281,23 @@ def edit_copied(copy: Path) -> None:
     """Change a function that the small entry point calls, in another file."""
     vectors = copy / TICK.relative_to(TICK.parents[1]) / "vectors.py"
     text = vectors.read_text(encoding="utf-8")
-    vectors.write_text(text.replace("return a[0] * b[0] +", "return 10.0 * a[0] * b[0] +"), encoding="utf-8")
+    vectors.write_text(
+        text.replace("return a[0] * b[0] +", "return 10.0 * a[0] * b[0] +"), encoding="utf-8"
+    )
 
 
-def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(copied: Path, tmp_path: Path) -> None:
+def test_an_edited_function_is_compiled_anew_and_an_old_one_is_loaded(
+    copied: Path, tmp_path: Path
+) -> None:
     run = partial(run_copied, copied, tmp_path / "cache")
     assert run() == ["6.0", "0"] and run() == ["6.0", "1"]
     edit_copied(copied)
     assert run() == ["24.0", "0"] and run() == ["24.0", "1"]
 
 
-def test_what_was_compiled_beside_the_source_is_loaded_by_those_who_may_not_write_there(copied: Path, tmp_path: Path) -> None:
+def test_what_was_compiled_beside_the_source_is_loaded_by_those_who_may_not_write_there(
+    copied: Path, tmp_path: Path
+) -> None:
     assert run_copied(copied) == ["6.0", "0"]  # who installs it
     own = tmp_path / "own"
     assert run_copied(copied, own) == ["6.0", "1"]
@@ -272,7 +321,9 @@ def make_small(digest: int) -> Callable[[float], float]:
 
 @pytest.fixture
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
-    """Makes `make_small` ready in a folder of its own, checks its answer, and says whether it was loaded from disk."""
+    """Makes `make_small` ready in a folder of its own, checks its answer, and says whether it was
+    loaded from disk.
+    """
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(jit, "cache_error", "")
 
@@ -286,7 +337,11 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]
 
 def flipped(at: float) -> Callable[[bytes], bytes]:
     """One bit, at a part of the file."""
-    return lambda data: data[: int(at * len(data))] + bytes([data[int(at * len(data))] ^ 16]) + data[int(at * len(data)) + 1 :]
+    return lambda data: (
+        data[: int(at * len(data))]
+        + bytes([data[int(at * len(data))] ^ 16])
+        + data[int(at * len(data)) + 1 :]
+    )
 
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
@@ -301,12 +356,16 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-def test_damaged_files_are_compiled_anew_and_replaced(suffix: str, small: Callable[[], bool], tmp_path: Path) -> None:
+def test_damaged_files_are_compiled_anew_and_replaced(
+    suffix: str, small: Callable[[], bool], tmp_path: Path
+) -> None:
     assert not small() and small()
     (file,) = tmp_path.rglob("*" + suffix)
     for name, damage in DAMAGES.items():
         file.write_bytes(damage(file.read_bytes()))
-        assert not small() or suffix == ".nbi", name  # a bit of the index may say nothing; of code, every bit counts
+        assert not small() or suffix == ".nbi", (
+            name
+        )  # a bit of the index may say nothing; of code, every bit counts
         assert small() and not jit.cache_error, name
     file.unlink()
     assert not small() and small()
@@ -329,7 +388,9 @@ def test_a_full_disk_leaves_a_compiled_tick_and_the_words(small: Callable[[], bo
     assert not small() and small()  # there is room again
 
 
-def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bool], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_tick_compiles_where_no_folder_can_be_written(
+    small: Callable[[], bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
     def nowhere(function: object) -> None:
         raise RuntimeError("cannot cache function: no locator available")
 
@@ -339,22 +400,31 @@ def test_the_tick_compiles_where_no_folder_can_be_written(small: Callable[[], bo
     reason = fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
     assert "NUMBA_CACHE_DIR" in reason
     monkeypatch.setattr(jit, "cache_error", "")
-    assert "NUMBA_CACHE_DIR" not in fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
+    assert (
+        "NUMBA_CACHE_DIR"
+        not in fb.WholeBodyController(robot, judges.stance(robot), []).backend_reason
+    )
 
 
-def test_where_numba_fails_the_reference_backend_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_numba_fails_the_reference_backend_is_the_last_resort(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def fails(*given: object) -> int:
         raise NotImplementedError("no such target")
 
     monkeypatch.setattr(tick, "tick", fails)
     controller = judges.controller_of("go2")
-    assert controller.backend == controller(judges.load("go2").posture, np.zeros(18)).backend == "reference"
+    assert (
+        controller.backend
+        == controller(judges.load("go2").posture, np.zeros(18)).backend
+        == "reference"
+    )
     assert not missing(controller.backend_reason, "numba", "NotImplementedError: no such target")
     with raises(InputError, "backend", "NotImplementedError: no such target"):
         judges.controller_of("go2", backend="compiled")
 
 
-# memory --------------------------------------------------------------------------------------------------------------------
+# memory -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
@@ -392,12 +462,24 @@ def test_a_tick_allocates_nothing_and_says_when_its_workspace_is_too_small() -> 
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])
-def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(weight: float) -> None:
-    """Forces inside the robot cost hardly anything: rounding may drive them anywhere, but no such answer comes out."""
+def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(
+    weight: float,
+) -> None:
+    """Forces inside the robot cost hardly anything: rounding may drive them anywhere, but no such
+    answer comes out.
+    """
     robot = judges.load("talos")
-    tasks = [*fb.standing_tasks(robot.standing()), fb.ForceTask(weight=weight), fb.TorqueTask(weight=0.0)]
-    controller = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), tasks, backend="compiled")
+    tasks = [
+        *fb.standing_tasks(robot.standing()),
+        fb.ForceTask(weight=weight),
+        fb.TorqueTask(weight=0.0),
+    ]
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.flat_feet(robot), tasks, backend="compiled"
+    )
     assert controller.compiled is not None
     for state in judges.states("talos", 5, 0.1):
         answer = controller.compiled(np.array(state.q), np.array(state.v), 0.0)
-        assert answer is None or (weight > 0.0 and np.max(np.abs(answer[0][: controller.compiled.forces.stop])) <= 1e8)
+        assert answer is None or (
+            weight > 0.0 and np.max(np.abs(answer[0][: controller.compiled.forces.stop])) <= 1e8
+        )

@@ -1,4 +1,6 @@
-"""The compiled tick against the reference backend, which is the specification: same torques, same verdicts, same messages."""
+"""The compiled tick against the reference backend, which is the specification: same torques, same
+verdicts, same messages.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +22,24 @@ from floatbase.linear_algebra import null_space
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
 from floatbase.robots import Robot, State
 
-DEPENDENT = (
-    1e-6  # N·m between the backends where contact rows depend on one another: the reference backend holds no more digits
-)
-TORQUE = 1e-8  # N·m between the backends: both keep eight digits of the strongest motor's limit on well-conditioned contacts
+# N·m between the backends where contact rows depend on one another: the reference backend holds no
+# more digits
+DEPENDENT = 1e-6
+# N·m between the backends: both keep eight digits of the strongest motor's limit on
+# well-conditioned contacts
+TORQUE = 1e-8
 
 
 def prove_optimal(solution: Solution) -> None:
-    """The optimality conditions of a convex problem, relative to the terms that they are sums of: they prove the optimum."""
-    qp, x, mu, residuals = solution.qp, solution.x, solution.inequality_multipliers, solution.residuals
+    """The optimality conditions of a convex problem, relative to the terms that they are sums of:
+    they prove the optimum.
+    """
+    qp, x, mu, residuals = (
+        solution.qp,
+        solution.x,
+        solution.inequality_multipliers,
+        solution.residuals,
+    )
     slopes = (qp.H @ x, qp.g, qp.A.T @ solution.equality_multipliers, qp.G.T @ mu)
     forces = (np.abs(qp.A) @ np.abs(x), np.abs(qp.b))
     costs = (mu * qp.h, mu * (np.abs(qp.G) @ np.abs(x)))
@@ -56,10 +67,11 @@ def largest(*terms: np.ndarray) -> float:
     return max(1.0, *(float(np.max(np.abs(term), initial=0.0)) for term in terms))
 
 
-ROUNDING = 1e-9  # part of the terms of a sum that its rounding may be, through a Cholesky factor of condition 1e7
+# part of the terms of a sum that its rounding may be, through a Cholesky factor of condition 1e7
+ROUNDING = 1e-9
 
 
-# the same answer ---------------------------------------------------------------------------------------------------------
+# the same answer ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", [name for name in judges.ROBOTS if name != "solo8"])
@@ -73,26 +85,39 @@ def test_on_dependent_contact_rows_a_compiled_tick_is_optimal() -> None:
     """solo8 on four feet: J has rank 11."""
     robot = judges.load("solo8")
     both = judges.pair(robot, judges.stance(robot))
-    assert max(judges.difference(*both, state) for state in judges.near_and_far("solo8", 15)) < DEPENDENT
+    assert (
+        max(judges.difference(*both, state) for state in judges.near_and_far("solo8", 15))
+        < DEPENDENT
+    )
     prove_all(both[0], judges.near_and_far("solo8", 15))
 
 
 def test_weights_of_1e_8_leave_both_backends_their_digits() -> None:
-    """Talos with corner forces that are hardly determined: DAQP alone ends 1e-6 N·m from the optimum."""
+    """Talos with corner forces that are hardly determined: DAQP alone ends 1e-6 N·m from the
+    optimum.
+    """
     robot = judges.load("talos")
-    tasks = [*fb.standing_tasks(robot.standing()), fb.ForceTask(weight=1e-8), fb.TorqueTask(weight=0.0)]
+    tasks = [
+        *fb.standing_tasks(robot.standing()),
+        fb.ForceTask(weight=1e-8),
+        fb.TorqueTask(weight=0.0),
+    ]
     both = judges.pair(robot, fb.Contacts.flat_feet(robot), tasks, inner_approximation=False)
     assert max(judges.difference(*both, state) for state in judges.near_and_far("talos", 5)) < 1e-7
 
 
 def resolution(robot: Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
     """The least singular value of A in (5), relative to the largest."""
-    s = np.linalg.svd(fb.equations_of_motion(State(robot, q, np.zeros(robot.nv)), contacts).A, compute_uv=False)
+    s = np.linalg.svd(
+        fb.equations_of_motion(State(robot, q, np.zeros(robot.nv)), contacts).A, compute_uv=False
+    )
     return float(s[-1] / s[0])
 
 
 def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
-    """The state in which `resolution` is `value`, on the way from standing, where A loses rank, through `state`."""
+    """The state in which `resolution` is `value`, on the way from standing, where A loses rank,
+    through `state`.
+    """
     robot, low, high = state.robot, 0.0, 1.0
     away = pin.difference(robot.model, robot.standing().q, state.q)
 
@@ -103,18 +128,27 @@ def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
         high *= 2.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if resolution(robot, contacts, at(middle)) < value else (low, middle)
+        low, high = (
+            (middle, high) if resolution(robot, contacts, at(middle)) < value else (low, middle)
+        )
     assert resolution(robot, contacts, at(high)) == pytest.approx(value, rel=1e-6)
     return State(robot, at(high), state.v)
 
 
 @pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0])
-def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(share: float) -> None:
-    """solo8 on three feet, with the least singular value of A on either side of CONSTRAINT_RANK_TOLERANCE."""
+def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(
+    share: float,
+) -> None:
+    """solo8 on three feet, with the least singular value of A on either side of
+    CONSTRAINT_RANK_TOLERANCE.
+    """
     robot = judges.load("solo8")
     contacts = fb.Contacts.points(robot).without(robot.feet[3].frame)
     both = judges.pair(robot, contacts)
-    states = [with_resolution(state, contacts, share * CONSTRAINT_RANK_TOLERANCE) for state in judges.states("solo8", 5, 0.1)]
+    states = [
+        with_resolution(state, contacts, share * CONSTRAINT_RANK_TOLERANCE)
+        for state in judges.states("solo8", 5, 0.1)
+    ]
     assert max(judges.difference(*both, state) for state in states) < DEPENDENT
     prove_all(both[0], states)
 
@@ -133,7 +167,10 @@ def test_one_flat_foot_points_and_no_contact_at_all() -> None:
     mixed = flat.only("left_sole_link") + points.only("right_sole_link")
     for contacts in (flat.only("left_sole_link"), points, mixed, fb.Contacts.none()):
         both = judges.pair(robot, contacts)
-        assert max(judges.difference(*both, state) for state in judges.near_and_far("talos", 3)) < TORQUE
+        assert (
+            max(judges.difference(*both, state) for state in judges.near_and_far("talos", 3))
+            < TORQUE
+        )
 
 
 @pytest.mark.parametrize("facets", [3, 5, 8, 16, 64])
@@ -158,7 +195,9 @@ def test_torque_limits_few_and_none(limits: float) -> None:
     some = np.where(np.arange(12) % 3 == 0, limits, np.inf)
     for torque_limits in (limits, some):
         both = judges.pair(robot, judges.stance(robot), torque_limits=torque_limits)
-        assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 6)) < TORQUE
+        assert (
+            max(judges.difference(*both, state) for state in judges.near_and_far("go2", 6)) < TORQUE
+        )
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-7, 1e-5, 1e-3, 1e-2, 0.1])
@@ -178,18 +217,40 @@ def test_every_task_with_targets_that_move() -> None:
     robot = judges.load("go2")
     at, com, foot = robot.standing(), robot.standing().com, robot.standing().point("FL_foot")
     tasks = [
-        fb.CoMTask(lambda t: (com + [0.0, 0.0, 0.01 * t], [0.0, 0.0, 0.01], [0.0, 0.2, t]), kp=50.0, kd=3.0, weight=4.0),
-        fb.OrientationTask("base", lambda t: (judges.rotation([0.1 * t, 0.0, 0.2]), [0.1, 0.0, 0.0], [0.0, t, 0.0])),
+        fb.CoMTask(
+            lambda t: (com + [0.0, 0.0, 0.01 * t], [0.0, 0.0, 0.01], [0.0, 0.2, t]),
+            kp=50.0,
+            kd=3.0,
+            weight=4.0,
+        ),
+        fb.OrientationTask(
+            "base", lambda t: (judges.rotation([0.1 * t, 0.0, 0.2]), [0.1, 0.0, 0.0], [0.0, t, 0.0])
+        ),
         fb.OrientationTask("FL_calf", judges.rotation([0.3, 0.1, 0.0]), weight=0.3),
-        fb.FrameTask("FL_foot", lambda t: np.array([foot + [0.0, 0.0, 0.05], np.zeros(3), [0.0, t, 1.0]]), weight=3.0),
+        fb.FrameTask(
+            "FL_foot",
+            lambda t: np.array([foot + [0.0, 0.0, 0.05], np.zeros(3), [0.0, t, 1.0]]),
+            weight=3.0,
+        ),
         fb.FrameTask("FL_calf", at.point("FL_calf"), [0.1, 0.0, 0.2], [0.0, 1.0, 0.0]),
-        fb.PostureTask(lambda t: (at.q, np.linspace(-t, t, 12), np.linspace(-1.0, 1.0, 12)), weight=0.2),
+        fb.PostureTask(
+            lambda t: (at.q, np.linspace(-t, t, 12), np.linspace(-1.0, 1.0, 12)), weight=0.2
+        ),
         fb.PostureTask(lambda t: at.q, weight=0.02),
-        fb.PostureTask(at.q, np.linspace(1.0, 2.0, 12), np.full(12, 0.5), kp=3.0, weight=0.1, name="soft posture"),
+        fb.PostureTask(
+            at.q,
+            np.linspace(1.0, 2.0, 12),
+            np.full(12, 0.5),
+            kp=3.0,
+            weight=0.1,
+            name="soft posture",
+        ),
         fb.ForceTask(lambda t: np.full(9, 10.0 + t), weight=1e-4),
         fb.TorqueTask(np.ones(12), weight=1e-3),
     ]
-    both = judges.pair(robot, fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"]), tasks)
+    both = judges.pair(
+        robot, fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"]), tasks
+    )
     for t, state in enumerate(judges.near_and_far("go2", 4)):
         assert judges.difference(*both, state, 0.3 * t) < TORQUE
 
@@ -202,7 +263,8 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
     """A continuous joint is (cos, sin) in q."""
     links = "".join(LINK.format(f"l{i}") for i in range(3))
     joints = "".join(
-        f'<joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/><origin xyz="0 0 0.3"/>'
+        f'<joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/><origin '
+        f'xyz="0 0 0.3"/>'
         f'<axis xyz="{axis}"/><limit effort="50" velocity="9" lower="-3" upper="3"/></joint>'
         for i, (kind, axis) in enumerate([("continuous", "0 1 0"), ("prismatic", "0.6 0 0.8")])
     )
@@ -210,7 +272,11 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
     urdf.write_text(f'<robot name="arm">{links}{joints}</robot>')
     robot = fb.load_urdf(urdf, floating=False)
     target = [np.cos(2.9), np.sin(2.9), 0.1]
-    tasks = [fb.PostureTask(target), fb.FrameTask("l2", [0.1, 0.0, 0.4]), fb.CoMTask([0.0, 0.0, 0.3])]
+    tasks = [
+        fb.PostureTask(target),
+        fb.FrameTask("l2", [0.1, 0.0, 0.4]),
+        fb.CoMTask([0.0, 0.0, 0.3]),
+    ]
     both = judges.pair(robot, fb.Contacts.none(), tasks)
     for seed in range(5):
         assert judges.difference(*both, robot.random_state(seed, 0.8)) < TORQUE
@@ -223,7 +289,9 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
         with raises(InputError, "q", "j0", 1.5):
             controller(robot.posture, np.zeros(2), 0.5)
     with raises(InputError, "q", "j0", 2):
-        fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask([2.0, 0.0, 0.1])], backend="compiled")
+        fb.WholeBodyController(
+            robot, fb.Contacts.none(), [fb.PostureTask([2.0, 0.0, 0.1])], backend="compiled"
+        )
 
 
 def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
@@ -231,12 +299,20 @@ def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(
         f'<robot name="pendulum">{LINK.format("wall")}{LINK.format("bob")}'
-        '<joint name="pin" type="revolute"><parent link="wall"/><child link="bob"/><axis xyz="0 1 0"/>'
+        '<joint name="pin" type="revolute"><parent link="wall"/><child link="bob"/><axis xyz="0 1 '
+        '0"/>'
         '<limit effort="50" velocity="9" lower="-3" upper="3"/></joint></robot>'
     )
     robot = fb.load_urdf(urdf, floating=False)
-    tasks = [fb.CoMTask([0.1, 0.0, 0.2]), fb.FrameTask("bob", np.zeros(3)), fb.OrientationTask("bob"), fb.PostureTask([0.0])]
-    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [*tasks, fb.TorqueTask(weight=0.0)])
+    tasks = [
+        fb.CoMTask([0.1, 0.0, 0.2]),
+        fb.FrameTask("bob", np.zeros(3)),
+        fb.OrientationTask("bob"),
+        fb.PostureTask([0.0]),
+    ]
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.none(), [*tasks, fb.TorqueTask(weight=0.0)]
+    )
     assert controller.backend == "reference" and "pendulum" in controller.backend_reason
     state = robot.random_state(0, 0.5)
     assert state.com_jacobian.shape == (3, 1) and state.frame_jacobian("bob").shape == (6, 1)
@@ -244,7 +320,7 @@ def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
     assert command.tau == pytest.approx(state.M @ command.qdd + state.h)
 
 
-# the same verdicts and messages -----------------------------------------------------------------------------------------------
+# the same verdicts and messages -------------------------------------------------------------------
 
 
 def test_infeasible_problems_are_told_by_both_with_the_same_rows() -> None:
@@ -258,13 +334,18 @@ def test_infeasible_problems_are_told_by_both_with_the_same_rows() -> None:
 
 
 def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference_backend() -> None:
-    """solo8 on four feet: a velocity that J forgives to first order is forbidden by its curvature, J̇ v."""
+    """solo8 on four feet: a velocity that J forgives to first order is forbidden by its curvature,
+    J̇ v.
+    """
     robot = judges.load("solo8")
     compiled, reference = judges.pair(robot, judges.stance(robot))
     state = robot.standing()
     motions = null_space(fb.equations_of_motion(state, compiled.contacts).A)
     v = motions @ motions.T[:, 3]  # the base rolls as far as the feet allow
-    assert compiled.compiled is not None and compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
+    assert (
+        compiled.compiled is not None
+        and compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
+    )
     assert compiled.compiled(np.array(state.q), 10.0 * v, 0.0) is None
     assert judges.difference(compiled, reference, state.replace(v=10.0 * v)) == 0.0
     with raises(InfeasibleError, "motion FL_FOOT y"):
@@ -304,7 +385,7 @@ def test_a_bad_target_is_refused_in_the_same_words(target: object) -> None:
     assert refusal(compiled, state.q, state.v, 1.0) == refusal(reference, state.q, state.v, 1.0)
 
 
-# solutions ------------------------------------------------------------------------------------------------------------------
+# solutions ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
@@ -313,7 +394,10 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> 
     robot = judges.load(name)
     free, _ = judges.pair(robot, judges.stance(robot), torque_limits=np.inf)
     limited = np.arange(robot.d) != 4
-    limit = 0.9 * max(np.max(np.abs(free(state.q, state.v).tau[limited])) for state in judges.near_and_far(name, 6))
+    limit = 0.9 * max(
+        np.max(np.abs(free(state.q, state.v).tau[limited]))
+        for state in judges.near_and_far(name, 6)
+    )
     both = judges.pair(robot, judges.stance(robot), torque_limits=np.where(limited, limit, np.inf))
     kinds = set()
     for state in judges.near_and_far(name, 6):
@@ -323,7 +407,9 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> 
         assert r.dual == 0.0
         assert found.solution.objective == pytest.approx(expected.solution.objective, rel=1e-9)
         assert np.allclose(found.solution["forces"], found.forces)
-        if name == "go2":  # a flat foot's four corners share one wrench: rows can depend on one another
+        if (
+            name == "go2"
+        ):  # a flat foot's four corners share one wrench: rows can depend on one another
             assert set(found.active) == set(expected.active)
             for row, multiplier in expected.multipliers.items():
                 assert found.multipliers[row] == pytest.approx(multiplier, rel=1e-5, abs=1e-7)
@@ -344,14 +430,18 @@ def test_a_command_keeps_its_numbers_when_the_state_moves_on() -> None:
     assert np.allclose(command.solution.qp.H, reference.qp(state).H)
 
 
-# which backend runs -----------------------------------------------------------------------------------------------------------
+# which backend runs -------------------------------------------------------------------------------
 
 
 def test_the_path_is_visible_and_can_be_chosen() -> None:
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     state = robot.standing()
-    for requested, backend in (("auto", "compiled"), ("compiled", "compiled"), ("reference", "reference")):
+    for requested, backend in (
+        ("auto", "compiled"),
+        ("compiled", "compiled"),
+        ("reference", "reference"),
+    ):
         controller = fb.WholeBodyController(robot, contacts, tasks, backend=requested)
         assert controller.backend == controller(state.q, state.v).backend == backend
         assert backend in repr(controller)
@@ -380,10 +470,14 @@ def test_a_replaced_controller_is_like_a_new_one() -> None:
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
 
 
-def test_a_target_that_turns_into_a_reflection_is_left_to_the_reference_backend_which_refuses_it() -> None:
+def test_a_target_that_turns_into_a_reflection_is_left_to_the_reference_backend_which_refuses_it() -> (
+    None
+):
     robot = judges.load("go2")
     state = robot.standing()
-    mirrored = fb.OrientationTask("base", rotation=lambda t: np.diag([1.0, 1.0, 1.0 if t < 1.0 else -1.0]))
+    mirrored = fb.OrientationTask(
+        "base", rotation=lambda t: np.diag([1.0, 1.0, 1.0 if t < 1.0 else -1.0])
+    )
     controller = fb.WholeBodyController(robot, judges.stance(robot), [mirrored], backend="compiled")
     assert controller(state.q, state.v, 0.0).backend == "compiled"
     with raises(InputError, "rotation", "base"):
@@ -391,7 +485,9 @@ def test_a_target_that_turns_into_a_reflection_is_left_to_the_reference_backend_
 
 
 def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
-    """As when two threads share a controller: one tick's targets must not reach the other's problem."""
+    """As when two threads share a controller: one tick's targets must not reach the other's
+    problem.
+    """
     robot = judges.load("go2")
     state, com = robot.standing(), robot.standing().com
 
@@ -410,7 +506,13 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
     robot = judges.load("go2")
     state, slider = robot.standing(), {"height": 0.0, "turn": 0.0}
     tasks = [
-        fb.CoMTask(lambda t: (state.com + [0.0, 0.0, slider["height"]], [0.0, 0.0, slider["height"]], np.zeros(3))),
+        fb.CoMTask(
+            lambda t: (
+                state.com + [0.0, 0.0, slider["height"]],
+                [0.0, 0.0, slider["height"]],
+                np.zeros(3),
+            )
+        ),
         fb.OrientationTask("base", lambda t: judges.rotation([slider["turn"], 0.0, 0.0])),
         fb.PostureTask(state.q),
     ]
@@ -422,15 +524,28 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_controller_can_be_copied_and_sent_to_another_process(backend: str) -> None:
-    controller, state = judges.controller_of("go2", backend=backend), judges.load("go2").random_state(1, 0.1)
-    for other in (copy.deepcopy(controller), copy.copy(controller), pickle.loads(pickle.dumps(controller))):
+    controller, state = (
+        judges.controller_of("go2", backend=backend),
+        judges.load("go2").random_state(1, 0.1),
+    )
+    for other in (
+        copy.deepcopy(controller),
+        copy.copy(controller),
+        pickle.loads(pickle.dumps(controller)),
+    ):
         assert other.backend == backend
-        assert np.allclose(other(state.q, state.v).tau, controller(state.q, state.v).tau, rtol=0.0, atol=TORQUE)
+        assert np.allclose(
+            other(state.q, state.v).tau, controller(state.q, state.v).tau, rtol=0.0, atol=TORQUE
+        )
 
 
 @pytest.mark.parametrize(("name", "weight"), [("solo12", 1e3), ("solo12", 1e5), ("go2", 1e5)])
-def test_weights_far_apart_give_the_optimum_or_the_reference_backend(name: str, weight: float) -> None:
-    """Rounding in the search can end it at wrong active rows: Newton's method shows that, and the search goes on."""
+def test_weights_far_apart_give_the_optimum_or_the_reference_backend(
+    name: str, weight: float
+) -> None:
+    """Rounding in the search can end it at wrong active rows: Newton's method shows that, and the
+    search goes on.
+    """
     robot = judges.load(name)
     at = robot.standing()
     contacts = fb.Contacts.points(robot, mu=0.4, frames=[foot.frame for foot in robot.feet][:3])
@@ -439,13 +554,17 @@ def test_weights_far_apart_give_the_optimum_or_the_reference_backend(name: str, 
     prove_all(compiled, judges.states(name, 40, 0.3))
 
 
-def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend() -> None:
+def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend() -> (
+    None
+):
     robot = judges.load("go2")
     state = robot.random_state(2, 0.1)
     exact = judges.rotation([0.1, -0.2, 0.3])
     U, _, Vt = np.linalg.svd(exact.astype(np.float32).astype(np.float64))
     for given in (exact.astype(np.float32), lambda t: exact.astype(np.float32)):
-        compiled, reference = judges.pair(robot, judges.stance(robot), [fb.OrientationTask("base", given)])
+        compiled, reference = judges.pair(
+            robot, judges.stance(robot), [fb.OrientationTask("base", given)]
+        )
         _, expected = judges.pair(robot, judges.stance(robot), [fb.OrientationTask("base", U @ Vt)])
         found = compiled(state.q, state.v)
         assert found.backend == "compiled"
@@ -458,13 +577,17 @@ def test_a_whole_number_of_facets_may_be_written_with_a_point() -> None:
     state, contacts = robot.standing(), judges.stance(robot)
     for each in ("compiled", "reference"):
         eight, same = (
-            fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), facets=facets, backend=each)
+            fb.WholeBodyController(
+                robot, contacts, fb.standing_tasks(state), facets=facets, backend=each
+            )
             for facets in (8, 8.0)
         )
         assert np.array_equal(eight(state.q, state.v).tau, same(state.q, state.v).tau)
 
 
-def test_a_new_controller_has_run_a_tick_before_the_loop_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_controller_has_run_a_tick_before_the_loop_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     robot = judges.load("go2")
     warmed: list[CompiledTick] = []
     monkeypatch.setattr(CompiledTick, "warm_up", lambda self: warmed.append(self))

@@ -1,4 +1,6 @@
-"""The whole-body controller (26)(27): judged by cvxpy, by the articulated-body algorithm and by closed forms."""
+"""The whole-body controller (26)(27): judged by cvxpy, by the articulated-body algorithm and by
+closed forms.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,11 @@ from floatbase.errors import InfeasibleError, UnknownNameError
 from floatbase.qp import Solution, solve
 from floatbase.robots import State
 
-SAG = 2e-3  # of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on anymal_kinova
-ASIDE = 5e-3  # of the friction coefficient 0.3: a force at its limit may lean a little aside of the wish
+# of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on
+# anymal_kinova
+SAG = 2e-3
+# of the friction coefficient 0.3: a force at its limit may lean a little aside of the wish
+ASIDE = 5e-3
 
 
 def cases(name: str, n: int) -> list[State]:
@@ -23,21 +28,32 @@ def cases(name: str, n: int) -> list[State]:
     return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
 
 
-@pytest.mark.parametrize(("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS])
+@pytest.mark.parametrize(
+    ("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS]
+)
 def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
     controller, n_active = judges.controller_of(name), 0
     for state in cases(name, n):
         qp = controller.qp(state)
         found, judge = solve(qp), solve(qp, "cvxpy")
-        prices = float(np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers)))
-        worth = max(judge.residuals.inequality, judge.residuals.equality) * prices + judge.residuals.complementarity * len(qp.G)
-        assert abs(found.objective - judge.objective) < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
+        prices = float(
+            np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers))
+        )
+        worth = max(
+            judge.residuals.inequality, judge.residuals.equality
+        ) * prices + judge.residuals.complementarity * len(qp.G)
+        assert (
+            abs(found.objective - judge.objective)
+            < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
+        )
         n_active += bool(found.active)
         for solution in (found, judge):
             r = solution.residuals
             assert r.equality < 1e-9 and r.dual == 0.0
             assert max(r.inequality, r.stationarity, r.complementarity) < 1e-6
-    assert n_active > n / 4 or not judges.load(name).is_floating, "no row was active: these states try nothing"
+    assert n_active > n / 4 or not judges.load(name).is_floating, (
+        "no row was active: these states try nothing"
+    )
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
@@ -56,9 +72,14 @@ def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) ->
     for state in judges.states(name, 3, 0.2) if name != "solo8" else []:
         command = controller(state.q, state.v)
         step = 1e-5
-        ahead, behind = (judges.moved(state, command.qdd, t).replace(v=state.v + t * command.qdd) for t in (step, -step))
+        ahead, behind = (
+            judges.moved(state, command.qdd, t).replace(v=state.v + t * command.qdd)
+            for t in (step, -step)
+        )
         rates = [controller.contacts.jacobian(s) @ s.v for s in (ahead, behind)]
-        assert np.allclose((rates[0] - rates[1]) / (2 * step), 0.0, atol=1e-5 * (1.0 + np.max(np.abs(command.qdd))))
+        assert np.allclose(
+            (rates[0] - rates[1]) / (2 * step), 0.0, atol=1e-5 * (1.0 + np.max(np.abs(command.qdd)))
+        )
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
@@ -89,7 +110,9 @@ def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) ->
             assert command.multipliers[row] > 0
             if row.startswith("torque limit "):
                 joint, side = row.removeprefix("torque limit ").split()
-                assert torques[joint] == pytest.approx(limits[joint] * {"upper": 1, "lower": -1}[side], abs=1e-6)
+                assert torques[joint] == pytest.approx(
+                    limits[joint] * {"upper": 1, "lower": -1}[side], abs=1e-6
+                )
                 seen.add("torque")
             elif row.endswith(" normal force"):
                 assert forces[row.removesuffix(" normal force")][2] == pytest.approx(1.0, abs=1e-6)
@@ -108,11 +131,15 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) 
     state = judges.load(name).standing()
     command = judges.controller_of(name)(state.q, state.v)
     forces = command.forces.reshape(-1, 3)
-    assert np.allclose(forces.sum(axis=0), [0.0, 0.0, state.robot.weight], atol=SAG * state.robot.weight)
+    assert np.allclose(
+        forces.sum(axis=0), [0.0, 0.0, state.robot.weight], atol=SAG * state.robot.weight
+    )
     moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
     assert np.allclose(moment, 0.0, atol=SAG * state.robot.weight)
     assert np.allclose(command.qdd[:6], 0.0, atol=0.05)
-    assert np.allclose(command.qdd[6:], 0.0, atol=0.6)  # 0.5 rad/s² where anymal_kinova's arm begins
+    assert np.allclose(
+        command.qdd[6:], 0.0, atol=0.6
+    )  # 0.5 rad/s² where anymal_kinova's arm begins
     assert command.active == ()
 
 
@@ -142,13 +169,20 @@ def test_tasks_are_met_when_nothing_limits_them() -> None:
     robot = judges.load("go2")
     for state in judges.states("go2", 5, 0.02):
         feed = np.array([0.3, -0.2, 0.5])
-        tasks = [fb.CoMTask(state.com, state.com_velocity, feed, weight=1e3), fb.OrientationTask(weight=1e3)]
+        tasks = [
+            fb.CoMTask(state.com, state.com_velocity, feed, weight=1e3),
+            fb.OrientationTask(weight=1e3),
+        ]
         command = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)(state.q, state.v)
-        assert np.allclose(judges.acceleration_of(lambda s: s.com, state, command.qdd), feed, atol=1e-3)
+        assert np.allclose(
+            judges.acceleration_of(lambda s: s.com, state, command.qdd), feed, atol=1e-3
+        )
 
 
 def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
-    """Newton: the body cannot be accelerated sideways by more than μ g while the feet carry its weight."""
+    """Newton: the body cannot be accelerated sideways by more than μ g while the feet carry its
+    weight.
+    """
     robot = judges.load("go2")
     state = robot.standing()
     tasks = [
@@ -158,9 +192,9 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
     ]
     for inside, reach in ((True, 0.5 * np.cos(np.pi / 4)), (False, 0.5)):
         contacts = fb.Contacts.points(robot, mu=0.5)
-        command = fb.WholeBodyController(robot, contacts, tasks, inner_approximation=inside, torque_limits=np.inf)(
-            state.q, state.v
-        )
+        command = fb.WholeBodyController(
+            robot, contacts, tasks, inner_approximation=inside, torque_limits=np.inf
+        )(state.q, state.v)
         total = command.forces.reshape(-1, 3).sum(axis=0)
         assert total[1] / total[2] == pytest.approx(reach, rel=1e-4)
         for point in contacts.point_names:
@@ -168,8 +202,12 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(backend: str) -> None:
-    """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides, out of which forwards is one."""
+def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
+    backend: str,
+) -> None:
+    """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides, out of
+    which forwards is one.
+    """
     robot = judges.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.3)
     others = fb.standing_tasks(state)[1:]
@@ -177,9 +215,9 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
     def reached(direction: float, rotation: float) -> float:
         towards = np.array([np.cos(direction), np.sin(direction), 0.0])
         wish = fb.CoMTask(state.com, acceleration=4.0 * towards)
-        forces = fb.WholeBodyController(robot, contacts, [wish, *others], facet_rotation=rotation, backend=backend)(
-            state.q, state.v
-        ).forces
+        forces = fb.WholeBodyController(
+            robot, contacts, [wish, *others], facet_rotation=rotation, backend=backend
+        )(state.q, state.v).forces
         f = forces.reshape(-1, 3).sum(axis=0)
         return float(f @ towards / f[2])
 
@@ -189,22 +227,34 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
         assert reached(rotation + quarter, rotation) == pytest.approx(0.3, abs=ASIDE)
 
 
-def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> None:
-    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges, neither holds the other."""
+def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> (
+    None
+):
+    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges,
+    neither holds the other.
+    """
     for state in judges.states("go2", 5, 0.3):
         outside = [
-            solve(judges.controller_of("go2", facets=n, inner_approximation=False).qp(state)).objective for n in (4, 8, 16, 32)
+            solve(
+                judges.controller_of("go2", facets=n, inner_approximation=False).qp(state)
+            ).objective
+            for n in (4, 8, 16, 32)
         ]
         slack = 1e-9 * abs(outside[0])
         assert all(coarse <= fine + slack for coarse, fine in pairwise(outside))
-        inside = [solve(judges.controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)]
+        inside = [
+            solve(judges.controller_of("go2", facets=n).qp(state)).objective for n in (4, 8, 16, 32)
+        ]
         assert max(outside) <= min(inside) + slack
         assert inside[-1] - outside[-1] <= 0.1 * (inside[0] - outside[0]) + slack
 
 
 def test_the_smallest_normal_force_is_kept_on_every_point() -> None:
     controller = judges.controller_of("go2", min_normal_force=7.0)
-    lowest = [controller(s.q, s.v).forces.reshape(-1, 3)[:, 2].min() for s in judges.states("go2", 10, 0.2)]
+    lowest = [
+        controller(s.q, s.v).forces.reshape(-1, 3)[:, 2].min()
+        for s in judges.states("go2", 10, 0.2)
+    ]
     assert min(lowest) == pytest.approx(7.0, abs=1e-6)
 
 
@@ -212,12 +262,16 @@ def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
     robot = judges.load("go2")
     normals = judges.random_normals(4, 1)
     contacts = fb.Contacts.points(robot, mu=0.4, normals=normals)
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=2.0)
+    controller = fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=2.0
+    )
     for state in judges.states("go2", 5, 0.2):
         forces = controller(state.q, state.v).forces.reshape(4, 3)
         pressing = np.sum(forces * normals, axis=1)
         assert np.all(pressing >= 2.0 - 1e-6)
-        assert np.all(np.linalg.norm(forces - pressing[:, None] * normals, axis=1) <= 0.4 * pressing + 1e-6)
+        assert np.all(
+            np.linalg.norm(forces - pressing[:, None] * normals, axis=1) <= 0.4 * pressing + 1e-6
+        )
 
 
 def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
@@ -227,7 +281,9 @@ def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
     free = judges.controller_of("go2", torque_limits=np.inf)
     assert not any(name.startswith("torque") for name in free.qp(state).inequality_names)
     less = 0.9 * float(np.max(np.abs(free(state.q, state.v).tau)))
-    assert np.max(np.abs(judges.controller_of("go2", torque_limits=less)(state.q, state.v).tau)) <= less * (1.0 + 1e-9)
+    assert np.max(
+        np.abs(judges.controller_of("go2", torque_limits=less)(state.q, state.v).tau)
+    ) <= less * (1.0 + 1e-9)
     some = np.full(12, np.inf)
     some[3] = 1.0
     one = judges.controller_of("go2", torque_limits=some)
@@ -246,7 +302,11 @@ def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
 
 def test_the_order_of_tasks_and_of_contacts_does_not_matter() -> None:
     robot = judges.load("go2")
-    state, tasks, contacts = robot.random_state(3), fb.standing_tasks(robot.standing()), fb.Contacts.points(robot)
+    state, tasks, contacts = (
+        robot.random_state(3),
+        fb.standing_tasks(robot.standing()),
+        fb.Contacts.points(robot),
+    )
     turned = fb.Contacts.points(robot, frames=contacts.names[::-1])
     stances = ((contacts, tasks), (contacts, tasks[::-1]), (turned, tasks))
     one, two, three = (fb.WholeBodyController(robot, *given)(state.q, state.v) for given in stances)
@@ -277,7 +337,12 @@ def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
 def test_a_controller_is_replaced_rather_than_changed() -> None:
     robot = judges.load("go2")
     controller = judges.controller_of(
-        "go2", facets=8, inner_approximation=False, min_normal_force=3.0, torque_limits=20.0, solver="cvxpy"
+        "go2",
+        facets=8,
+        inner_approximation=False,
+        min_normal_force=3.0,
+        torque_limits=20.0,
+        solver="cvxpy",
     )
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
@@ -293,13 +358,19 @@ def test_a_controller_is_replaced_rather_than_changed() -> None:
 
 def test_anything_of_the_form_of_a_task_is_a_task() -> None:
     robot = judges.load("go2")
-    command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [judges.KeepStill()])(robot.standing().q, np.zeros(18))
+    command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [judges.KeepStill()])(
+        robot.standing().q, np.zeros(18)
+    )
     assert np.allclose(command.qdd[6:], 0.0, atol=0.05)
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(name: str) -> None:
-    """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever that is possible."""
+def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(
+    name: str,
+) -> None:
+    """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever
+    that is possible.
+    """
     controller = judges.controller_of(name)
     for state in judges.states(name, 5, 0.3):
         eom = fb.equations_of_motion(state, controller.contacts)
@@ -310,7 +381,7 @@ def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_n
             assert np.allclose(eom.A @ qdd, eom.b, atol=1e-7)
 
 
-# infeasible --------------------------------------------------------------------------------------------------------------
+# infeasible ---------------------------------------------------------------------------------------
 
 
 def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict() -> None:
@@ -321,7 +392,12 @@ def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict() -> None
     assert any(row.endswith("normal force") for row in caught.value.constraints)
     assert any(row.startswith("torque limit") for row in caught.value.constraints)
     for row in caught.value.constraints:  # each by its owner, in the line of its kind
-        owner = row.removeprefix("torque limit ").removesuffix(" upper").removesuffix(" lower").removesuffix(" normal force")
+        owner = (
+            row.removeprefix("torque limit ")
+            .removesuffix(" upper")
+            .removesuffix(" lower")
+            .removesuffix(" normal force")
+        )
         assert owner in str(caught.value)
     assert judges.is_smallest_conflict(controller.qp(state), caught.value.constraints)
 
@@ -334,7 +410,7 @@ def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
     assert min(r.stationarity, r.equality, r.inequality, r.complementarity) > 1e-4
 
 
-# arguments ---------------------------------------------------------------------------------------------------------------
+# arguments ----------------------------------------------------------------------------------------
 
 
 def test_any_solver_can_drive_a_controller() -> None:
@@ -342,7 +418,9 @@ def test_any_solver_can_drive_a_controller() -> None:
     for solver in ("daqp", "cvxpy", "active_set"):
         command = judges.controller_of("go2", solver=solver, backend="reference")(state.q, state.v)
         assert command.solution.solver == solver
-        assert max(command.solution.residuals.equality, command.solution.residuals.inequality) < 1e-6
+        assert (
+            max(command.solution.residuals.equality, command.solution.residuals.inequality) < 1e-6
+        )
         assert np.allclose(command.tau, expected(state.q, state.v).tau, atol=1e-4)
 
 
@@ -350,7 +428,10 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     from floatbase.dynamics import fixed_frame
 
     robot = judges.load("go2")
-    feet, bolts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]), fb.Contacts([fixed_frame("base")])
+    feet, bolts = (
+        fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]),
+        fb.Contacts([fixed_frame("base")]),
+    )
     tasks = fb.standing_tasks(robot.standing())
     state = robot.random_state(3, 0.05)
     first = fb.WholeBodyController(robot, bolts + feet, tasks)(state.q, state.v)
@@ -359,12 +440,16 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> None:
+def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> (
+    None
+):
     robot = judges.load("solo8")
     state = robot.standing()
 
     def target(t: float) -> np.ndarray:
-        return state.com + min(1.0, 4.0 * t) * np.array([0.0, 0.02 * np.sin(6.0 * t), 0.01 * np.sin(9.0 * t)])
+        return state.com + min(1.0, 4.0 * t) * np.array(
+            [0.0, 0.02 * np.sin(6.0 * t), 0.01 * np.sin(9.0 * t)]
+        )
 
     tasks = [fb.CoMTask(target), *fb.standing_tasks(state)[1:]]
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
@@ -399,7 +484,9 @@ def test_limits_keep_their_own_copy() -> None:
 def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(backend: str) -> None:
     robot = judges.load("talos")
     contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
-    command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend=backend)(state.q, state.v)
+    command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend=backend)(
+        state.q, state.v
+    )
     left, right = (command.force(name) for name in contacts.names)
     assert np.allclose(left + right, [0.0, 0.0, robot.weight], atol=SAG * robot.weight)
     assert np.allclose(left, command.forces[:12].reshape(4, 3).sum(axis=0))

@@ -1,4 +1,6 @@
-"""User-defined rows and bounds of normal forces: kept on both backends, told when they conflict, refused where they do not fit."""
+"""User-defined rows and bounds of normal forces: kept on both backends, told when they conflict,
+refused where they do not fit.
+"""
 
 from __future__ import annotations
 
@@ -16,20 +18,29 @@ from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.qp import solve
 from floatbase.robots import Robot
 
-# rows ----------------------------------------------------------------------------------------------------------------------
+# rows ---------------------------------------------------------------------------------------------
 
 
 def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequality]:
-    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with time."""
+    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with
+    time.
+    """
     E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
     up[0, contacts.point_force_indices[2::3]] = 1.0
     turns = np.resize([1.0, -1.0], (1, robot.d))
     sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
     return [
-        LinearInequality("acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides),
+        LinearInequality(
+            "acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides
+        ),
         LinearInequality("total force", "forces", (up, [1.05 * robot.weight])),
         LinearInequality(
-            "joined torques", "tau", lambda eom, t: (np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight))
+            "joined torques",
+            "tau",
+            lambda eom, t: (
+                np.vstack([turns, -turns]),
+                np.full(2, (0.01 - 0.002 * t) * robot.weight),
+            ),
         ),
     ]
 
@@ -39,7 +50,9 @@ def test_rows_of_ones_own_hold_and_have_their_names_on_both_backends(name: str) 
     robot = judges.load(name)
     contacts = judges.stance(robot)
     inequalities = user_inequalities(robot, contacts)
-    compiled, reference = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=inequalities)
+    compiled, reference = judges.pair(
+        robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=inequalities
+    )
     kinds: set[str] = set()
     for i, state in enumerate(judges.near_and_far(name, 6)):
         t = 0.1 * i
@@ -62,7 +75,10 @@ def test_rows_of_ones_own_against_cvxpy() -> None:
     robot = judges.load("go2")
     contacts = judges.stance(robot)
     controller = judges.pair(
-        robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=user_inequalities(robot, contacts)
+        robot,
+        contacts,
+        list(fb.standing_tasks(robot.standing())),
+        inequalities=user_inequalities(robot, contacts),
     )[0]
     for state in judges.states("go2", 4, 0.1):
         command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
@@ -73,15 +89,19 @@ def test_rows_of_ones_own_against_cvxpy() -> None:
 def test_rows_in_conflict_are_told_by_their_names() -> None:
     robot = judges.load("go2")
     light = LinearInequality("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
-    for controller in judges.pair(robot, judges.stance(robot), [], inequalities=[light], min_normal_force=10.0):
+    for controller in judges.pair(
+        robot, judges.stance(robot), [], inequalities=[light], min_normal_force=10.0
+    ):
         with raises(InfeasibleError, "light feet") as caught:
             controller(robot.standing().q, np.zeros(18))
         row = next(row for row in caught.value.constraints if row == "light feet")
         assert (row.kind, row.owner, row.number) == ("inequality", "light feet", 0)
-        assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
+        assert judges.is_smallest_conflict(
+            controller.qp(robot.standing()), caught.value.constraints
+        )
 
 
-# forces over time ----------------------------------------------------------------------------------------------------------
+# forces over time ---------------------------------------------------------------------------------
 
 
 def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
@@ -100,7 +120,9 @@ def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
         assert normal["RL_foot"] >= 5.0 * t - 1e-6
         assert t == 0.0 or "FL_foot largest normal force" in command.active
         assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
-        assert max(judges.difference(*both, state, t) for state in judges.near_and_far("go2", 3)) < judges.agreement(robot)
+        assert max(
+            judges.difference(*both, state, t) for state in judges.near_and_far("go2", 3)
+        ) < judges.agreement(robot)
     row = next(row for row in command.active if row.endswith("largest normal force"))
     assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
 
@@ -112,7 +134,9 @@ def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> No
     both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
     normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
     assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
-    assert max(judges.difference(*both, state) for state in judges.near_and_far("talos", 3)) < judges.agreement(robot)
+    assert max(
+        judges.difference(*both, state) for state in judges.near_and_far("talos", 3)
+    ) < judges.agreement(robot)
 
 
 class Heel(PointContact):
@@ -125,25 +149,39 @@ class Heel(PointContact):
 def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str) -> None:
     robot = judges.load("go2")
     state, tasks = robot.random_state(1, 0.1), list(fb.standing_tasks(robot.standing()))
-    stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts([Heel("RL_foot", radius=0.022)])
+    stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts(
+        [Heel("RL_foot", radius=0.022)]
+    )
     swing = stand.without("FL_foot", "heel")
 
     def torques(contacts: fb.Contacts, **bounds: object) -> np.ndarray:
-        return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **bounds)(state.q, state.v, 0.1).tau
+        return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **bounds)(
+            state.q, state.v, 0.1
+        ).tau
 
-    bounds = {"min_normal_force": {"heel": 15.0, "RR_foot": 12.0}, "max_normal_force": {"FL_foot": lambda t: 20.0 + t}}
+    bounds = {
+        "min_normal_force": {"heel": 15.0, "RR_foot": 12.0},
+        "max_normal_force": {"FL_foot": lambda t: 20.0 + t},
+    }
     standing = fb.WholeBodyController(robot, stand, tasks, backend=backend, **bounds)
     lifted = standing.replace(contacts=swing)
     other = lifted.replace(limits=replace(lifted.limits, torque_limits=robot.torque_limits))
     for each in (lifted, other):
         assert each.backend == backend
-        assert np.array_equal(each(state.q, state.v, 0.1).tau, torques(swing, min_normal_force={"RR_foot": 12.0}))
+        assert np.array_equal(
+            each(state.q, state.v, 0.1).tau, torques(swing, min_normal_force={"RR_foot": 12.0})
+        )
         back = each.replace(contacts=stand)(state.q, state.v, 0.1)
         assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
         assert "FL_foot largest normal force" in back.active
-    assert np.array_equal(lifted(state.q, state.v, 0.1).tau, torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}))
+    assert np.array_equal(
+        lifted(state.q, state.v, 0.1).tau,
+        torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}),
+    )
     with raises(UnknownNameError, "min_normal_force", "heel"):
-        torques(swing, **bounds)  # a new controller knows the robot's feet, and no other contact that is not there
+        torques(
+            swing, **bounds
+        )  # a new controller knows the robot's feet, and no other contact that is not there
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
@@ -151,7 +189,9 @@ def test_a_bound_that_is_a_function_is_asked_once_at_a_time(backend: str) -> Non
     robot = judges.load("go2")
     asked: list[float] = []
     bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
-    controller = fb.WholeBodyController(robot, judges.stance(robot), [], max_normal_force=bound, backend=backend)
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot), [], max_normal_force=bound, backend=backend
+    )
     assert asked == [0.0]
     controller(robot.standing().q, np.zeros(18), 0.5)
     assert asked == [0.0, 0.5]
@@ -175,7 +215,10 @@ def test_a_replaced_controller_is_checked(backend: str) -> None:
     controller = judges.controller_of("go2", backend=backend)
     with raises(InputError, "r", "tau", 3, 12):
         controller.replace(
-            limits=replace(controller.limits, inequalities=[LinearInequality("r", "tau", (np.eye(3), np.ones(3)))])
+            limits=replace(
+                controller.limits,
+                inequalities=[LinearInequality("r", "tau", (np.eye(3), np.ones(3)))],
+            )
         )
     with raises(UnknownNameError, "max_normal_force", "FL_fot", "FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))

@@ -1,4 +1,6 @@
-"""What tasks, limits and controllers refuse: the type of each error, and the names and numbers in it."""
+"""What tasks, limits and controllers refuse: the type of each error, and the names and numbers in
+it.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,12 @@ class Own:
     """A user-defined task, whose parts a test leaves out or makes wrongly."""
 
     def __init__(self, without: str = "", residual: object = None):
-        parts = {"block": "qdd", "name": "mine", "weight": 1.0, "residual": lambda eom, t=0.0: residual}
+        parts = {
+            "block": "qdd",
+            "name": "mine",
+            "weight": 1.0,
+            "residual": lambda eom, t=0.0: residual,
+        }
         vars(self).update({name: part for name, part in parts.items() if name != without})
 
 
@@ -52,7 +59,9 @@ class Fixed(Own):
         vars(self).update({"residual": lambda eom, t=0.0: fb.Affine.identity(3)} | wrong)
 
 
-def rows(block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()) -> LinearInequality:
+def rows(
+    block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()
+) -> LinearInequality:
     return LinearInequality("r", block, (np.eye(n), np.ones(m or n)), owners)
 
 
@@ -65,15 +74,43 @@ def analytic(**swap: object) -> AnalyticController:
     [
         (lambda: controller(facets=2), InputError, "facets", 2, 3),
         (lambda: controller(facet_rotation=np.nan), InputError, "turn", np.nan),
-        (lambda: controller().qp(STATE).without("frictions"), UnknownNameError, "frictions", "friction"),
+        (
+            lambda: controller().qp(STATE).without("frictions"),
+            UnknownNameError,
+            "frictions",
+            "friction",
+        ),
         (lambda: controller(min_normal_force=-1.0), InputError, "min_normal_force", -1),
-        (lambda: controller(min_normal_force={"FL_fot": 1.0}), UnknownNameError, "min_normal_force", "FL_fot", "FL_foot"),
-        (lambda: controller(min_normal_force={"FL_foot": lambda t: -1.0}), InputError, "min_normal_force", "FL_foot", -1),
+        (
+            lambda: controller(min_normal_force={"FL_fot": 1.0}),
+            UnknownNameError,
+            "min_normal_force",
+            "FL_fot",
+            "FL_foot",
+        ),
+        (
+            lambda: controller(min_normal_force={"FL_foot": lambda t: -1.0}),
+            InputError,
+            "min_normal_force",
+            "FL_foot",
+            -1,
+        ),
         (lambda: controller(max_normal_force=-1.0), InputError, "max_normal_force", -1),
-        (lambda: controller(max_normal_force={"FL_foot": -1.0}), InputError, "max_normal_force", "FL_foot", -1),
+        (
+            lambda: controller(max_normal_force={"FL_foot": -1.0}),
+            InputError,
+            "max_normal_force",
+            "FL_foot",
+            -1,
+        ),
         (lambda: controller(max_normal_force=lambda t: 1.0), InputError, "max_normal_force"),
         (lambda: controller(max_normal_force=[1.0, 2.0]), InputError, "max_normal_force", 1, 2),
-        (lambda: controller(max_normal_force={"FL_foot": lambda: 1.0}), InputError, "max_normal_force", "FL_foot"),
+        (
+            lambda: controller(max_normal_force={"FL_foot": lambda: 1.0}),
+            InputError,
+            "max_normal_force",
+            "FL_foot",
+        ),
         (lambda: Limits(np.ones(12), min_normal_force=-50.0), InputError, "min_normal_force", -50),
         (lambda: Limits(np.ones(12), facets=2), InputError, "facets", 2),
         (lambda: controller(torque_limits=[1.0, 2.0]), InputError, "torque_limits", 12, 2),
@@ -82,12 +119,26 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(torque_limits="strong"), InputError, "torque_limits", "strong"),
         (lambda: controller(torque_limits=["strong"] * 12), InputError, "torque_limits", "strong"),
         (lambda: controller(solver="dapq"), UnknownNameError, "solver", "dapq", "daqp"),
-        (lambda: controller(backend="quick"), UnknownNameError, "backend", "quick", "compiled", "reference"),
+        (
+            lambda: controller(backend="quick"),
+            UnknownNameError,
+            "backend",
+            "quick",
+            "compiled",
+            "reference",
+        ),
         (lambda: controller(rows=rows("tau", 12)), InputError, "rows", "LinearInequality"),
         (lambda: controller(rows=[np.eye(12)]), InputError, "rows", "LinearInequality", 12),
         (lambda: controller(rows=[rows("tau", 3)]), InputError, "r", "tau", 3, 12),
         (lambda: controller(rows=[rows("forces", 9)]), InputError, "r", "forces", 9, 12),
-        (lambda: controller(rows=[LinearInequality("r", "tau", lambda eom, t: 3.0)]), InputError, "r", "G", "h", 3),
+        (
+            lambda: controller(rows=[LinearInequality("r", "tau", lambda eom, t: 3.0)]),
+            InputError,
+            "r",
+            "G",
+            "h",
+            3,
+        ),
         (lambda: controller(rows=[rows("tau", 12, owners=("a",))]), InputError, "r", 1, 12),
         (lambda: controller(rows=2 * [rows("tau", 12)]), InputError, "r 0"),
         (lambda: rows("lambda", 12), InputError, "r", "lambda", "qdd", "tau", "forces"),
@@ -100,38 +151,112 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(Own()), InputError, "residual", "mine", "NoneType"),
         (lambda: controller(own(lambda eom: None)), InputError, "residual", "mine", "eom", "t"),
         (lambda: controller(own(lambda eom, t: 1 + "")), TypeError),  # the user's error itself
-        (lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))), InputError, "mine", "A", 18),
+        (
+            lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))),
+            InputError,
+            "mine",
+            "A",
+            18,
+        ),
         (lambda: controller(own_with_nan()), InputError, "mine", "b", np.nan),
-        (lambda: controller(Fixed(block="foo")), InputError, "mine", "block", "foo", "qdd", "tau", "forces"),
+        (
+            lambda: controller(Fixed(block="foo")),
+            InputError,
+            "mine",
+            "block",
+            "foo",
+            "qdd",
+            "tau",
+            "forces",
+        ),
         (lambda: controller(Fixed(weight=-1.0)), InputError, "weight", "mine", -1),
         (lambda: controller(Fixed()), InputError, "residual", "mine", "qdd", 3, 18),
         (lambda: controller(fb.CoMTask), InputError, "tasks", "CoMTask"),
-        (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), InputError, "tasks", "SimpleNamespace"),
+        (
+            lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})),
+            InputError,
+            "tasks",
+            "SimpleNamespace",
+        ),
         (lambda: controller("stand"), InputError, "tasks", "stand"),
         (lambda: controller().replace(tasks=3), InputError, "tasks", 3),
-        (lambda: controller().replace(tasks=[Fixed()]), InputError, "residual", "mine", "qdd", 3, 18),
-        (lambda: controller(mismatch=ModelMismatch(ignored_contacts=["FL_fot"])), UnknownNameError, "FL_fot", "FL_foot"),
-        (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), InputError, "tasks", "CoMTask"),
+        (
+            lambda: controller().replace(tasks=[Fixed()]),
+            InputError,
+            "residual",
+            "mine",
+            "qdd",
+            3,
+            18,
+        ),
+        (
+            lambda: controller(mismatch=ModelMismatch(ignored_contacts=["FL_fot"])),
+            UnknownNameError,
+            "FL_fot",
+            "FL_foot",
+        ),
+        (
+            lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)),
+            InputError,
+            "tasks",
+            "CoMTask",
+        ),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, None), InputError, "tasks", "None"),
         (lambda: fb.WholeBodyController(GO2, [1], []), InputError, "contacts", "Contacts", 1),
         (lambda: fb.WholeBodyController("go2", CONTACTS, []), InputError, "robot", "Robot", "go2"),
-        (lambda: fb.WholeBodyController(SOLO, CONTACTS, []), UnknownNameError, "solo12", "FL_foot", "FL_FOOT"),
+        (
+            lambda: fb.WholeBodyController(SOLO, CONTACTS, []),
+            UnknownNameError,
+            "solo12",
+            "FL_foot",
+            "FL_FOOT",
+        ),
         (lambda: fb.standing_tasks(GO2), InputError, "state", "State"),
         (lambda: controller().qp(SOLO.standing()), InputError, "solo12", "go2"),
-        (lambda: controller(fb.FrameTask("FL_fot", UP)), UnknownNameError, "go2", "FL_fot", "FL_foot"),
+        (
+            lambda: controller(fb.FrameTask("FL_fot", UP)),
+            UnknownNameError,
+            "go2",
+            "FL_fot",
+            "FL_foot",
+        ),
         (lambda: controller(fb.OrientationTask("torso")), UnknownNameError, "go2", "torso"),
         (lambda: controller(fb.PostureTask(np.zeros(5))), InputError, "q", 5, 19),
         (lambda: controller(fb.ForceTask(np.zeros(3))), InputError, "target", 3, 12),
         (lambda: controller(fb.TorqueTask(np.zeros(3))), InputError, "target", 3, 12),
         (lambda: controller(fb.TorqueTask(lambda t: None)), InputError, "target", 12, "None"),
         (lambda: controller(fb.CoMTask(lambda t: [0.0])), InputError, "position", 1, 3),
-        (lambda: controller(fb.CoMTask(lambda t: (UP, UP, [0.0]))), InputError, "acceleration", 1, 3),
-        (lambda: controller(fb.CoMTask(lambda t: (UP, UP))), InputError, 2, "position", "velocity", "acceleration"),
+        (
+            lambda: controller(fb.CoMTask(lambda t: (UP, UP, [0.0]))),
+            InputError,
+            "acceleration",
+            1,
+            3,
+        ),
+        (
+            lambda: controller(fb.CoMTask(lambda t: (UP, UP))),
+            InputError,
+            2,
+            "position",
+            "velocity",
+            "acceleration",
+        ),
         (lambda: controller(fb.CoMTask(lambda t: None)), InputError, "position", 3, "None"),
-        (lambda: controller(fb.CoMTask(lambda t: (UP, None, UP))), InputError, "velocity", 3, "None"),
+        (
+            lambda: controller(fb.CoMTask(lambda t: (UP, None, UP))),
+            InputError,
+            "velocity",
+            3,
+            "None",
+        ),
         (lambda: controller(fb.CoMTask(lambda t: np.array(1.0))), InputError, "position", 3),
         (lambda: controller(fb.CoMTask(lambda t: ([0, [0]], UP, UP))), InputError, "position", 3),
-        (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), InputError, "rotation", "base"),
+        (
+            lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))),
+            InputError,
+            "rotation",
+            "base",
+        ),
         (lambda: controller(fb.PostureTask(STATE.q, UP)), InputError, "velocity", 3, 12),
         (lambda: fb.CoMTask(lambda: UP), InputError, "position", "t"),
         (lambda: fb.CoMTask(UP, kp=UP), InputError, "kp", 3),
@@ -164,7 +289,13 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: analytic(robot="go2"), InputError, "robot", "Robot", "go2"),
         (lambda: analytic(contacts=["FL_foot"]), InputError, "contacts", "Contacts", "FL_foot"),
         (lambda: analytic(state=np.zeros(19)), InputError, "state", "State", 19),
-        (lambda: analytic(contacts=fb.Contacts.points(SOLO)), UnknownNameError, "go2", "FL_FOOT", "FL_foot"),
+        (
+            lambda: analytic(contacts=fb.Contacts.points(SOLO)),
+            UnknownNameError,
+            "go2",
+            "FL_FOOT",
+            "FL_foot",
+        ),
     ],
 )
 def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
@@ -177,7 +308,10 @@ def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_t
             raise ArithmeticError(f"nothing at {t}")
         return STATE.com
 
-    made = (lambda: controller(fb.CoMTask(later)), lambda: controller().replace(tasks=[fb.CoMTask(later)]))
+    made = (
+        lambda: controller(fb.CoMTask(later)),
+        lambda: controller().replace(tasks=[fb.CoMTask(later)]),
+    )
     for make in made:
         with raises(ArithmeticError, 0) as raised:
             make()
@@ -200,7 +334,9 @@ def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> 
 def test_what_a_controller_was_made_with_is_not_set_afterwards(name: str) -> None:
     made = controller(fb.ForceTask(), backend="reference")
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
-        with raises(InputError, name, "WholeBodyController", *(["tasks"] if name == "task" else [])):
+        with raises(
+            InputError, name, "WholeBodyController", *(["tasks"] if name == "task" else [])
+        ):
             setattr(one, name, 2.0)
 
 

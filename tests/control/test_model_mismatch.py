@@ -1,4 +1,6 @@
-"""What a controller assumes of (7), judged by Pinocchio's own dynamics of another model and by what the plan does."""
+"""What a controller assumes of (7), judged by Pinocchio's own dynamics of another model and by what
+the plan does.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,20 @@ def moving(seed: int = 3) -> fb.State:
     return state.replace(v=np.random.default_rng(seed).normal(size=state.robot.nv))
 
 
-def solved(mismatch: ModelMismatch, state: fb.State, **options: object) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
+def solved(
+    mismatch: ModelMismatch, state: fb.State, **options: object
+) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
     robot, contacts = state.robot, judges.stance(state.robot)
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), mismatch=mismatch, **options)
+    controller = fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(robot.standing()), mismatch=mismatch, **options
+    )
     command = controller(state.q, state.v)
     assert command.backend == "reference"
-    return fb.equations_of_motion(state, contacts), {"qdd": command.qdd, "tau": command.tau, "forces": command.forces.ravel()}
+    return fb.equations_of_motion(state, contacts), {
+        "qdd": command.qdd,
+        "tau": command.tau,
+        "forces": command.forces.ravel(),
+    }
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -44,11 +54,19 @@ def test_mass_and_the_parts_of_h_are_those_of_another_model(seed: int) -> None:
     weightless.gravity = pin.Motion.Zero()
     velocity = pin.nonLinearEffects(weightless, weightless.createData(), state.q, state.v)
     assert np.allclose(
-        ModelMismatch(gravity=False).assumed_equations(eom).h, velocity, rtol=0.0, atol=ROUNDING * np.abs(h).max()
+        ModelMismatch(gravity=False).assumed_equations(eom).h,
+        velocity,
+        rtol=0.0,
+        atol=ROUNDING * np.abs(h).max(),
     )
-    still = pin.computeGeneralizedGravity(state.robot.model, state.robot.model.createData(), state.q)
+    still = pin.computeGeneralizedGravity(
+        state.robot.model, state.robot.model.createData(), state.q
+    )
     assert np.allclose(
-        ModelMismatch(velocity_forces=False).assumed_equations(eom).h, still, rtol=0.0, atol=ROUNDING * np.abs(h).max()
+        ModelMismatch(velocity_forces=False).assumed_equations(eom).h,
+        still,
+        rtol=0.0,
+        atol=ROUNDING * np.abs(h).max(),
     )
 
 
@@ -57,8 +75,13 @@ def test_the_truth_is_the_default_and_changes_nothing() -> None:
     controller = judges.controller_of("go2")
     assert controller.problem.mismatch.is_exact
     qp = controller.qp(state)
-    again = build_qp(fb.equations_of_motion(state, controller.contacts), controller.tasks, controller.limits)
-    assert all(np.array_equal(getattr(qp, part), getattr(again, part)) for part in ("H", "g", "A", "b", "G", "h"))
+    again = build_qp(
+        fb.equations_of_motion(state, controller.contacts), controller.tasks, controller.limits
+    )
+    assert all(
+        np.array_equal(getattr(qp, part), getattr(again, part))
+        for part in ("H", "g", "A", "b", "G", "h")
+    )
     assert controller.backend == "compiled" and not ModelMismatch(drift=False).is_exact
 
 
@@ -73,14 +96,18 @@ def test_an_ignored_contact_pushes_nobody_in_the_plan() -> None:
     part = eom.contacts.force_slice("FR_foot")
     others = np.array(x["forces"])
     others[part] = 0.0
-    assert np.allclose(eom.M @ x["qdd"] + eom.h - eom.S @ x["tau"] - eom.J.T @ others, 0.0, atol=1e-6)
+    assert np.allclose(
+        eom.M @ x["qdd"] + eom.h - eom.S @ x["tau"] - eom.J.T @ others, 0.0, atol=1e-6
+    )
 
 
 def test_without_the_zeros_of_s_the_joints_obey_and_the_base_need_not() -> None:
     eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
-    assert np.linalg.norm(missing[:3]) > 0.5 * eom.robot.weight, "motors of the base should carry it: torques cost"
+    assert np.linalg.norm(missing[:3]) > 0.5 * eom.robot.weight, (
+        "motors of the base should carry it: torques cost"
+    )
 
 
 def test_without_cones_feet_pull() -> None:
@@ -88,9 +115,9 @@ def test_without_cones_feet_pull() -> None:
     state, contacts = robot.standing(), judges.stance(robot)
     tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
     normals = {
-        assumed: fb.WholeBodyController(robot, contacts, tasks, mismatch=ModelMismatch(cones=assumed))(
-            state.q, state.v
-        ).forces.reshape(-1, 3)[:, 2]
+        assumed: fb.WholeBodyController(
+            robot, contacts, tasks, mismatch=ModelMismatch(cones=assumed)
+        )(state.q, state.v).forces.reshape(-1, 3)[:, 2]
         for assumed in (True, False)
     }
     assert normals[True].min() > -1e-6
@@ -99,9 +126,15 @@ def test_without_cones_feet_pull() -> None:
 
 def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     robot, mismatch = judges.load("go2"), ModelMismatch(mass=1.1)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(robot.standing()), mismatch=mismatch)
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot), fb.standing_tasks(robot.standing()), mismatch=mismatch
+    )
     lifted = controller.replace(contacts=controller.contacts.without("FL_foot"))
-    assert lifted.problem.mismatch is mismatch and lifted.backend == "reference" and "mismatch" in lifted.backend_reason
+    assert (
+        lifted.problem.mismatch is mismatch
+        and lifted.backend == "reference"
+        and "mismatch" in lifted.backend_reason
+    )
     state = robot.standing()
     qp = lifted.qp(state)
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]

@@ -1,4 +1,6 @@
-"""Tasks and user-defined constraints: the same answers on both backends, and the words for what is wrong with them."""
+"""Tasks and user-defined constraints: the same answers on both backends, and the words for what is
+wrong with them.
+"""
 
 from __future__ import annotations
 
@@ -50,12 +52,17 @@ class MyHand:
         s = eom.state
         e = s.point(self.frame) - self.target - [0.1 * t, 0.0, 0.0]
         e_dot = s.frame_velocity(self.frame)[:3] - [0.1, 0.0, 0.0]
-        return fb.Affine(s.frame_jacobian(self.frame)[:3], s.frame_drift(self.frame)[:3] + 400.0 * e + 40.0 * e_dot)
+        return fb.Affine(
+            s.frame_jacobian(self.frame)[:3],
+            s.frame_drift(self.frame)[:3] + 400.0 * e + 40.0 * e_dot,
+        )
 
 
 @dataclass
 class MyEffort:
-    """Forces and torques that share a load: rows on λ, or on τ, with a matrix that couples their entries."""
+    """Forces and torques that share a load: rows on λ, or on τ, with a matrix that couples their
+    entries.
+    """
 
     block: str
     weight: float = 1e-3
@@ -78,7 +85,7 @@ def stance(robot: Robot) -> fb.Contacts:
     return contacts.without(HANDS[robot.name]) if HANDS[robot.name] in contacts.names else contacts
 
 
-# tasks ---------------------------------------------------------------------------------------------------------------------
+# tasks --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", HANDS)
@@ -88,8 +95,12 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
     hand = at.point(frame) + [0.0, 0.0, 0.05]
     others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
     own = [MyCoM(at.com), others[0], MyHand(frame, hand), *others[1:]]
-    moving = fb.FrameTask(frame, lambda t: (hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]), weight=7.0)
-    known = fb.WholeBodyController(robot, contacts, [fb.CoMTask(at.com), moving, *others], backend="compiled")
+    moving = fb.FrameTask(
+        frame, lambda t: (hand + [0.1 * t, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]), weight=7.0
+    )
+    known = fb.WholeBodyController(
+        robot, contacts, [fb.CoMTask(at.com), moving, *others], backend="compiled"
+    )
     compiled, reference = judges.pair(robot, contacts, own)
     active = 0
     for i, state in enumerate(judges.near_and_far(name, 8)):
@@ -101,9 +112,17 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
 
 def test_tasks_of_ones_own_on_torques_and_forces() -> None:
     robot = judges.load("go2")
-    tasks = [*fb.standing_tasks(robot.standing()), MyEffort("forces"), MyEffort("tau"), fb.ForceTask(), fb.TorqueTask()]
+    tasks = [
+        *fb.standing_tasks(robot.standing()),
+        MyEffort("forces"),
+        MyEffort("tau"),
+        fb.ForceTask(),
+        fb.TorqueTask(),
+    ]
     both = judges.pair(robot, judges.stance(robot), tasks)
-    assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 6)) < judges.agreement(robot)
+    assert max(
+        judges.difference(*both, state) for state in judges.near_and_far("go2", 6)
+    ) < judges.agreement(robot)
 
 
 @dataclass
@@ -122,7 +141,9 @@ class Looks:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_later(name: str) -> None:
+def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_later(
+    name: str,
+) -> None:
     robot = judges.load(name)
     seen: list[EquationsOfMotion] = []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
@@ -138,14 +159,29 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
         expected = fb.equations_of_motion(state, contacts)
         copies = (pickle.loads(pickle.dumps(eom)), copy.copy(eom)) if eom is seen[0] else ()
         for other in (eom, *copies):
-            for part in ("com", "com_velocity", "com_jacobian", "com_drift", "M", "h", "joint_transforms"):
+            for part in (
+                "com",
+                "com_velocity",
+                "com_jacobian",
+                "com_drift",
+                "M",
+                "h",
+                "joint_transforms",
+            ):
                 found = getattr(other.state, part)
                 assert np.allclose(found, getattr(state, part), rtol=1e-10, atol=1e-10), part
                 assert not found.flags.writeable
             for part in ("M", "h", "S", "J", "A", "b"):
-                assert np.allclose(getattr(other, part), getattr(expected, part), rtol=1e-10, atol=1e-10), part
+                assert np.allclose(
+                    getattr(other, part), getattr(expected, part), rtol=1e-10, atol=1e-10
+                ), part
             for ask in ("frame_jacobian", "frame_velocity", "frame_drift", "point"):
-                assert np.allclose(getattr(other.state, ask)(frame), getattr(state, ask)(frame), rtol=1e-10, atol=1e-10), ask
+                assert np.allclose(
+                    getattr(other.state, ask)(frame),
+                    getattr(state, ask)(frame),
+                    rtol=1e-10,
+                    atol=1e-10,
+                ), ask
             assert (other.nv, other.d, other.k) == (expected.nv, expected.d, expected.k)
             assert other.state.frame_pose(frame).isApprox(state.frame_pose(frame))
     with raises(AttributeError, "nothing"):
@@ -158,7 +194,9 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> No
     """Its memory serves the states of later ticks."""
     robot = judges.load("go2")
     seen: list[EquationsOfMotion] = []
-    controller = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), Looks(seen)])[0]
+    controller = judges.pair(
+        robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), Looks(seen)]
+    )[0]
     parts = ("M", "h", "com", "com_velocity", "com_jacobian", "com_drift", "joint_transforms")
 
     def arrays(state: State) -> list[np.ndarray]:
@@ -166,22 +204,33 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> No
         seen.clear()
         controller(state.q, state.v)
         at = seen.pop().state
-        asked = [at.point("base"), at.frame_velocity("base"), at.frame_drift("base"), at.frame_jacobian("base")]
+        asked = [
+            at.point("base"),
+            at.frame_velocity("base"),
+            at.frame_drift("base"),
+            at.frame_jacobian("base"),
+        ]
         return [*asked, at.frame_pose("base").homogeneous, *(getattr(at, part) for part in parts)]
 
     kept = arrays(robot.random_state(1_000))
     before = [array.copy() for array in kept]
     others = [arrays(state) for state in judges.states("go2", 6)]
     assert all(np.array_equal(array, was) for array, was in zip(kept, before, strict=True))
-    assert not any(np.array_equal(a, b) for other in others for a, b in zip(other, kept, strict=True))
+    assert not any(
+        np.array_equal(a, b) for other in others for a, b in zip(other, kept, strict=True)
+    )
 
 
 def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
     robot = judges.load("go2")
     task = Looks([], rows=0)
-    compiled, reference = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
+    compiled, reference = judges.pair(
+        robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task]
+    )
     for task.rows in (0, 3, 1, 400, 2):
-        assert judges.difference(compiled, reference, robot.random_state(task.rows, 0.1)) < judges.agreement(robot)
+        assert judges.difference(
+            compiled, reference, robot.random_state(task.rows, 0.1)
+        ) < judges.agreement(robot)
 
 
 def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
@@ -195,28 +244,46 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
             return np.eye(18)[6:7], pull
 
     drive = Drive("drive", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
-    inequality = LinearInequality("push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]]))
-    options = {"inequalities": [inequality], "max_normal_force": {"FL_foot": lambda t: slider["bound"]}}
+    inequality = LinearInequality(
+        "push", "forces", lambda eom, t: (np.eye(eom.k)[2:3], [slider["bound"]])
+    )
+    options = {
+        "inequalities": [inequality],
+        "max_normal_force": {"FL_foot": lambda t: slider["bound"]},
+    }
     contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
-    controller, _ = judges.pair(robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options)
+    controller, _ = judges.pair(
+        robot, contacts, [task, *fb.standing_tasks(robot.standing())], **options
+    )
     command = controller(robot.standing().q, np.zeros(18))
     assert command.backend == "compiled"
     slider.update(bound=7.0)
     pull[:] = 50.0
     task.target, task.weight = task.target + 1.0, 3.0
     solution = command.solution
-    assert max(solution.residuals.stationarity, solution.residuals.equality, solution.residuals.inequality) < 1e-7
+    assert (
+        max(
+            solution.residuals.stationarity,
+            solution.residuals.equality,
+            solution.residuals.inequality,
+        )
+        < 1e-7
+    )
     assert np.allclose(solution["tau"], command.tau)
 
 
-def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_ask_another_controller() -> None:
+def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_ask_another_controller() -> (
+    None
+):
     robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
     inner = judges.controller_of("go2", backend="compiled")
 
     class Nested(MyCoM):
         def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
             found = super().residual(eom, t)
-            inner(eom.state.replace(v=np.zeros(18)).q, np.zeros(18))  # which runs a tick of the same robot
+            inner(
+                eom.state.replace(v=np.zeros(18)).q, np.zeros(18)
+            )  # which runs a tick of the same robot
             return found
 
     tasks = [Nested(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
@@ -225,7 +292,11 @@ def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_a
 
     def wrong(shift: int) -> list[int]:
         order = (np.arange(200) + shift) % len(states)
-        return [i for i in order if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])]
+        return [
+            i
+            for i in order
+            if not np.array_equal(controller(states[i].q, states[i].v).tau, expected[i])
+        ]
 
     with ThreadPoolExecutor(3) as pool:
         assert list(pool.map(wrong, (0, 13, 27))) == [[], [], []]
@@ -274,10 +345,25 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
     state, at = robot.random_state(1, 0.1), robot.standing()
     feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"])
     with event.install_recorder("numba:compile") as recorder:
-        for contacts in (feet, feet + fb.Contacts([LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))])):
-            for tasks in (fb.standing_tasks(at), [MyCoM(at.com)], [MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))]):
-                for rows in ((), [LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))]):
-                    limits = replace(controller.limits, inequalities=rows, max_normal_force={"FR_foot": 90.0})
+        for contacts in (
+            feet,
+            feet
+            + fb.Contacts(
+                [LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))]
+            ),
+        ):
+            for tasks in (
+                fb.standing_tasks(at),
+                [MyCoM(at.com)],
+                [MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))],
+            ):
+                for rows in (
+                    (),
+                    [LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))],
+                ):
+                    limits = replace(
+                        controller.limits, inequalities=rows, max_normal_force={"FR_foot": 90.0}
+                    )
                     other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
                     assert other(state.q, state.v).backend == "compiled"
     assert not recorder.buffer
@@ -287,7 +373,10 @@ def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_e
     psutil = pytest.importorskip("psutil")
     robot = judges.load("go2")
     tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
-    controller, states = judges.pair(robot, judges.stance(robot), tasks)[0], judges.states("go2", 50, 0.1)
+    controller, states = (
+        judges.pair(robot, judges.stance(robot), tasks)[0],
+        judges.states("go2", 50, 0.1),
+    )
 
     def resident(ticks: int) -> float:
         for i in range(ticks):
@@ -298,13 +387,21 @@ def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_e
     assert resident(10_000) - before < 2.0  # MB: one array that stays of each tick would be more
 
 
-# constraints ---------------------------------------------------------------------------------------------------------------
+# constraints --------------------------------------------------------------------------------------
 
 
 def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
-    """Some joints that accelerate as a function of time says, by rows of which no two have the same unit."""
+    """Some joints that accelerate as a function of time says, by rows of which no two have the same
+    unit.
+    """
     rows = np.eye(robot.nv)[joints] * (1.0 + np.arange(len(joints)))[:, None]
-    return fb.Contacts([LinearConstraint("held", len(joints), lambda state, t: (rows, np.full(len(joints), np.sin(t))))])
+    return fb.Contacts(
+        [
+            LinearConstraint(
+                "held", len(joints), lambda state, t: (rows, np.full(len(joints), np.sin(t)))
+            )
+        ]
+    )
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
@@ -312,7 +409,9 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
     robot = judges.load(name)
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
-        compiled, reference = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())))
+        compiled, reference = judges.pair(
+            robot, contacts, list(fb.standing_tasks(robot.standing()))
+        )
         for i, state in enumerate(judges.near_and_far(name, 3)):
             assert judges.difference(compiled, reference, state, 0.2 * i) < judges.agreement(robot)
             with np.errstate(all="ignore"):
@@ -321,16 +420,26 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
                 except InfeasibleError:
                     continue
             eom = fb.equations_of_motion(state, contacts, 0.2 * i)
-            assert max(np.max(np.abs(r)) for r in eom.residual(command.qdd, command.tau, command.forces)) < 1e-6
+            assert (
+                max(
+                    np.max(np.abs(r))
+                    for r in eom.residual(command.qdd, command.tau, command.forces)
+                )
+                < 1e-6
+            )
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(backend: str) -> None:
     robot = judges.load("go2")
     asked: list[float] = []
-    held = LinearConstraint("held", 1, lambda state, t: asked.append(t) or (np.eye(18)[6:7], np.zeros(1)))
+    held = LinearConstraint(
+        "held", 1, lambda state, t: asked.append(t) or (np.eye(18)[6:7], np.zeros(1))
+    )
     contacts = judges.stance(robot) + fb.Contacts([held])
-    controller = fb.WholeBodyController(robot, contacts, list(fb.standing_tasks(robot.standing())), backend=backend)
+    controller = fb.WholeBodyController(
+        robot, contacts, list(fb.standing_tasks(robot.standing())), backend=backend
+    )
     asked.clear()
     assert controller(robot.standing().q, np.zeros(18), 0.3).backend == backend
     assert asked == [0.3]
@@ -346,11 +455,15 @@ def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
     robot = judges.load("go2")
     held = Coupled("held", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
     both = judges.pair(robot, judges.stance(robot).without("FL_foot") + fb.Contacts([held]))
-    assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 4)) < judges.agreement(robot)
+    assert max(
+        judges.difference(*both, state) for state in judges.near_and_far("go2", 4)
+    ) < judges.agreement(robot)
 
 
 class Reuses(PointContact):
-    """A contact that writes all its answers into the same arrays; its rows are twice those of a point, and hold the same."""
+    """A contact that writes all its answers into the same arrays; its rows are twice those of a
+    point, and hold the same.
+    """
 
     rows, right_side = np.zeros((3, 18)), np.zeros(3)
 
@@ -366,7 +479,10 @@ class Reuses(PointContact):
 
 def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
     robot = judges.load("go2")
-    others, frames = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]), ("FL_foot", "FR_foot")
+    others, frames = (
+        fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]),
+        ("FL_foot", "FR_foot"),
+    )
     own = fb.Contacts([Reuses(frame, radius=0.022) for frame in frames])
     same = fb.Contacts([PointContact(frame, radius=0.022) for frame in frames])
     A, b = own.constraint(robot.random_state(0))
@@ -401,4 +517,6 @@ def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones()
     tasks = list(fb.standing_tasks(robot.standing()))
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
         both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
-        assert max(judges.difference(*both, state) for state in judges.near_and_far("go2", 5)) < judges.agreement(robot)
+        assert max(
+            judges.difference(*both, state) for state in judges.near_and_far("go2", 5)
+        ) < judges.agreement(robot)

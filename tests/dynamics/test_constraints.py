@@ -1,4 +1,6 @@
-"""Constraints beyond feet (5)(6), note 6: bolts, drives and rolling wheels, judged by closed forms and by integration."""
+"""Constraints beyond feet (5)(6), note 6: bolts, drives and rolling wheels, judged by closed forms
+and by integration.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from messages import refused
 
 import floatbase as fb
 from floatbase import dynamics, linear_algebra, objectives
-from floatbase.dynamics import LinearConstraint, PointContact, RollingWheel, fixed_frame, moving_frame
+from floatbase.dynamics import (
+    LinearConstraint,
+    PointContact,
+    RollingWheel,
+    fixed_frame,
+    moving_frame,
+)
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
@@ -26,7 +34,8 @@ Z = np.array([0.0, 0.0, 1.0])
 DISC = f"""<robot name="disc"><link name="disc"><inertial><origin xyz="0 0 0"/><mass value="{M_DISC}"/>
 <inertia ixx="{I_ACROSS}" ixy="0" ixz="0" iyy="{I_AXLE}" iyz="0" izz="{I_ACROSS}"/></inertial></link></robot>"""
 
-# a body with a steered wheel, every axis and offset askew, so that no term of the drift is zero by luck
+# a body with a steered wheel, every axis and offset askew, so that no term of the drift is zero by
+# luck
 CART = """<robot name="cart">
 <link name="body"><inertial><origin xyz="0.02 -0.01 0.05"/><mass value="5"/>
 <inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="-0.01" izz="0.15"/></inertial></link>
@@ -45,7 +54,9 @@ def read(text: str, path: Path, **more: object) -> Robot:
     path.write_text(text)
     model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
     d = model.nv - 6
-    return Robot(path.stem, model, path, (path.parent,), (), np.full(d, np.inf), pin.neutral(model), **more)
+    return Robot(
+        path.stem, model, path, (path.parent,), (), np.full(d, np.inf), pin.neutral(model), **more
+    )
 
 
 @pytest.fixture
@@ -58,14 +69,24 @@ def cart(tmp_path: Path) -> Robot:
     return read(CART, tmp_path / "cart.urdf")
 
 
-def pose(robot: Robot, R: Array, position: npt.ArrayLike, omega: npt.ArrayLike, velocity: npt.ArrayLike) -> fb.State:
+def pose(
+    robot: Robot, R: Array, position: npt.ArrayLike, omega: npt.ArrayLike, velocity: npt.ArrayLike
+) -> fb.State:
     """A floating body's state from world quantities."""
     q = np.concatenate([np.asarray(position, float), pin.Quaternion(R).normalized().coeffs()])
-    return fb.State(robot, q, np.concatenate([R.T @ np.asarray(velocity, float), R.T @ np.asarray(omega, float)]))
+    return fb.State(
+        robot,
+        q,
+        np.concatenate([R.T @ np.asarray(velocity, float), R.T @ np.asarray(omega, float)]),
+    )
 
 
-def rolling(robot: Robot, R: Array, omega: npt.ArrayLike, place: npt.ArrayLike = (0.0, 0.0)) -> fb.State:
-    """A disc on z = 0 with its axle along R's y axis that rolls with angular velocity ω: v_c = ω × (r u)."""
+def rolling(
+    robot: Robot, R: Array, omega: npt.ArrayLike, place: npt.ArrayLike = (0.0, 0.0)
+) -> fb.State:
+    """A disc on z = 0 with its axle along R's y axis that rolls with angular velocity ω: v_c = ω ×
+    (r u).
+    """
     axle = R[:, 1]
     u = Z - axle * axle[2]
     u /= np.linalg.norm(u)
@@ -84,34 +105,54 @@ def motion(state: fb.State, *contacts: object, t: float = 0.0) -> tuple[Array, A
 
 
 def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:
-    """Linear acceleration of a floating body's origin and its angular acceleration, world: Newton's, not the base frame's."""
+    """Linear acceleration of a floating body's origin and its angular acceleration, world:
+    Newton's, not the base frame's.
+    """
     R = judges.quaternion_rotation(state.q[3:7])
     return R @ (qdd[:3] + np.cross(state.v[3:6], state.v[:3])), R @ qdd[3:6]
 
 
-# any A q̈ = b ------------------------------------------------------------------------------------------------------------
+# any A q̈ = b -------------------------------------------------------------------------------------
 
 
-def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_times_its_multipliers() -> None:
+def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_times_its_multipliers() -> (
+    None
+):
     rng = np.random.default_rng(0)
     state = judges.load("go2").random_state(1)
     A, b = rng.normal(size=(4, 18)), rng.normal(size=4)
     constraint = LinearConstraint("any", 4, lambda s, t: (A, b))
-    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint]))
+    eom = fb.equations_of_motion(
+        state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint])
+    )
     tau = rng.normal(size=12)
-    qdd, forces = dynamics.accelerations_from_torques(eom)(tau), dynamics.forces_from_torques(eom)(tau)
+    qdd, forces = (
+        dynamics.accelerations_from_torques(eom)(tau),
+        dynamics.forces_from_torques(eom)(tau),
+    )
     assert np.allclose(A @ qdd, b, atol=1e-8)
-    J_foot = judges.mujoco_of("go2").move_to(state).jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
-    assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7)
+    J_foot = (
+        judges.mujoco_of("go2")
+        .move_to(state)
+        .jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
+    )
+    assert np.allclose(
+        state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7
+    )
     assert eom.contacts.point_names == ("FL_foot",)
 
 
 def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
-    """Note 6: A(q, q̇, t) q̈ = b(q, q̇, t). The force of the constraint at t is A(t)ᵀ λ, not A(0)ᵀ λ."""
+    """Note 6: A(q, q̇, t) q̈ = b(q, q̇, t). The force of the constraint at t is A(t)ᵀ λ, not A(0)ᵀ
+    λ.
+    """
     state = judges.load("go2").random_state(0)
 
     def rows(s: fb.State, t: float) -> tuple[Array, Array]:
-        return (np.array([[np.cos(t), 0.0, np.sin(t)]]) @ s.frame_jacobian("base")[:3], np.array([t]))
+        return (
+            np.array([[np.cos(t), 0.0, np.sin(t)]]) @ s.frame_jacobian("base")[:3],
+            np.array([t]),
+        )
 
     eom = fb.equations_of_motion(state, fb.Contacts([LinearConstraint("rail", 1, rows)]), t=0.7)
     expected = rows(state, 0.7)[0]
@@ -124,11 +165,15 @@ def test_a_number_of_rows_may_be_a_float() -> None:
     assert fb.Contacts([whole]).k == 1 and whole.row_names == ("row 0",)
 
 
-# bolts: Figure 1, left --------------------------------------------------------------------------------------------------
+# bolts: Figure 1, left ----------------------------------------------------------------------------
 
 
-def test_bolts_of_a_robot_that_is_held_still_carry_its_weight_upwards_and_the_moment_of_its_centre_of_mass() -> None:
-    """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r from the frame to the CoM."""
+def test_bolts_of_a_robot_that_is_held_still_carry_its_weight_upwards_and_the_moment_of_its_centre_of_mass() -> (
+    None
+):
+    """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r
+    from the frame to the CoM.
+    """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
     zeta, eta = dynamics.forces_from_torques(eom), dynamics.accelerations_from_torques(eom)
@@ -152,7 +197,9 @@ def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls
     assert 0.5 * up[2] < wrench[2] < 0.99 * up[2]
 
 
-def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_bolts_carry_that_robots_base_wrench() -> None:
+def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_bolts_carry_that_robots_base_wrench() -> (
+    None
+):
     robot = judges.load("go2")
     rng = np.random.default_rng(0)
     model = pin.buildModelFromXML(robot.urdf)
@@ -179,14 +226,17 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_b
         own = robot.model.inertias[1]
         f_own = -own.mass * np.array(model.gravity.linear)
         origin += pin.Force(f_own, np.cross(own.lever, f_own))
-        # the links that pin welds into the world keep their weight out of data.f; robot.inertias[1] holds them all
+        # the links that pin welds into the world keep their weight out of data.f; robot.inertias[1]
+        # holds them all
         wrench = dynamics.forces_from_torques(eom)(tau)
         assert np.allclose(R.T @ wrench[:3], origin.linear, atol=1e-7)
         assert np.allclose(R.T @ wrench[3:], origin.angular, atol=1e-7)
 
 
 def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() -> None:
-    """§1: fixed bases are fully actuated. η of a bolted robot is onto the joints; of a standing one it is not."""
+    """§1: fixed bases are fully actuated. η of a bolted robot is onto the joints; of a standing one
+    it is not.
+    """
     state = judges.load("go2").standing()
     bolted = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
     standing = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
@@ -207,11 +257,13 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
         assert np.allclose(force, rate[:3] + np.array([0.0, 0.0, state.robot.mass * G]), atol=1e-7)
 
 
-# the wheel --------------------------------------------------------------------------------------------------------------
+# the wheel ----------------------------------------------------------------------------------------
 
 
 def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Robot) -> None:
-    """(6) by central differences of J(q) v with v fixed, on states that neither roll nor stand, on leaning grounds."""
+    """(6) by central differences of J(q) v with v fixed, on states that neither roll nor stand, on
+    leaning grounds.
+    """
     rng = np.random.default_rng(0)
     for seed in range(20):
         q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
@@ -253,7 +305,9 @@ def test_the_contact_is_the_lowest_point_of_the_rim(cart: Robot) -> None:
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.4, 0.9])
-def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(disc: Robot, slope: float) -> None:
+def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(
+    disc: Robot, slope: float
+) -> None:
     normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
     down = np.array([np.cos(slope), 0.0, -np.sin(slope)])
     state = pose(disc, np.eye(3), R_DISC * normal, np.zeros(3), np.zeros(3))
@@ -262,12 +316,18 @@ def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(disc: Ro
     assert np.allclose(linear, 2.0 / 3.0 * G * np.sin(slope) * down, atol=1e-10)
     assert np.allclose(angular, [0.0, 2.0 / 3.0 * G * np.sin(slope) / R_DISC, 0.0], atol=1e-9)
     # friction takes the third that gravity does not give, up the slope
-    assert np.allclose(force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9)
+    assert np.allclose(
+        force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(("lean", "radius"), [(1.2, 0.6), (0.8, 1.0), (0.5, 0.3)])
-def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: Robot, lean: float, radius: float) -> None:
-    """Steady motion with angle α between disc and ground, centre on a circle of radius b: Ω² = 4 g cot α / (6 b + r cos α)."""
+def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
+    disc: Robot, lean: float, radius: float
+) -> None:
+    """Steady motion with angle α between disc and ground, centre on a circle of radius b: Ω² = 4 g
+    cot α / (6 b + r cos α).
+    """
     rate = np.sqrt(4.0 * G / np.tan(lean) / (6.0 * radius + R_DISC * np.cos(lean)))
     out, along = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
     u = -np.cos(lean) * out + np.sin(lean) * Z  # leans towards the circle's centre
@@ -279,19 +339,28 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc: R
     wheel = wheel_of_the_disc()
     assert np.allclose(wheel.slip(state), 0.0, atol=1e-12)
     qdd, force = motion(state, wheel)
-    assert force @ (wheel.constraint(state)[0] @ state.v) == pytest.approx(0.0, abs=1e-9), "a wheel that rolls does no work"
+    assert force @ (wheel.constraint(state)[0] @ state.v) == pytest.approx(0.0, abs=1e-9), (
+        "a wheel that rolls does no work"
+    )
     linear, angular = world_acceleration(state, qdd)
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)
     assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
-    faster = state.replace(v=1.2 * state.v)  # at another rate the circle is not kept: the lean changes
-    assert np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular) > 1.0
+    faster = state.replace(
+        v=1.2 * state.v
+    )  # at another rate the circle is not kept: the lean changes
+    assert (
+        np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular)
+        > 1.0
+    )
 
 
 def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) -> None:
-    """Roll, turn, roll back, turn back: never a slip, and in the end the disc stands beside where it was, nothing else changed.
+    """Roll, turn, roll back, turn back: never a slip, and in the end the disc stands beside where
+    it was, nothing else changed.
 
-    Straight there it may not go. So the same place is reached or refused by the way, which no φ(q) = 0 can tell apart.
+    Straight there it may not go. So the same place is reached or refused by the way, which no φ(q)
+    = 0 can tell apart.
     """
     wheel, turn, way = wheel_of_the_disc(), 0.7, 0.5
 
@@ -301,7 +370,13 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) 
             omega = spin(R[:, 1])
             velocity = np.cross(omega, R_DISC * Z)
             assert np.max(np.abs(wheel.slip(pose(disc, R, state.q[:3], omega, velocity)))) < 1e-9
-            state = pose(disc, judges.rotation(omega / steps) @ R, state.q[:3] + velocity / steps, omega, velocity)
+            state = pose(
+                disc,
+                judges.rotation(omega / steps) @ R,
+                state.q[:3] + velocity / steps,
+                omega,
+                velocity,
+            )
         return state
 
     start = rolling(disc, np.eye(3), np.zeros(3))
@@ -311,14 +386,20 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) 
     end = drive(back, lambda axle: -turn * Z)
     assert np.allclose(ahead.q[:3] - start.q[:3], [way, 0.0, 0.0], atol=1e-9)
     assert np.allclose(end.frame_pose("disc").rotation, np.eye(3), atol=1e-9)
-    assert np.allclose(end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9)
+    assert np.allclose(
+        end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9
+    )
     sideways = start.replace(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     assert np.linalg.norm(wheel.slip(sideways)) > 0.9
 
 
-def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(cart: Robot) -> None:
-    """The height of the centre, r √(1 - (n·a)²), is a position constraint; its derivative is the normal row. The curl of the
-    tangential rows is not zero on the motions they allow (Frobenius), so no position constraint stands behind them."""
+def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(
+    cart: Robot,
+) -> None:
+    """The height of the centre, r √(1 - (n·a)²), is a position constraint; its derivative is the
+    normal row. The curl of the tangential rows is not zero on the motions they allow (Frobenius),
+    so no position constraint stands behind them.
+    """
     rng = np.random.default_rng(4)
     q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.4, 0.4, cart.nv))
     state, n = fb.State(cart, q), judges.random_normals(1, 1)[0]
@@ -331,7 +412,9 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
     assert np.allclose(judges.jacobian_of(height, state)[0], n @ wheel.jacobian(state), atol=1e-8)
 
     def bracket(contact: object) -> float:
-        """Largest A [X, Y] over pairs of constant allowed directions: what a small parallel-parking loop gains, per area."""
+        """Largest A [X, Y] over pairs of constant allowed directions: what a small parallel-parking
+        loop gains, per area.
+        """
         N = linear_algebra.null_space(contact.constraint(state)[0])
         gains = []
         for x in N.T:
@@ -352,7 +435,9 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
 
 
 def test_a_wheel_that_lies_flat_has_no_lowest_point(disc: Robot) -> None:
-    state = pose(disc, judges.rotation([np.pi / 2, 0.0, 0.0]), np.zeros(3), np.zeros(3), np.zeros(3))
+    state = pose(
+        disc, judges.rotation([np.pi / 2, 0.0, 0.0]), np.zeros(3), np.zeros(3), np.zeros(3)
+    )
     refused(lambda: wheel_of_the_disc().constraint(state), InputError, "disc")
 
 

@@ -1,4 +1,6 @@
-"""Contacts: Jacobians against MuJoCo, drifts by finite differences, how they are named, chosen and stacked."""
+"""Contacts: Jacobians against MuJoCo, drifts by finite differences, how they are named, chosen and
+stacked.
+"""
 
 from __future__ import annotations
 
@@ -56,21 +58,30 @@ class Pad:
 
 
 def test_contacts_of_a_users_own_are_chosen_by_name() -> None:
-    contacts = fb.Contacts([Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))])
+    contacts = fb.Contacts(
+        [Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))]
+    )
     assert contacts.force_slice("FR_foot") == slice(3, 6)
     assert contacts.only("FR_foot").names == contacts.without("FL_foot").names == ("FR_foot",)
     state = judges.load("go2").standing()
-    eom, feet = fb.equations_of_motion(state, contacts), [PointContact(name) for name in contacts.names]
+    eom, feet = (
+        fb.equations_of_motion(state, contacts),
+        [PointContact(name) for name in contacts.names],
+    )
     assert np.allclose(eom.J, fb.equations_of_motion(state, fb.Contacts(feet)).J, atol=1e-12)
 
 
 def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str) -> None:
     robot = judges.load(name)
     for seed, state in enumerate(judges.states(name, 3)):
-        normal = judges.random_normals(1, seed)[0] if name in judges.BALLS else np.array([0.0, 0.0, 1.0])
+        normal = (
+            judges.random_normals(1, seed)[0] if name in judges.BALLS else np.array([0.0, 0.0, 1.0])
+        )
         sim = fb.Simulation(robot, Ground(normal=normal))
         if name in judges.FLAT:
-            state = robot.standing()  # corners are balls' lowest points, so only level soles can be compared
+            state = (
+                robot.standing()
+            )  # corners are balls' lowest points, so only level soles can be compared
         sim.reset(state)
         make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
         contacts = make(robot, normals=normal)
@@ -117,7 +128,10 @@ def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
         for contact in judges.stance(state.robot):
             forces = rng.normal(size=(len(contact.corners), 3))
             origin = state.point(contact.frame)
-            moment = sum(np.cross(p - origin, f) for p, f in zip(contact.positions(state), forces, strict=True))
+            moment = sum(
+                np.cross(p - origin, f)
+                for p, f in zip(contact.positions(state), forces, strict=True)
+            )
             wrench = contact.force_generator_matrix(state) @ forces.ravel()
             assert np.allclose(wrench, np.concatenate([forces.sum(axis=0), moment]), atol=1e-12)
             A, _ = contact.constraint(state)
@@ -149,7 +163,7 @@ def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name: str) -
     assert np.max(np.abs(left)) > 1e-3
 
 
-# names, choices, order --------------------------------------------------------------------------------------------------
+# names, choices, order ----------------------------------------------------------------------------
 
 
 def test_all_feet_touch_by_default_in_the_robots_order(name: str) -> None:
@@ -198,7 +212,9 @@ def test_normals_can_be_one_for_all_one_for_each_or_by_name() -> None:
 def test_friction_is_that_of_each_contact_at_each_of_its_points() -> None:
     talos = judges.load("talos")
     left, right = (foot.frame for foot in talos.feet)
-    mixed = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left]) + fb.Contacts.points(talos, mu=0.9, frames=[right])
+    mixed = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left]) + fb.Contacts.points(
+        talos, mu=0.9, frames=[right]
+    )
     assert np.array_equal(mixed.mus, [0.4, 0.4, 0.4, 0.4, 0.9])
     assert mixed.point_names == (*(f"{left} corner {i}" for i in range(4)), right)
     assert mixed.k == 15
@@ -232,7 +248,12 @@ def test_no_contacts_give_empty_rows() -> None:
 def test_each_foot_may_have_its_own_friction() -> None:
     robot, mu = judges.load("go2"), (0.3, 0.4, 0.5, 0.6)
     assert np.array_equal(fb.Contacts.points(robot, mu=mu).mus, [0.3, 0.4, 0.5, 0.6])
-    assert np.array_equal(fb.Contacts.points(robot, mu, frames=list(reversed(judges.stance(robot).names)))["RR_foot"].mu, 0.3)
+    assert np.array_equal(
+        fb.Contacts.points(robot, mu, frames=list(reversed(judges.stance(robot).names)))[
+            "RR_foot"
+        ].mu,
+        0.3,
+    )
     assert np.array_equal(fb.Contacts.points(robot, mu={"RL_foot": 0.2}).mus, [0.7, 0.7, 0.2, 0.7])
     talos = judges.load("talos")
     assert np.array_equal(fb.Contacts.flat_feet(talos, mu=mu[:2]).mus, [0.3] * 4 + [0.4] * 4)
@@ -256,9 +277,14 @@ def test_feet_are_taken_as_they_are_flat_or_round() -> None:
         robot = judges.load(name)
         contacts = fb.Contacts.feet(robot, mu=0.4)
         assert contacts.names == tuple(foot.frame for foot in robot.feet)
-        assert [contact.k for contact in contacts] == [12 if foot.is_flat else 3 for foot in robot.feet]
+        assert [contact.k for contact in contacts] == [
+            12 if foot.is_flat else 3 for foot in robot.feet
+        ]
         assert np.all(contacts.mus == 0.4)
-    mixed = fb.load("go2", feet=[Foot("FL_foot", 0.02), Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])])
+    mixed = fb.load(
+        "go2",
+        feet=[Foot("FL_foot", 0.02), Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])],
+    )
     assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
     talos = fb.load("talos")
     mixed = fb.Contacts.feet(talos, mu={"left_sole_link": 0.3})
@@ -269,8 +295,14 @@ def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(
     robot = judges.load("go2")
     state = robot.standing()
     sole = fb.Contacts.points(robot).positions(state)[0]
-    assert np.allclose(state.point("FL_foot") - sole, [0.0, 0.0, robot.foot("FL_foot").radius], atol=1e-12)
+    assert np.allclose(
+        state.point("FL_foot") - sole, [0.0, 0.0, robot.foot("FL_foot").radius], atol=1e-12
+    )
     here = fb.FrameTask("FL_foot", state.point("FL_foot"))
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    assert np.allclose(here.residual(eom).b, state.frame_drift("FL_foot")[:3])  # no error to correct
-    assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0  # kp times the radius, m/s²
+    assert np.allclose(
+        here.residual(eom).b, state.frame_drift("FL_foot")[:3]
+    )  # no error to correct
+    assert (
+        np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
+    )  # kp times the radius, m/s²

@@ -1,4 +1,6 @@
-"""(1)(4)(7): inertia, bias force and acceleration, judged by MuJoCo and by Pinocchio's recursive algorithm."""
+"""(1)(4)(7): inertia, bias force and acceleration, judged by MuJoCo and by Pinocchio's recursive
+algorithm.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def test_acceleration_agrees_with_the_articulated_body_algorithm(name: str) -> N
         assert judges.relative(eom.acceleration(tau, forces), judges.aba(eom, tau, forces)) < 1e-8
 
 
-def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algorithm_gives(name: str) -> None:
+def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algorithm_gives(
+    name: str,
+) -> None:
     rng = np.random.default_rng(1)
     state = judges.load(name).random_state(2)
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
@@ -50,7 +54,9 @@ def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algo
     dynamics, motion = eom.residual(qdd, tau, forces)
     assert np.allclose(dynamics, 0.0, atol=1e-7)
     assert np.allclose(motion, eom.A @ qdd - eom.b)
-    assert np.allclose(eom.residual(qdd, tau + 1.0, forces)[0], dynamics - eom.S @ np.ones(eom.d), atol=1e-9)
+    assert np.allclose(
+        eom.residual(qdd, tau + 1.0, forces)[0], dynamics - eom.S @ np.ones(eom.d), atol=1e-9
+    )
     if eom.k:
         pushed = eom.residual(qdd, tau, forces + 1.0)[0]
         assert np.allclose(pushed, dynamics - eom.J.T @ np.ones(eom.k), atol=1e-9)
@@ -58,7 +64,9 @@ def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algo
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_torques_cannot_move_the_centre_of_mass_or_turn_the_robot_in_free_fall(name: str) -> None:
-    """ẍ_c = g by differences, and no angular momentum about the centre of mass, whatever the joints do."""
+    """ẍ_c = g by differences, and no angular momentum about the centre of mass, whatever the joints
+    do.
+    """
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         eom = fb.equations_of_motion(state, fb.Contacts.none())
@@ -91,9 +99,15 @@ def test_rotor_inertia_counts() -> None:
 
 @pytest.mark.parametrize("name", fb.catalogue())
 def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) -> None:
-    """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J M⁻¹ Jᵀ."""
+    """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J
+    M⁻¹ Jᵀ.
+    """
     state = judges.states(name, 1)[0]
-    contacts = judges.stance(state.robot) if state.robot.is_floating else fb.Contacts.points(state.robot, frames=["tool0"])
+    contacts = (
+        judges.stance(state.robot)
+        if state.robot.is_floating
+        else fb.Contacts.points(state.robot, frames=["tool0"])
+    )
     eom = fb.equations_of_motion(state, contacts)
     rest = judges.aba(eom, np.zeros(eom.d), np.zeros(eom.k))
     columns = [eom.A @ (judges.aba(eom, np.zeros(eom.d), unit) - rest) for unit in np.eye(eom.k)]

@@ -1,4 +1,6 @@
-"""App. A: h taken apart, judged by MuJoCo without gravity, finite differences, energy; straight paths seen turning."""
+"""App. A: h taken apart, judged by MuJoCo without gravity, finite differences, energy; straight
+paths seen turning.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +39,12 @@ def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name: str
         assert judges.relative(bias_forces(state).fictitious, judge.move_to(state).h) < 1e-8
 
 
-def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(name: str) -> None:
-    """MuJoCo's own forces: of a free joint the linear velocity is in the world's axes, the angular one in the base's."""
+def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(
+    name: str,
+) -> None:
+    """MuJoCo's own forces: of a free joint the linear velocity is in the world's axes, the angular
+    one in the base's.
+    """
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.gravity[:] = 0.0
     for state in judges.states(name, N, spread=1.0):
@@ -50,28 +56,46 @@ def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_
         assert judges.relative(bias_forces(state, axes="world").fictitious, to_raw.T @ raw) < 1e-8
 
 
-def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(name: str) -> None:
-    """p̈ of the base, in the world, when h alone acts: M q̈ = -h in the base's axes, T ᵀ M T u̇ = -h in the world's."""
+def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(
+    name: str,
+) -> None:
+    """p̈ of the base, in the world, when h alone acts: M q̈ = -h in the base's axes, T ᵀ M T u̇ =
+    -h in the world's.
+    """
     for state in judges.states(name, N, spread=1.0):
         own, world = bias_forces(state), bias_forces(state, axes="world")
         if not state.robot.is_floating:
-            assert np.array_equal(own.total, world.total) and np.array_equal(own.coriolis, world.coriolis)
+            assert np.array_equal(own.total, world.total) and np.array_equal(
+                own.coriolis, world.coriolis
+            )
             continue
         R, nv = state.frame_pose("base").rotation, state.robot.nv
         T = np.eye(nv)
         T[:3, :3] = T[3:6, 3:6] = R.T
-        qdd, u_dot = np.linalg.solve(state.M, -own.total), np.linalg.solve(T.T @ state.M @ T, -world.total)
+        qdd, u_dot = (
+            np.linalg.solve(state.M, -own.total),
+            np.linalg.solve(T.T @ state.M @ T, -world.total),
+        )
         turning = np.cross(state.v[3:6], state.v[:3])
-        assert judges.relative(u_dot, np.concatenate([R @ (qdd[:3] + turning), R @ qdd[3:6], qdd[6:]])) < 1e-8
+        assert (
+            judges.relative(u_dot, np.concatenate([R @ (qdd[:3] + turning), R @ qdd[3:6], qdd[6:]]))
+            < 1e-8
+        )
         assert np.allclose(world.gravity, T.T @ own.gravity)
 
 
-def test_gliding_and_tumbling_as_one_body_asks_for_no_force_on_the_centre_of_mass_in_the_worlds_axes() -> None:
-    """A base that glides is the artefact: the base's axes count m ω × v, the world's only what tumbles."""
+def test_gliding_and_tumbling_as_one_body_asks_for_no_force_on_the_centre_of_mass_in_the_worlds_axes() -> (
+    None
+):
+    """A base that glides is the artefact: the base's axes count m ω × v, the world's only what
+    tumbles.
+    """
     state = judges.load("go2").random_state(5)
     mass, v = state.robot.mass, np.zeros(18)
     v[:6] = 1.0, -2.0, 0.5, 0.3, 1.0, -0.7
-    own, world = (bias_forces(state.replace(v=v), axes=axes).fictitious for axes in ("base", "world"))
+    own, world = (
+        bias_forces(state.replace(v=v), axes=axes).fictitious for axes in ("base", "world")
+    )
     R, omega = state.frame_pose("base").rotation, v[3:6]
     lever = R.T @ (state.com - state.frame_pose("base").translation)
     tumbling = mass * np.cross(omega, np.cross(omega, lever))
@@ -93,7 +117,9 @@ def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None
         assert judges.relative(bias_forces(state).gravity, slope) < 1e-5
 
 
-def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grows_with_the_square(name: str) -> None:
+def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grows_with_the_square(
+    name: str,
+) -> None:
     state = judges.load(name).random_state(3, spread=1.0)
     scale = np.max(np.abs(state.h))
     for i, unit in enumerate(np.eye(state.robot.nv)):
@@ -113,14 +139,20 @@ def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str)
 
     v, nv = state.v, state.robot.nv
     alone = [felt(v[i] * np.eye(nv)[i]) for i in range(nv)]
-    pairs = sum(felt(v[i] * np.eye(nv)[i] + v[j] * np.eye(nv)[j]) - alone[i] - alone[j] for i in range(nv) for j in range(i))
+    pairs = sum(
+        felt(v[i] * np.eye(nv)[i] + v[j] * np.eye(nv)[j]) - alone[i] - alone[j]
+        for i in range(nv)
+        for j in range(i)
+    )
     assert judges.relative(bias_forces(state).coriolis, pairs) < 1e-8
     assert judges.relative(bias_forces(state).centrifugal, sum(alone)) < 1e-8
 
 
 def test_the_coriolis_matrix_gives_the_velocity_forces(name: str) -> None:
     for state in judges.states(name, N, spread=1.0):
-        assert judges.relative(coriolis_matrix(state) @ state.v, bias_forces(state).fictitious) < 1e-9
+        assert (
+            judges.relative(coriolis_matrix(state) @ state.v, bias_forces(state).fictitious) < 1e-9
+        )
 
 
 def test_inertia_changes_as_finite_differences_along_v_say(name: str) -> None:
@@ -130,32 +162,43 @@ def test_inertia_changes_as_finite_differences_along_v_say(name: str) -> None:
 
 
 def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name: str) -> None:
-    """vᵀ (Ṁ - 2 C) v = 0 with Ṁ from differences of M: not for the C of half the velocity, nor for one without a column."""
+    """vᵀ (Ṁ - 2 C) v = 0 with Ṁ from differences of M: not for the C of half the velocity, nor for
+    one without a column.
+    """
     worst = np.zeros(3)
     for state in judges.states(name, N, spread=1.0):
         C = coriolis_matrix(state)
         wrong = C.copy()
         wrong[:, 3] = 0.0
         power = np.abs(state.v) @ np.abs(C) @ np.abs(state.v)
-        found = [power_identity(state), power_identity(state, 0.5 * C), power_identity(state, wrong)]
+        found = [
+            power_identity(state),
+            power_identity(state, 0.5 * C),
+            power_identity(state, wrong),
+        ]
         worst = np.maximum(worst, np.abs(found) / power)
     assert worst[0] < 1e-8  # the differences leave 2e-10
     assert np.all(worst[1:] > 1e-3)
 
 
 def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
-    """go2 whirls its legs for 0.2 s under fictitious forces alone: energy moves between joints and base, none is lost."""
+    """go2 whirls its legs for 0.2 s under fictitious forces alone: energy moves between joints and
+    base, none is lost.
+    """
     state = judges.load("go2").random_state(5, spread=1.0)
     state = state.replace(v=8.0 * state.v)
     start, dt, joints = 0.5 * state.v @ state.M @ state.v, 1e-4, []
     for _ in range(2000):
         # the midpoint rule in q and v
         acceleration = -np.linalg.solve(state.M, bias_forces(state).fictitious)
-        middle = state.replace(q=state.integrate(0.5 * dt * state.v), v=state.v + 0.5 * dt * acceleration)
+        middle = state.replace(
+            q=state.integrate(0.5 * dt * state.v), v=state.v + 0.5 * dt * acceleration
+        )
         acceleration = -np.linalg.solve(middle.M, bias_forces(middle).fictitious)
         state = state.replace(q=state.integrate(dt * middle.v), v=state.v + dt * acceleration)
         joints.append(0.5 * state.v[6:] @ state.M[6:, 6:] @ state.v[6:])
-    # the midpoint rule's own error is 1e-7; without these forces, or with half of them, energy changes by 1e-2
+    # the midpoint rule's own error is 1e-7; without these forces, or with half of them, energy
+    # changes by 1e-2
     assert abs(0.5 * state.v @ state.M @ state.v / start - 1.0) < 1e-6
     assert np.ptp(joints) > 0.3 * joints[0]
 
@@ -174,13 +217,19 @@ def wandering_rate(t: float) -> np.ndarray:
 
 def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> None:
     time = np.linspace(0.0, 2.0, 4001)
-    view = view_from_rotating_frame(time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate)
+    view = view_from_rotating_frame(
+        time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate
+    )
     dt = time[1] - time[0]
     velocity = (view.position[2:] - view.position[:-2]) / (2.0 * dt)
     acceleration = (view.position[2:] - 2.0 * view.position[1:-1] + view.position[:-2]) / dt**2
     assert np.max(np.abs(view.velocity[1:-1] - velocity)) < 1e-5
     assert np.max(np.abs(view.acceleration[1:-1] - acceleration)) < 2e-5
-    for term in (view.centrifugal, view.coriolis, view.euler):  # leaving one out would not explain it
+    for term in (
+        view.centrifugal,
+        view.coriolis,
+        view.euler,
+    ):  # leaving one out would not explain it
         assert np.max(np.abs(term)) > 0.5
 
 
@@ -190,14 +239,20 @@ def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
         return (np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ R.reshape(3, 3)).ravel()
 
     time = np.linspace(0.0, 3.0, 7)
-    found = view_from_rotating_frame(time, wandering, (1.0, 0.0, 0.0), omega_rate=wandering_rate).rotation
-    exact = scipy.integrate.solve_ivp(derivative, (0.0, 3.0), np.eye(3).ravel(), t_eval=time, rtol=1e-12, atol=1e-13)
+    found = view_from_rotating_frame(
+        time, wandering, (1.0, 0.0, 0.0), omega_rate=wandering_rate
+    ).rotation
+    exact = scipy.integrate.solve_ivp(
+        derivative, (0.0, 3.0), np.eye(3).ravel(), t_eval=time, rtol=1e-12, atol=1e-13
+    )
     assert np.max(np.abs(found.reshape(7, 9) - exact.y.T)) < 1e-8
     assert np.allclose(found @ found.transpose(0, 2, 1), np.eye(3), atol=1e-12)
 
 
 def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns_evenly() -> None:
-    """p' = (r cos ωt, -r sin ωt): Coriolis pulls inward twice as hard as centrifugal pushes outward."""
+    """p' = (r cos ωt, -r sin ωt): Coriolis pulls inward twice as hard as centrifugal pushes
+    outward.
+    """
     time = np.linspace(0.0, 5.0, 101)
     r, w = 0.8, 1.3
     view = view_from_rotating_frame(time, (0.0, 0.0, w), (r, 0.0, 0.2))
@@ -213,7 +268,10 @@ def test_a_link_that_turns_evenly_pulls_its_points_inward_by_omega_squared_times
     """ur5's shoulder turns at 2 rad/s: the wrist's acceleration by the robot's own kinematics."""
     robot = judges.load("ur5")
     state = robot.standing().replace(v=2.0 * np.eye(robot.nv)[0])
-    axis, place = state.frame_pose("shoulder_pan_joint").rotation[:, 2], state.point("shoulder_pan_joint")
+    axis, place = (
+        state.frame_pose("shoulder_pan_joint").rotation[:, 2],
+        state.point("shoulder_pan_joint"),
+    )
     r = state.point("wrist_3_link") - place
     inward = centripetal_acceleration(2.0 * axis, r)
     assert np.allclose(state.frame_drift("wrist_3_link")[:3], inward, atol=1e-10)

@@ -1,7 +1,7 @@
 """ζ, η, C, B and their spaces (8)-(14)(16)(17): counted, solved and measured by others.
 
-Counts come from MuJoCo's matrices and elimination with complete pivoting, forces from Pinocchio's constrained dynamics and
-from MuJoCo's contacts.
+Counts come from MuJoCo's matrices and elimination with complete pivoting, forces from Pinocchio's
+constrained dynamics and from MuJoCo's contacts.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ from floatbase.robots import Foot
 
 
 def stances(name: str) -> list[fb.Contacts]:
-    """Every subset of a robot's feet as points, and as flat feet where they are; no contacts for a robot without feet."""
+    """Every subset of a robot's feet as points, and as flat feet where they are; no contacts for a
+    robot without feet.
+    """
     robot = judges.load(name)
     frames = [foot.frame for foot in robot.feet]
     some = [list(c) for n in range(1, len(frames) + 1) for c in itertools.combinations(frames, n)]
@@ -47,20 +49,32 @@ def straight(name: str) -> fb.State:
 
 @cache
 def clear_states(name: str, n: int) -> list[fb.State]:
-    """n random states where every stance has its rank beyond doubt: no singular value near what contacts resolve, 1e-4."""
+    """n random states where every stance has its rank beyond doubt: no singular value near what
+    contacts resolve, 1e-4.
+    """
 
     def clear(state: fb.State) -> bool:
-        parts = (np.linalg.svd(contacts.constraint(state)[0], compute_uv=False) for contacts in stances(name))
+        parts = (
+            np.linalg.svd(contacts.constraint(state)[0], compute_uv=False)
+            for contacts in stances(name)
+        )
         return not any(np.any((s > 1e-9 * s[0]) & (s < 5e-4 * s[0])) for s in parts if s.size)
 
-    return list(itertools.islice(filter(clear, map(judges.load(name).random_state, itertools.count())), n))
+    return list(
+        itertools.islice(filter(clear, map(judges.load(name).random_state, itertools.count())), n)
+    )
 
 
 def configurations(name: str) -> dict[str, fb.State]:
     """Standing, straight knees, all joints at zero, and two random ones."""
     robot = judges.load(name)
     random = {f"random {i}": state for i, state in enumerate(clear_states(name, 2))}
-    return {"standing": robot.standing(), "straight": straight(name), "neutral": robot.neutral(), **random}
+    return {
+        "standing": robot.standing(),
+        "straight": straight(name),
+        "neutral": robot.neutral(),
+        **random,
+    }
 
 
 @cache
@@ -74,7 +88,9 @@ def cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
 
 
 def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
-    """Rank by Gaussian elimination with complete pivoting, rows scaled to unit length: no singular values."""
+    """Rank by Gaussian elimination with complete pivoting, rows scaled to unit length: no singular
+    values.
+    """
     A = np.array(A, dtype=np.float64)
     lengths = np.linalg.norm(A, axis=1, keepdims=True)
     A = A / np.where(lengths > 1e-12, lengths, 1.0)
@@ -112,7 +128,7 @@ def held_cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
     return [(case, held(eom)) for case, eom in cases(name)]
 
 
-# counting -----------------------------------------------------------------------------------------------------------------
+# counting -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
@@ -142,7 +158,9 @@ def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: 
 
 @pytest.mark.parametrize("name", judges.KINDS)
 def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(name: str) -> None:
-    """rank V_q̈ = d - rank J + rank J_b, and it is the number of accelerations that torques reach with the contacts held."""
+    """rank V_q̈ = d - rank J + rank J_b, and it is the number of accelerations that torques reach
+    with the contacts held.
+    """
     for case, eom in cases(name):
         M, J = judged(eom)
         found = dynamics.dimensions(eom)
@@ -153,8 +171,12 @@ def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(nam
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(name: str) -> None:
-    """k - rank J_b from geometry alone: points that are one, on a line, or not leave 3, 5 or 6 ways to push a rigid body."""
+def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(
+    name: str,
+) -> None:
+    """k - rank J_b from geometry alone: points that are one, on a line, or not leave 3, 5 or 6 ways
+    to push a rigid body.
+    """
     for case, eom in cases(name):
         points = eom.contacts.positions(eom.state)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -171,7 +193,9 @@ def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_g
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -> None:
-    """τ changes by -J_jᵀ λ for an internal λ: the acceleration by Pinocchio's recursion stays what it was."""
+    """τ changes by -J_jᵀ λ for an internal λ: the acceleration by Pinocchio's recursion stays what
+    it was.
+    """
     rng = np.random.default_rng(0)
     for case, eom in cases(name)[:: 3 if name != "talos" else 1]:
         F = dynamics.internal_forces(eom)
@@ -182,7 +206,9 @@ def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -
         before = judges.aba(eom, tau, forces)
         after = judges.aba(eom, tau - eom.J[:, 6:].T @ squeeze, forces + squeeze)
         assert np.allclose(before, after, atol=1e-7 * max(1.0, np.abs(before).max())), case
-        if np.linalg.norm(eom.J.T @ squeeze) > 1.0:  # one that is not in null(Jᵀ) needs those torques
+        if (
+            np.linalg.norm(eom.J.T @ squeeze) > 1.0
+        ):  # one that is not in null(Jᵀ) needs those torques
             assert np.linalg.norm(judges.aba(eom, tau, forces + squeeze) - before) > 1e-2, case
 
 
@@ -197,16 +223,24 @@ def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -
             assert np.max(np.abs(J.T @ N), initial=0.0) < 1e-8, case
 
 
-def test_solo8_on_four_feet_has_rank_10_where_it_stands_symmetrically_9_with_straight_legs_and_11_elsewhere() -> None:
+def test_solo8_on_four_feet_has_rank_10_where_it_stands_symmetrically_9_with_straight_legs_and_11_elsewhere() -> (
+    None
+):
     robot = judges.load("solo8")
-    for state, rank in ((robot.standing(), 10), (robot.neutral(), 9), *((state, 11) for state in clear_states("solo8", 10))):
+    for state, rank in (
+        (robot.standing(), 10),
+        (robot.neutral(), 9),
+        *((state, 11) for state in clear_states("solo8", 10)),
+    ):
         found = dynamics.dimensions(fb.equations_of_motion(state, fb.Contacts.points(robot)))
         assert (found.rank_J, found.null_B, found.undetermined) == (rank, 20 - rank, 12 - rank)
         assert found.rank_V_qdd == 8 - rank + found.rank_J_base
 
 
 def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_rank() -> None:
-    """The base still moves: 12 contact rows stay independent although each leg's own 3 × 3 Jacobian is singular."""
+    """The base still moves: 12 contact rows stay independent although each leg's own 3 × 3 Jacobian
+    is singular.
+    """
     state = judges.load("go2").neutral()  # legs straight down
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     _, J = judged(eom)
@@ -223,19 +257,27 @@ def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_
         found = dynamics.dimensions(fb.equations_of_motion(state, contacts))
         assert found.rank_J == 18 - lost
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
-        assert found.rank_V_qdd == 12 - found.rank_J + 6 == lost  # how many ways the legs can still move: bent, none
+        assert (
+            found.rank_V_qdd == 12 - found.rank_J + 6 == lost
+        )  # how many ways the legs can still move: bent, none
 
 
 def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
-    """solo8 on four feet, 10^-exponent away from where it loses rank, moving with noise of `speed` m/s and rad/s."""
+    """solo8 on four feet, 10^-exponent away from where it loses rank, moving with noise of `speed`
+    m/s and rad/s.
+    """
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
     state = judges.along(robot.standing(), rng.normal(size=robot.nv), 10.0**-exponent)
-    return fb.equations_of_motion(state.replace(v=speed * rng.normal(size=robot.nv)), fb.Contacts.points(robot))
+    return fb.equations_of_motion(
+        state.replace(v=speed * rng.normal(size=robot.nv)), fb.Contacts.points(robot)
+    )
 
 
 def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_rank() -> None:
-    """A simulated solo8 is never quite symmetric: whatever rank J is said to have, all other numbers must follow from it."""
+    """A simulated solo8 is never quite symmetric: whatever rank J is said to have, all other
+    numbers must follow from it.
+    """
     for exponent in range(1, 13):
         found = dynamics.dimensions(near_singular(exponent))
         expected = found.d + found.k - found.rank_J
@@ -243,8 +285,12 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
         assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base, exponent
 
 
-def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth() -> None:
-    """A q̈ = b to 1e-10 of |q̈| along the resolved directions, and along the others to their singular value times |q̈|."""
+def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth() -> (
+    None
+):
+    """A q̈ = b to 1e-10 of |q̈| along the resolved directions, and along the others to their
+    singular value times |q̈|.
+    """
     for exponent in range(1, 13):
         eom = near_singular(exponent)
         qdd = dynamics.accelerations_from_torques(eom)(np.random.default_rng(1).normal(size=8))
@@ -257,43 +303,65 @@ def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_te
 
 
 def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
-    """The torques that hold solo8 still at the singular stance: nearby they make the same forces to 1 % of the weight.
+    """The torques that hold solo8 still at the singular stance: nearby they make the same forces to
+    1 % of the weight.
 
-    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 need more than 1e8 N.
+    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 need more than 1e8
+    N.
     """
     robot = judges.load("solo8")
     standing, contacts = robot.standing(), fb.Contacts.points(robot)
-    tau = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))(standing.q, standing.v).tau
+    tau = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))(
+        standing.q, standing.v
+    ).tau
     expected = dynamics.forces_from_torques(fb.equations_of_motion(standing, contacts))(tau)
     for exponent, speed in itertools.product(range(4, 13), (0.0, 0.01, 0.1)):
         eom = near_singular(exponent, speed)
         case = exponent, speed
-        assert np.max(np.abs(dynamics.forces_from_torques(eom)(tau) - expected)) < 0.01 * robot.weight, case
-        assert np.max(np.abs(dynamics.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed, case
+        assert (
+            np.max(np.abs(dynamics.forces_from_torques(eom)(tau) - expected)) < 0.01 * robot.weight
+        ), case
+        assert np.max(np.abs(dynamics.accelerations_from_torques(eom)(tau))) < 0.2 + 10.0 * speed, (
+            case
+        )
         space = dynamics.feasible_space(eom)
-        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, case  # the smallest point of all; q̈ in rad/s² is in it
+        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, (
+            case
+        )  # the smallest point of all; q̈ in rad/s² is in it
 
 
 def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank() -> None:
-    """Also for forces along directions that the contacts resolve badly: they act a little, and q̈ says so."""
+    """Also for forces along directions that the contacts resolve badly: they act a little, and q̈
+    says so.
+    """
     for exponent in range(1, 13):
         eom = near_singular(exponent, 0.1)
         space = dynamics.feasible_space(eom)
         qdd, tau, forces = space(10.0 * np.random.default_rng(2).normal(size=space.dimension))
-        assert np.max(np.abs(judges.aba(eom, tau, forces) - qdd)) < 1e-9 * np.max(np.abs(qdd)), exponent
+        assert np.max(np.abs(judges.aba(eom, tau, forces) - qdd)) < 1e-9 * np.max(np.abs(qdd)), (
+            exponent
+        )
         assert space.dimension == eom.d + eom.k - dynamics.dimensions(eom).rank_J, exponent
 
 
-def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_the_rows_forbids() -> None:
-    """A leaning of 1e-4 rad is below what contacts resolve: torques that roll the base meet no wall of 500 N there."""
+def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_the_rows_forbids() -> (
+    None
+):
+    """A leaning of 1e-4 rad is below what contacts resolve: torques that roll the base meet no wall
+    of 500 N there.
+    """
     robot = judges.load("solo8")
     contacts, sim = fb.Contacts.points(robot), fb.Simulation(robot)
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
-    run = fb.rollout(sim, controller, 1.0, pushes=[fb.Push([0.0, 0.1, 0.0], 0.9)], control_period=2e-3)
+    run = fb.rollout(
+        sim, controller, 1.0, pushes=[fb.Push([0.0, 0.1, 0.0], 0.9)], control_period=2e-3
+    )
     eom = fb.equations_of_motion(sim.state, contacts)
     _, s, Vt = np.linalg.svd(eom.A)
     assert 1e-6 < s[10] / s[0] < dynamics.CONSTRAINT_RANK_TOLERANCE
-    rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()  # N·m, torques along the badly resolved direction
+    rolling = (
+        0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
+    )  # N·m, torques along the badly resolved direction
     change, rolls = [], []
     motors = [sim.model.joint(joint).dofadr[0] for joint in robot.joint_names]
     sim.data.ctrl[:] = 0.0
@@ -308,7 +376,9 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_
     assert dynamics.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
     found = (dynamics.forces_from_torques(eom).A @ rolling).reshape(4, 3)
     assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
-    assert np.max(np.abs(found - (change[1] - change[0]))) < 0.3  # N; lateral shares are what softness decides
+    assert (
+        np.max(np.abs(found - (change[1] - change[0]))) < 0.3
+    )  # N; lateral shares are what softness decides
     to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
     assert np.max(np.abs(to_the_letter @ np.linalg.solve(eom.M, eom.S @ rolling))) > 100.0
 
@@ -320,8 +390,12 @@ def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_t
     assert np.max(np.abs(U[:, 10:].T @ b)) < 1e-12 < np.max(np.abs(U[:, 10:].T @ eom.b))
     assert np.max(np.abs(A @ Vt[10])) < 1e-12 < np.max(np.abs(eom.A @ Vt[10]))
     assert np.allclose(U[:, :10].T @ b, U[:, :10].T @ eom.b, atol=1e-12)
-    regular = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.points(judges.load("go2")))
-    for found, given in zip(dynamics.resolved_constraint(regular), (regular.A, regular.b), strict=True):
+    regular = fb.equations_of_motion(
+        judges.load("go2").random_state(0), fb.Contacts.points(judges.load("go2"))
+    )
+    for found, given in zip(
+        dynamics.resolved_constraint(regular), (regular.A, regular.b), strict=True
+    ):
         assert np.allclose(found, given, atol=1e-12)
 
 
@@ -337,12 +411,18 @@ def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
 
     state = judges.load("go2").standing()
     with raises(InputError, "A", "J"):
-        dynamics.feasible_space(fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)])))
+        dynamics.feasible_space(
+            fb.equations_of_motion(state, fb.Contacts([Thruster("FL_foot", radius=0.022)]))
+        )
 
 
 @pytest.mark.parametrize(("name", "unseen"), [("go2", 0), ("solo12", 0), ("solo8", 2)])
-def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name: str, unseen: int) -> None:
-    """ζ answers -J_jᵀ λ with λ for an internal λ, without its part in null(Jᵀ): k - rank J_b - (k - rank J) are left."""
+def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(
+    name: str, unseen: int
+) -> None:
+    """ζ answers -J_jᵀ λ with λ for an internal λ, without its part in null(Jᵀ): k - rank J_b - (k -
+    rank J) are left.
+    """
     state = judges.load(name).standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     F, N = dynamics.internal_forces(eom), dynamics.undetermined_forces(eom)
@@ -351,7 +431,11 @@ def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name:
     assert np.allclose(answer, F - N @ (N.T @ F), atol=1e-9)
     found = dynamics.dimensions(eom)
     assert (found.internal, found.undetermined) == (6, unseen)
-    assert np.linalg.matrix_rank(answer, tol=1e-8) == found.internal - found.undetermined == found.rank_J - found.rank_J_base
+    assert (
+        np.linalg.matrix_rank(answer, tol=1e-8)
+        == found.internal - found.undetermined
+        == found.rank_J - found.rank_J_base
+    )
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
@@ -362,35 +446,53 @@ def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name: str) -> 
     assert found.null_B == found.null_C == found.rank_V_qdd == eom.d
     assert found.internal == found.undetermined == 0
     tau = np.random.default_rng(0).normal(size=eom.d)
-    assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), judges.aba(eom, tau, np.zeros(0))) < 1e-9
+    assert (
+        judges.relative(
+            dynamics.accelerations_from_torques(eom)(tau), judges.aba(eom, tau, np.zeros(0))
+        )
+        < 1e-9
+    )
     assert dynamics.forces_from_torques(eom)(tau).shape == (0,)
 
 
-# ζ and η -----------------------------------------------------------------------------------------------------------------
+# ζ and η ------------------------------------------------------------------------------------------
 
 
 def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tuple[Array, Array]:
-    """q̈ and the contact forces [wrenches] of Pinocchio's constrained forward dynamics, world-aligned, no Baumgarte terms."""
+    """q̈ and the contact forces [wrenches] of Pinocchio's constrained forward dynamics,
+    world-aligned, no Baumgarte terms.
+    """
     robot, models = eom.robot, pin.StdVec_RigidConstraintModel()
     for contact in eom.contacts:
         frame = robot.model.frames[robot.frame_id(contact.name)]
         placement = frame.placement
         if kind == pin.ContactType.CONTACT_3D:
-            local = eom.state.frame_pose(contact.name).actInv(np.array(contact.positions(eom.state)[0]))
+            local = eom.state.frame_pose(contact.name).actInv(
+                np.array(contact.positions(eom.state)[0])
+            )
             placement = placement * pin.SE3(np.eye(3), local)
-        model = pin.RigidConstraintModel(kind, robot.model, frame.parentJoint, placement, pin.LOCAL_WORLD_ALIGNED)
+        model = pin.RigidConstraintModel(
+            kind, robot.model, frame.parentJoint, placement, pin.LOCAL_WORLD_ALIGNED
+        )
         assert model.m_baumgarte_parameters.Kp == model.m_baumgarte_parameters.Kd == 0.0
         models.append(model)
-    datas, data = pin.StdVec_RigidConstraintData([m.createData() for m in models]), robot.model.createData()
+    datas, data = (
+        pin.StdVec_RigidConstraintData([m.createData() for m in models]),
+        robot.model.createData(),
+    )
     pin.initConstraintDynamics(robot.model, data, models, datas)
     settings = pin.ProximalSettings(1e-14, 1e-12, 200)
-    qdd = pin.constraintDynamics(robot.model, data, eom.state.q, eom.state.v, eom.S @ tau, models, datas, settings)
+    qdd = pin.constraintDynamics(
+        robot.model, data, eom.state.q, eom.state.v, eom.S @ tau, models, datas, settings
+    )
     part = "linear" if kind == pin.ContactType.CONTACT_3D else "vector"
     return np.array(qdd), np.concatenate([getattr(d.contact_force, part) for d in datas])
 
 
 def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned() -> None:
-    """The judge's own convention, checked first: its forces, put on the links as external ones, give its accelerations."""
+    """The judge's own convention, checked first: its forces, put on the links as external ones,
+    give its accelerations.
+    """
     state = judges.load("go2").random_state(0).replace(v=np.zeros(18))
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     tau = np.random.default_rng(0).normal(size=12)
@@ -401,8 +503,12 @@ def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_ali
 
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name: str) -> None:
-    """Feet of radius 0 where the balls' centres are, random states and torques, every stance with J of full rank."""
-    robot = fb.load(name, feet=[Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet])
+    """Feet of radius 0 where the balls' centres are, random states and torques, every stance with J
+    of full rank.
+    """
+    robot = fb.load(
+        name, feet=[Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet]
+    )
     rng, compared = np.random.default_rng(0), 0
     for state in clear_states(name, 3):
         state = fb.State(robot, state.q, state.v)
@@ -413,7 +519,9 @@ def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(n
             tau = 10.0 * rng.normal(size=eom.d)
             qdd, forces = pinocchios(eom, tau, pin.ContactType.CONTACT_3D)
             assert judges.relative(dynamics.forces_from_torques(eom)(tau), forces) < 1e-8, chosen
-            assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8, chosen
+            assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8, (
+                chosen
+            )
             compared += 1
     assert compared >= 3 * 14
 
@@ -429,14 +537,21 @@ def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: st
         tau = 10.0 * rng.normal(size=eom.d)
         qdd, wrenches = pinocchios(eom, tau, pin.ContactType.CONTACT_6D)
         forces = dynamics.forces_from_torques(eom)(tau)
-        found = np.concatenate([c.force_generator_matrix(eom.state) @ forces[contacts.force_slice(c.name)] for c in contacts])
+        found = np.concatenate(
+            [
+                c.force_generator_matrix(eom.state) @ forces[contacts.force_slice(c.name)]
+                for c in contacts
+            ]
+        )
         assert judges.relative(found, wrenches) < 1e-8
         assert judges.relative(dynamics.accelerations_from_torques(eom)(tau), qdd) < 1e-8
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str) -> None:
-    """Every configuration and stance, rank lost or not, against one least-squares solve of the whole system."""
+    """Every configuration and stance, rank lost or not, against one least-squares solve of the
+    whole system.
+    """
     rng = np.random.default_rng(0)
     for case, eom in held_cases(name):
         tau = 5.0 * rng.normal(size=eom.d)
@@ -445,33 +560,48 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str
         found = dynamics.forces_from_torques(eom)(tau)
         assert judges.relative(found, forces) < 1e-6, case
         N = dynamics.undetermined_forces(eom)
-        assert np.max(np.abs(N.T @ found), initial=0.0) < 1e-6 * (1.0 + np.abs(found).max(initial=0.0)), case
+        assert np.max(np.abs(N.T @ found), initial=0.0) < 1e-6 * (
+            1.0 + np.abs(found).max(initial=0.0)
+        ), case
 
 
 def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
-    """§2.2.1: a leg that presses its foot down is pushed up. Torques that make -z at the foot raise λ_z."""
+    """§2.2.1: a leg that presses its foot down is pushed up. Torques that make -z at the foot raise
+    λ_z.
+    """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    pressing = eom.J[:, 6:].T @ np.tile([0.0, 0.0, -10.0], 4)  # joint torques of a downward force of the feet
+    pressing = eom.J[:, 6:].T @ np.tile(
+        [0.0, 0.0, -10.0], 4
+    )  # joint torques of a downward force of the feet
     change = dynamics.forces_from_torques(eom).A @ pressing
     assert np.all(change[2::3] > 1.0)
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(name: str) -> None:
-    """Measured while swaying at 1 rad/s and 2 cm: 2e-5 of the weight: a rigid contact is a good model of MuJoCo's stiffest."""
+def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(
+    name: str,
+) -> None:
+    """Measured while swaying at 1 rad/s and 2 cm: 2e-5 of the weight: a rigid contact is a good
+    model of MuJoCo's stiffest.
+    """
     robot = judges.load(name)
     standing, contacts = robot.standing(), judges.stance(robot)
 
     def sway(t: float) -> Array:
-        return standing.com + min(1.0, 4.0 * t) * np.array([0.02 * np.sin(6.0 * t), 0.0, 0.01 * np.sin(9.0 * t)])
+        return standing.com + min(1.0, 4.0 * t) * np.array(
+            [0.02 * np.sin(6.0 * t), 0.0, 0.01 * np.sin(9.0 * t)]
+        )
 
-    controller = fb.WholeBodyController(robot, contacts, (fb.CoMTask(sway), *fb.standing_tasks(standing)[1:]))
+    controller = fb.WholeBodyController(
+        robot, contacts, (fb.CoMTask(sway), *fb.standing_tasks(standing)[1:])
+    )
     run = fb.rollout(fb.Simulation(robot), controller, 0.5, control_period=2e-3)
     assert run.outcome == "completed"
     assert np.abs(run.v[100:]).max() > 0.1
     gaps = [
-        dynamics.forces_from_torques(fb.equations_of_motion(run.state(i), contacts))(run.tau[i]) - run.measured[i]
+        dynamics.forces_from_torques(fb.equations_of_motion(run.state(i), contacts))(run.tau[i])
+        - run.measured[i]
         for i in range(100, len(run), 5)
     ]
     assert 1e-7 < np.abs(gaps).max() / robot.weight < 1e-4
@@ -479,7 +609,9 @@ def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> None:
-    """(10)(12) against (7) itself at points that solve nothing: what is left over is the residual, b's part by MuJoCo's M."""
+    """(10)(12) against (7) itself at points that solve nothing: what is left over is the residual,
+    b's part by MuJoCo's M.
+    """
     rng = np.random.default_rng(4)
     for case, eom in cases(name):
         if case.split()[1] != "random":
@@ -493,12 +625,16 @@ def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> No
         C, a = dynamics.torque_force_matrix(eom)
         expected = eom.A @ judges.aba(eom, tau, forces) - eom.b
         assert np.allclose(
-            C @ np.concatenate([tau, forces]) - a, expected, atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0))
+            C @ np.concatenate([tau, forces]) - a,
+            expected,
+            atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0)),
         )
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_as_13_has_them(name: str) -> None:
+def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_as_13_has_them(
+    name: str,
+) -> None:
     for case, eom in held_cases(name):
         if case.split()[1] not in ("standing", "random"):
             continue
@@ -516,12 +652,14 @@ def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_
             assert judges.relative(pairs.b, np.linalg.lstsq(C, a, rcond=1e-10)[0]) < 1e-5, case
 
 
-# the whole space ---------------------------------------------------------------------------------------------------------
+# the whole space ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(name: str) -> None:
-    """(7) to 1e-9 of its largest term, the dynamics by Pinocchio's recursion, in motion that the contacts allow."""
+    """(7) to 1e-9 of its largest term, the dynamics by Pinocchio's recursion, in motion that the
+    contacts allow.
+    """
     rng = np.random.default_rng(0)
     for case, eom in held_cases(name):
         if case.split()[1] != "random" and not eom.k:
@@ -537,7 +675,9 @@ def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(nam
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
-    """τ drawn at random, q̈ and λ by another solver, any part of null(Jᵀ) added: its coordinates lead back to it."""
+    """τ drawn at random, q̈ and λ by another solver, any part of null(Jᵀ) added: its coordinates
+    lead back to it.
+    """
     rng = np.random.default_rng(1)
     for case, eom in held_cases(name):
         space = dynamics.feasible_space(eom)
@@ -560,11 +700,17 @@ def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str
         beta = rng.normal(size=space.dimension)
         assert np.allclose(space.coordinates(*space(beta)), beta, atol=1e-8), case
         assert np.allclose(space.map.A.T @ space.map.A, np.eye(space.dimension), atol=1e-10), case
-        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, case  # (13) v has no part along V⊥
+        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, (
+            case
+        )  # (13) v has no part along V⊥
 
 
-def test_where_contacts_cannot_do_what_is_required_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> None:
-    """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay for that."""
+def test_where_contacts_cannot_do_what_is_required_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> (
+    None
+):
+    """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay
+    for that.
+    """
     state = judges.load("solo8").random_state(3, spread=0.6)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     nearest = eom.A @ np.linalg.lstsq(eom.A, eom.b, rcond=1e-10)[0]

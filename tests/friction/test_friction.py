@@ -1,4 +1,6 @@
-"""The force taken apart, the exact cone, its projection, and what the polyhedron adds to rows and rays."""
+"""The force taken apart, the exact cone, its projection, and what the polyhedron adds to rows and
+rays.
+"""
 
 from __future__ import annotations
 
@@ -57,10 +59,14 @@ def test_the_cone_opens_by_arctan_mu() -> None:
 
 
 @given(seeds, mus)
-def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_slips(seed: int, mu: float) -> None:
+def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_slips(
+    seed: int, mu: float
+) -> None:
     rng = np.random.default_rng(seed)
     cone = FrictionCone(any_normal(rng), mu)
-    f = cone.normal * rng.uniform(1, 100) + 0.9 * mu * rng.uniform(-0.7, 0.7, 2) @ tangents(cone.normal)
+    f = cone.normal * rng.uniform(1, 100) + 0.9 * mu * rng.uniform(-0.7, 0.7, 2) @ tangents(
+        cone.normal
+    )
     margin, parts = cone.margin(f), decompose(f, cone.normal)
     outwards = parts.f_par / parts.alpha_par
     assert margin > 0
@@ -72,7 +78,10 @@ def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_sl
 
 
 def test_the_tolerance_is_in_newton() -> None:
-    cone, polyhedron = FrictionCone(UP, 0.5), FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False)
+    cone, polyhedron = (
+        FrictionCone(UP, 0.5),
+        FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False),
+    )
     slipping = [50.02, 0.0, 100.0]
     for shape in (cone, polyhedron):
         assert not shape.contains(slipping)
@@ -81,7 +90,9 @@ def test_the_tolerance_is_in_newton() -> None:
 
 
 @given(seeds, facets, mus, st.booleans())
-def test_the_area_ratio_follows_the_number_of_facets(seed: int, n: int, mu: float, inside: bool) -> None:
+def test_the_area_ratio_follows_the_number_of_facets(
+    seed: int, n: int, mu: float, inside: bool
+) -> None:
     polyhedron = FrictionPolyhedron(any_normal(np.random.default_rng(seed)), mu, n, inside)
     corners = polyhedron.rays - polyhedron.normal
     turns = np.cross(corners, np.roll(corners, -1, axis=0)) @ polyhedron.normal
@@ -89,14 +100,24 @@ def test_the_area_ratio_follows_the_number_of_facets(seed: int, n: int, mu: floa
 
 
 def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97() -> None:
-    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == [0.64, 0.90, 0.97]
-    assert [round(FrictionPolyhedron(UP, 0.7, n, False).area_ratio, 2) for n in (4, 8, 16)] == [1.27, 1.05, 1.01]
+    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == [
+        0.64,
+        0.90,
+        0.97,
+    ]
+    assert [round(FrictionPolyhedron(UP, 0.7, n, False).area_ratio, 2) for n in (4, 8, 16)] == [
+        1.27,
+        1.05,
+        1.01,
+    ]
 
 
 @settings(max_examples=25)
 @given(seeds, facets, mus, st.booleans())
 def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, inside: bool) -> None:
-    """The largest push in any direction, cut off at normal component 1, is the same over the rows and over the rays."""
+    """The largest push in any direction, cut off at normal component 1, is the same over the rows
+    and over the rays.
+    """
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
     for direction in rng.normal(size=(4, 3)):
@@ -128,7 +149,11 @@ def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_i
         FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True),
         FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False),
     )
-    assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == ("outside", "inside", "inside")
+    assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == (
+        "outside",
+        "inside",
+        "inside",
+    )
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
 
 
@@ -139,7 +164,9 @@ def slips(force: Array, normal: Array, mu: float) -> float:
 
 
 @given(seeds, facets, mus)
-def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(seed: int, n: int, mu: float) -> None:
+def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(
+    seed: int, n: int, mu: float
+) -> None:
     rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
     cone = FrictionPolyhedron(normal, mu, n)
     for weights in rng.exponential(size=(20, n)):
@@ -149,7 +176,9 @@ def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(seed: int, n
 
 
 @given(seeds, facets, mus)
-def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed: int, n: int, mu: float) -> None:
+def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(
+    seed: int, n: int, mu: float
+) -> None:
     rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
     cone, (t1, t2) = FrictionPolyhedron(normal, mu, n, inner_approximation=False), tangents(normal)
     for angle, part in zip(rng.uniform(0, 2 * np.pi, 50), rng.uniform(0, 1, 50), strict=True):
@@ -158,14 +187,21 @@ def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed: int, n
 
 
 @given(seeds, facets, mus)
-def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(seed: int, n: int, mu: float) -> None:
+def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(
+    seed: int, n: int, mu: float
+) -> None:
     normal = any_normal(np.random.default_rng(seed))
-    inner, outer = FrictionPolyhedron(normal, mu, n), FrictionPolyhedron(normal, mu, n, inner_approximation=False)
+    inner, outer = (
+        FrictionPolyhedron(normal, mu, n),
+        FrictionPolyhedron(normal, mu, n, inner_approximation=False),
+    )
     for ray in inner.rays:
         assert slips(ray, normal, mu) == pytest.approx(0.0, abs=1e-9)
     for direction in inner.face_matrix + inner.mu_facet * normal:
         assert np.linalg.norm(direction) == pytest.approx(1.0)
-        assert inner.margin(normal + mu * np.cos(np.pi / n) * direction) == pytest.approx(0.0, abs=1e-9)
+        assert inner.margin(normal + mu * np.cos(np.pi / n) * direction) == pytest.approx(
+            0.0, abs=1e-9
+        )
         assert outer.margin(normal + mu * direction) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -184,15 +220,21 @@ def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y() -> None:
 
 
 @given(seeds, facets, mus, st.booleans(), st.floats(-10.0, 10.0))
-def test_turned_facets_are_the_facets_turned_about_the_normal(seed: int, n: int, mu: float, inside: bool, turn: float) -> None:
+def test_turned_facets_are_the_facets_turned_about_the_normal(
+    seed: int, n: int, mu: float, inside: bool, turn: float
+) -> None:
     normal = any_normal(np.random.default_rng(seed))
     turned, straight = (FrictionPolyhedron(normal, mu, n, inside, angle) for angle in (turn, 0.0))
     about = Rotation.from_rotvec(turn * normal).as_matrix()
     size = 1.0 + mu
     assert np.allclose(turned.face_matrix, straight.face_matrix @ about.T, rtol=0, atol=1e-9 * size)
-    assert np.allclose(turned.rays, straight.rays @ about.T, rtol=0, atol=1e-9 * size / np.cos(np.pi / n))
+    assert np.allclose(
+        turned.rays, straight.rays @ about.T, rtol=0, atol=1e-9 * size / np.cos(np.pi / n)
+    )
     whole = FrictionPolyhedron(normal, mu, n, inside, turn + 2 * np.pi / n)
-    assert np.allclose(np.roll(turned.face_matrix, -1, axis=0), whole.face_matrix, rtol=0, atol=1e-9 * size)
+    assert np.allclose(
+        np.roll(turned.face_matrix, -1, axis=0), whole.face_matrix, rtol=0, atol=1e-9 * size
+    )
 
 
 @given(seeds)
@@ -224,13 +266,19 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
         assert np.allclose(found, x.value, atol=2e-5)
         # the judge stops within its tolerance: ours must not be farther away
         assert np.linalg.norm(found - f.value) <= np.linalg.norm(x.value - f.value) + 1e-7
-        cases.add("inside" if np.array_equal(found, f.value) else "surface" if np.any(found) else "apex")
+        cases.add(
+            "inside" if np.array_equal(found, f.value) else "surface" if np.any(found) else "apex"
+        )
     assert cases == {"inside", "surface", "apex"}
 
 
 @given(seeds, facets, mus, st.booleans())
-def test_a_projection_is_the_nearest_point_of_the_cone(seed: int, n: int, mu: float, inside: bool) -> None:
-    """Moreau: p in K, (f - p) · p = 0, (f - p) · k ≤ 0 for all k in K; together they make p the nearest point."""
+def test_a_projection_is_the_nearest_point_of_the_cone(
+    seed: int, n: int, mu: float, inside: bool
+) -> None:
+    """Moreau: p in K, (f - p) · p = 0, (f - p) · k ≤ 0 for all k in K; together they make p the
+    nearest point.
+    """
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
     f = any_force(rng)

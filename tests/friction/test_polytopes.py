@@ -1,4 +1,6 @@
-"""Facets from rays and vertices from farthest points, also where the set is flat or holds whole lines."""
+"""Facets from rays and vertices from farthest points, also where the set is flat or holds whole
+lines.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ def test_every_row_is_a_facet() -> None:
 
 
 def test_a_half_space_has_one_row_and_the_whole_space_none() -> None:
-    lines = np.array([[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
+    lines = np.array(
+        [[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]]
+    )
     G, E = cone_face_matrix(lines)
     assert np.allclose(G, [[0.0, 0.0, -1.0]])
     assert E.shape == (0, 3)
@@ -59,7 +63,9 @@ def points_of(rng: np.random.Generator, n: int, rank: int) -> Array:
 
 @settings(max_examples=60)
 @given(seeds, st.integers(2, 3), st.integers(0, 3))
-def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed: int, n: int, rank: int) -> None:
+def test_vertices_are_those_of_the_hull_whatever_its_dimension(
+    seed: int, n: int, rank: int
+) -> None:
     rank = min(rank, n)
     points = points_of(np.random.default_rng(seed), n, rank)
     found = polytope_vertices(lambda direction: points[int(np.argmax(points @ direction))], n, 1.0)
@@ -68,7 +74,11 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed: int, n: int
         return
     basis = np.linalg.svd(points - points[0])[2][:rank].T
     flat = (points - points[0]) @ basis
-    expected = {int(np.argmin(flat)), int(np.argmax(flat))} if rank == 1 else set(ConvexHull(flat).vertices.tolist())
+    expected = (
+        {int(np.argmin(flat)), int(np.argmax(flat))}
+        if rank == 1
+        else set(ConvexHull(flat).vertices.tolist())
+    )
     assert {int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in found} == expected
     assert len(found) == len(expected)
 

@@ -1,4 +1,6 @@
-"""Centre of pressure and the wrench of a sole: by their definitions, and where MuJoCo's ground pushes."""
+"""Centre of pressure and the wrench of a sole: by their definitions, and where MuJoCo's ground
+pushes.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def test_about_the_centre_of_pressure_there_is_no_tangential_moment(seed: int) -
     state, forces = TALOS.standing(), loads(seed)
     for contacts, part in ((SOLES, forces), (SOLES.only("left_sole_link"), forces[:4])):
         centre = centre_of_pressure(state, contacts, part)
-        assert np.allclose(contact_wrench(state, contacts, part, centre)[3:5], 0.0, atol=1e-9 * TALOS.weight)
+        assert np.allclose(
+            contact_wrench(state, contacts, part, centre)[3:5], 0.0, atol=1e-9 * TALOS.weight
+        )
         middle = state.point("left_sole_link")
         f, tau = np.split(contact_wrench(state, contacts, part.ravel(), middle), 2)
         assert np.allclose(middle + [-tau[1] / f[2], tau[0] / f[2], 0.0], centre, atol=1e-9)
@@ -47,15 +51,23 @@ def test_the_ground_pushes_where_the_controller_planned() -> None:
     state = TALOS.standing()
     target = state.com + [0.02, 0.01, 0.0]
     tasks = [fb.CoMTask(target), *fb.standing_tasks(state)[1:]]
-    run = fb.rollout(fb.Simulation(TALOS), fb.WholeBodyController(TALOS, SOLES, tasks), 2.0, control_period=2e-3)
-    planned, measured = (centre_of_pressure(run.final, SOLES, forces[-1]) for forces in (run.planned, run.measured))
+    run = fb.rollout(
+        fb.Simulation(TALOS), fb.WholeBodyController(TALOS, SOLES, tasks), 2.0, control_period=2e-3
+    )
+    planned, measured = (
+        centre_of_pressure(run.final, SOLES, forces[-1]) for forces in (run.planned, run.measured)
+    )
     assert np.allclose(planned, measured, atol=1e-3)
-    assert np.allclose(measured[:2], run.final.com[:2], atol=2e-3)  # at rest it is below the centre of mass
+    assert np.allclose(
+        measured[:2], run.final.com[:2], atol=2e-3
+    )  # at rest it is below the centre of mass
 
 
 def test_without_pressure_there_is_no_centre() -> None:
     state = TALOS.standing()
     refused(lambda: centre_of_pressure(state, SOLES, np.zeros(24)), InputError, 0)
     with raises(InputError, "held"):
-        held = SOLES + fb.Contacts([LinearConstraint("held", 1, lambda state, t: (np.eye(1, TALOS.nv), np.zeros(1)))])
+        held = SOLES + fb.Contacts(
+            [LinearConstraint("held", 1, lambda state, t: (np.eye(1, TALOS.nv), np.zeros(1)))]
+        )
         centre_of_pressure(state, held, np.zeros(25))

@@ -1,4 +1,6 @@
-"""The wrenches of a stance, judged by cvxpy, by linear programs over rows and rays, and by brute force."""
+"""The wrenches of a stance, judged by cvxpy, by linear programs over rows and rays, and by brute
+force.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contac
     robot = judges.load(name)
     kind = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
     frames = [foot.frame for foot in robot.feet][:feet]
-    return robot.standing(), kind(robot, 0.6, frames, judges.random_normals(feet, 7, tilt) if tilt else None)
+    return robot.standing(), kind(
+        robot, 0.6, frames, judges.random_normals(feet, 7, tilt) if tilt else None
+    )
 
 
 def of(
@@ -46,18 +50,26 @@ def of(
     limit: npt.ArrayLike = np.inf,
 ) -> WrenchSet:
     """Contact points without a robot, weight 100 N, about the origin."""
-    cones = tuple(FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float))
-    return WrenchSet(np.asarray(points), cones, np.zeros(3), 100.0, np.broadcast_to(limit, len(cones)))
+    cones = tuple(
+        FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float)
+    )
+    return WrenchSet(
+        np.asarray(points), cones, np.zeros(3), 100.0, np.broadcast_to(limit, len(cones))
+    )
 
 
 def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) -> WrenchSet:
     """Feet about a metre apart, some higher than others, each on a slope of its own."""
     rng = np.random.default_rng(seed)
-    return of(rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside)
+    return of(
+        rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside
+    )
 
 
 def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
-    """Sums of forces from the cones, so inside: the first quarter as they are, to the others ever harder pushes are added."""
+    """Sums of forces from the cones, so inside: the first quarter as they are, to the others ever
+    harder pushes are added.
+    """
     rng = np.random.default_rng(seed)
     inside = wrenches.rays @ rng.exponential(30.0, (wrenches.rays.shape[1], n))
     push = rng.normal(size=(6, n)) * np.maximum(np.linspace(-2.0, 8.0, n), 0.0)
@@ -65,12 +77,21 @@ def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
 
 
 class Judge:
-    """(20)(21)(28) in cvxpy: how far inside its cone every force can be; rows for four facets, written out."""
+    """(20)(21)(28) in cvxpy: how far inside its cone every force can be; rows for four facets,
+    written out.
+    """
 
     def __init__(self, points: Array, normals: Array, mu: float, exact: bool):
-        forces, self.about, self.wrench = cp.Variable((len(points), 3)), cp.Parameter(3), cp.Parameter(6)
+        forces, self.about, self.wrench = (
+            cp.Variable((len(points), 3)),
+            cp.Parameter(3),
+            cp.Parameter(6),
+        )
         self.t = cp.Variable()
-        moment = [cp.sum([self._cross(x - self.about, forces[i])[j] for i, x in enumerate(points)]) for j in range(3)]
+        moment = [
+            cp.sum([self._cross(x - self.about, forces[i])[j] for i, x in enumerate(points)])
+            for j in range(3)
+        ]
         rows = [cp.sum(forces, axis=0) == self.wrench[:3], cp.hstack(moment) == self.wrench[3:]]
         for i, n in enumerate(normals):
             x = np.array([1.0, 0.0, 0.0]) - n * n[0]
@@ -88,7 +109,11 @@ class Judge:
     def margin(self, about: Array, wrench: Array) -> float:
         self.about.value, self.wrench.value = about, wrench
         self.problem.solve(solver=cp.CLARABEL)
-        return -np.inf if self.problem.status in ("infeasible", "infeasible_inaccurate") else float(self.t.value)
+        return (
+            -np.inf
+            if self.problem.status in ("infeasible", "infeasible_inaccurate")
+            else float(self.t.value)
+        )
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
@@ -99,7 +124,8 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
     found = []
     for w in random_wrenches(wrenches, 16, seed=feet):
-        # what the stance cannot produce at all is told apart by the equalities; the judge decides the rest
+        # what the stance cannot produce at all is told apart by the equalities; the judge decides
+        # the rest
         E = wrenches.equalities
         w = w - np.linalg.pinv(E) @ E @ w if len(E) else w
         expected = judge.margin(state.com, w)
@@ -111,7 +137,9 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
 
 
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("talos", 2)])
-def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(name: str, feet: int) -> None:
+def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(
+    name: str, feet: int
+) -> None:
     state, contacts = stance(name, feet, 0.5)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=True)
     inner = wrench_set(state, contacts, facets=6)
@@ -160,7 +188,9 @@ def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: 
 
 
 @pytest.mark.parametrize(("feet", "missing"), [(1, 3), (2, 1), (3, 0), (4, 0)])
-def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(feet: int, missing: int) -> None:
+def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(
+    feet: int, missing: int
+) -> None:
     state, contacts = stance("go2", feet)
     wrenches = wrench_set(state, contacts)
     assert len(wrenches.equalities) == missing
@@ -169,7 +199,9 @@ def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line
         # (a - b) · (τ + (x_c - a) × f): the moment about the line through a and b
         about_line = np.concatenate([np.cross(a - b, wrenches.reference_point - a), a - b])
         row = wrenches.equalities[0]
-        assert np.linalg.matrix_rank(np.vstack([row / np.linalg.norm(row), about_line]), tol=1e-9) == 1
+        assert (
+            np.linalg.matrix_rank(np.vstack([row / np.linalg.norm(row), about_line]), tol=1e-9) == 1
+        )
         assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
 
 
@@ -178,7 +210,8 @@ def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
     wrenches = wrench_set(state, contacts)
     carrying = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
     assert wrenches.margin(3.0 * carrying) == pytest.approx(3.0 * wrenches.margin(carrying))
-    # the weight divides between front and rear pair as the lever says; the lighter pair has the smaller margin
+    # the weight divides between front and rear pair as the lever says; the lighter pair has the
+    # smaller margin
     x = wrenches.points[:, 0] - state.com[0]
     lightest = 0.5 * state.robot.weight * min(x[0], -x[2]) / (x[0] - x[2])
     assert wrenches.margin(carrying) == pytest.approx(lightest * 0.6 / np.sqrt(2))
@@ -193,7 +226,12 @@ def test_limits_make_the_set_bounded() -> None:
     state, contacts = stance("go2", 4, 0.4)
     limited = wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
     for direction in np.random.default_rng(0).normal(size=(20, 6)):
-        best = linprog(-(direction @ limited.rays), np.kron(np.eye(4), np.ones(4)), limited.max_normal_force, bounds=(0, None))
+        best = linprog(
+            -(direction @ limited.rays),
+            np.kron(np.eye(4), np.ones(4)),
+            limited.max_normal_force,
+            bounds=(0, None),
+        )
         assert limited.contains(limited.rays @ best.x, tolerance=1e-5)
         assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or best.fun == 0
 
@@ -212,18 +250,29 @@ def test_reach_is_where_membership_ends() -> None:
 
 def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
     """Without torque about a CoM at the height of the ground, only friction ends it."""
-    wrenches = of([[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]], [UP] * 4, 0.5, 4, inside=False)
+    wrenches = of(
+        [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]],
+        [UP] * 4,
+        0.5,
+        4,
+        inside=False,
+    )
     carrying = [0.0, 0.0, 100.0, 0.0, 0.0, 0.0]
     assert wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
     assert wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
     assert wrenches.max_scaling([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
-    assert wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]) == np.inf
+    assert (
+        wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0])
+        == np.inf
+    )
     with raises(InfeasibleError, "start", "direction"):
         wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
 def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
-    """A facet allows μ cos(π/n) and an edge μ; with the edges out of the way, the outer feet carry all."""
+    """A facet allows μ cos(π/n) and an edge μ; with the edges out of the way, the outer feet carry
+    all.
+    """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, mu=0.7)
     feet, com = contacts.positions(state), state.com
@@ -247,14 +296,18 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
 
 @pytest.mark.parametrize("limit", [None, 90.0])
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2)])
-def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name: str, feet: int, limit: float | None) -> None:
+def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(
+    name: str, feet: int, limit: float | None
+) -> None:
     state, contacts = stance(name, feet, 0.4)
     limit = None if limit is None else limit / 150.0 * state.robot.weight
     wrenches = wrench_set(state, contacts, max_normal_force=limit)
     corners = wrenches.moment_vertices()
     carried = np.array([0.0, 0.0, state.robot.weight])
     assert len(corners) >= 4
-    assert all(wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners)
+    assert all(
+        wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners
+    )
     hull = ConvexHull(corners)
     assert len(hull.vertices) == len(corners)
     rng, centre = np.random.default_rng(0), corners.mean(axis=0)
@@ -264,7 +317,11 @@ def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name: st
             assert wrenches.contains(np.concatenate([carried, torque])) is held
     for *normal, offset in rng.permutation(hull.equations)[:30]:
         best = linprog(
-            -(np.array(normal) @ wrenches.rays[3:]), *wrenches_limits(wrenches), wrenches.rays[:3], carried, (0, None)
+            -(np.array(normal) @ wrenches.rays[3:]),
+            *wrenches_limits(wrenches),
+            wrenches.rays[:3],
+            carried,
+            (0, None),
         )
         assert -best.fun == pytest.approx(-offset, abs=1e-6 * state.robot.weight)
 
@@ -307,8 +364,12 @@ def depth(polygon: Array, at: Array) -> float:
 
 
 @pytest.mark.parametrize("mu", [0.05, 0.7])
-@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("solo8", 4), ("talos", 2), ("talos", 1)])
-def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(name: str, feet: int, mu: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "feet"), [("go2", 4), ("go2", 3), ("solo8", 4), ("talos", 2), ("talos", 1)]
+)
+def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(
+    name: str, feet: int, mu: float
+) -> None:
     robot, state = judges.load(name), judges.load(name).standing()
     contacts = judges.stance(robot, mu).only(*[foot.frame for foot in robot.feet][:feet])
     region = wrench_set(state, contacts).support_region()
@@ -332,9 +393,13 @@ def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> N
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed: int) -> None:
-    wrenches = next(feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2)
+    wrenches = next(
+        feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2
+    )
     region = wrenches.support_region()
-    judge = Judge(wrenches.points, np.array([cone.normal for cone in wrenches.cones]), 0.6, exact=False)
+    judge = Judge(
+        wrenches.points, np.array([cone.normal for cone in wrenches.cones]), 0.6, exact=False
+    )
     low, high = region.min(axis=0), region.max(axis=0)
     margin = 0.2 * (high - low)
     seen = set()
@@ -342,7 +407,10 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
         for y in np.linspace(low[1] - margin[1], high[1] + margin[1], 9):
             inside = depth(region, np.array([x, y]))
             if abs(inside) > 1e-3:
-                held = judge.margin(np.array([x, y, 0.8]), np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])) > 0
+                held = (
+                    judge.margin(np.array([x, y, 0.8]), np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]))
+                    > 0
+                )
                 assert held == (inside > 0)
                 seen.add(held)
     assert seen == {True, False}
@@ -351,7 +419,9 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
 def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() -> None:
     feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
     area = ConvexHull(feet[:, :2]).volume
-    outwards = np.column_stack([feet[:, :2], np.full(3, 0.8)])  # feet on a hilltop: friction must hold them
+    outwards = np.column_stack(
+        [feet[:, :2], np.full(3, 0.8)]
+    )  # feet on a hilltop: friction must hold them
     inwards = np.column_stack([-feet[:, :2], np.full(3, 0.8)])  # feet in a bowl
     on_top, in_bowl = (of(feet, normals, 0.3).support_region() for normals in (outwards, inwards))
     areas = [ConvexHull(region).volume if len(region) > 2 else 0.0 for region in (on_top, in_bowl)]
@@ -367,7 +437,11 @@ def test_too_steep_a_slope_carries_nobody() -> None:
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
         region = of(
-            [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]], normals, 0.4, 4, inside=False
+            [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]],
+            normals,
+            0.4,
+            4,
+            inside=False,
         ).support_region()
         assert region.shape == ((3, 2) if stands else (0, 2))
 
@@ -375,13 +449,20 @@ def test_too_steep_a_slope_carries_nobody() -> None:
 def test_limits_on_the_normal_force_cut_the_corners_off() -> None:
     square = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
     region = of(square, [UP] * 4, limit=50.0).support_region()
-    assert {tuple(np.round(corner, 9)) for corner in region} == {(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)}
+    assert {tuple(np.round(corner, 9)) for corner in region} == {
+        (1.0, 0.0),
+        (-1.0, 0.0),
+        (0.0, 1.0),
+        (0.0, -1.0),
+    }
     assert of(square, [UP] * 4, limit=20.0).support_region().shape == (0, 2)
 
 
 def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
     chimney = of(
-        [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]], [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], 0.5
+        [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]],
+        [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        0.5,
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
     refused(chimney.torques, InputError, "max_normal_force")
@@ -407,17 +488,27 @@ def test_a_grip_from_all_sides_makes_every_wrench() -> None:
 def test_moving_everything_changes_nothing(seed: int) -> None:
     here = feet_on_slopes(seed)
     step = np.random.default_rng(seed).normal(size=3)
-    there = WrenchSet(here.points + step, here.cones, here.reference_point + step, here.weight, here.max_normal_force)
+    there = WrenchSet(
+        here.points + step,
+        here.cones,
+        here.reference_point + step,
+        here.weight,
+        here.max_normal_force,
+    )
     assert np.allclose(there.rays, here.rays)
     region, moved = here.support_region(), there.support_region()
     assert region.shape == moved.shape
-    assert all(np.min(np.linalg.norm(moved - step[:2] - corner, axis=1)) < 1e-7 for corner in region)
+    assert all(
+        np.min(np.linalg.norm(moved - step[:2] - corner, axis=1)) < 1e-7 for corner in region
+    )
 
 
 @settings(max_examples=12)
 @given(seeds)
 def test_turning_everything_turns_the_wrenches(seed: int) -> None:
-    """Facets may start elsewhere after the turn, but inner polyhedra stay within outer ones, nearly the same."""
+    """Facets may start elsewhere after the turn, but inner polyhedra stay within outer ones, nearly
+    the same.
+    """
     rng = np.random.default_rng(seed)
     R = judges.rotation(rng.normal(size=3))
     here = feet_on_slopes(seed, 3, 48)
@@ -438,18 +529,29 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
     for call, *named in (
         (lambda: wrench_set(state, fb.Contacts.none()),),
         (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope"),
-        (lambda: wrench_set(contacts, contacts), "state", "State", "Contacts"),  # type: ignore[arg-type]
-        (lambda: wrench_set(state, state), "contacts", "Contacts", "State"),  # type: ignore[arg-type]
+        (lambda: wrench_set(contacts, contacts), "state", "State", "Contacts"),
+        # type: ignore[arg-type]
+        (lambda: wrench_set(state, state), "contacts", "Contacts", "State"),
+        # type: ignore[arg-type]
         (lambda: wrench_set(state, contacts, facets=2), "facets", 2),
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
-        (lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix, "rows", "max_normal_force"),
+        (
+            lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix,
+            "rows",
+            "max_normal_force",
+        ),
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),
         (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
         (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
         (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
         (lambda: wrench_set(state, contacts).moment_vertices([1.0]), "force", 1, 3),
-        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "cones", "FrictionPolyhedron", 2),
+        (
+            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
+            "cones",
+            "FrictionPolyhedron",
+            2,
+        ),
     ):
         refused(call, InputError, *named)

@@ -1,4 +1,6 @@
-"""One colour, one meaning: what a lesson draws beside forces and cones is grey, and its words have the page's own colour."""
+"""One colour, one meaning: what a lesson draws beside forces and cones is grey, and its words have
+the page's own colour.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,17 @@ import floatbase as fb
 from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04
 from floatbase.lessons.publish import NOTEBOOKS, read_notebook
 from floatbase.viewer import Viewer
-from floatbase.viewer.scene.colours import ALARM, CALM, COM, CONE, GREYS, MEASURED, PLANNED, WARNING, hex_code
+from floatbase.viewer.scene.colours import (
+    ALARM,
+    CALM,
+    COM,
+    CONE,
+    GREYS,
+    MEASURED,
+    PLANNED,
+    WARNING,
+    hex_code,
+)
 
 LESSONS = Path(fb.__file__).parent / "lessons"
 TAKEN = {hex_code(colour) for colour in (MEASURED, PLANNED, COM, *CONE.values())}
@@ -30,16 +42,22 @@ def sources() -> Iterator[tuple[str, str]]:
     for path in sorted(LESSONS.rglob("*.py")):
         yield path.name, path.read_text(encoding="utf-8")
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
-        yield from ((path.name, cell.source) for cell in read_notebook(path).cells if cell.cell_type == "code")
+        yield from (
+            (path.name, cell.source)
+            for cell in read_notebook(path).cells
+            if cell.cell_type == "code"
+        )
 
 
 def test_lessons_take_their_colours_from_the_viewer_and_leave_those_of_cones_to_it() -> None:
     texts = list(sources())
     assert len(texts) > 100
     assert [(name, found) for name, text in texts for found in re.findall(CODE, text)] == []
-    of_cones = {name for name, value in vars(fb.viewer.colours).items() if value in (CALM, WARNING, ALARM, CONE)} | {
-        "CONE_ALPHA"
-    }
+    of_cones = {
+        name
+        for name, value in vars(fb.viewer.colours).items()
+        if value in (CALM, WARNING, ALARM, CONE)
+    } | {"CONE_ALPHA"}
     assert of_cones >= {"CALM", "WARNING", "ALARM", "CONE"}
     for name, text in texts:
         if name in ("figures.py", "props.py"):
@@ -58,20 +76,30 @@ def lines(figure: Figure) -> set[str]:
     "draw",
     [
         lambda: lesson02.draw_equation(lesson03.standing_go2_eom()),
-        lambda: lesson02.plot_foot_displacement({"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0).figure,
+        lambda: (
+            lesson02.plot_foot_displacement(
+                {"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0
+            ).figure
+        ),
         lambda: lesson03.matrix_picture(np.eye(4), {"rows": 4}, {"q̈": 1, "λ": 3}),
         lambda: lesson04.cost_slices(bowl=(BOWL, "x", "y", 2.0)),
         lambda: lesson04.effort_picture({name: ([0, 1], [0, 1]) for name in "abc"}),
     ],
     ids=["equation", "strayed", "matrix", "slices", "effort"],
 )
-def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(draw: Callable[[], Figure]) -> None:
+def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(
+    draw: Callable[[], Figure],
+) -> None:
     found = lines(draw())
     assert found and not found & TAKEN
 
 
-def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_colour_of_forces_or_cones() -> None:
-    base, qdd, tau, forces = lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)).split("<svg")[1:]
+def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_colour_of_forces_or_cones() -> (
+    None
+):
+    base, qdd, tau, forces = lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)).split(
+        "<svg"
+    )[1:]
     assert set(re.findall(CODE, forces)) == {hex_code(PLANNED)}
     assert set(re.findall(CODE, base)) == set(re.findall(CODE, qdd))
     assert len(set(re.findall(CODE, qdd))) == len(set(re.findall(CODE, tau))) == 1
@@ -79,7 +107,10 @@ def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_col
 
 
 def test_words_and_dots_of_svg_have_the_colour_of_the_page_so_that_a_dark_one_can_be_read() -> None:
-    for drawn in (lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)), lesson04.level_curves(BOWL, [1, 1], 2.0, "x", "y")):
+    for drawn in (
+        lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)),
+        lesson04.level_curves(BOWL, [1, 1], 2.0, "x", "y"),
+    ):
         assert 'fill="currentColor"' in drawn
         assert re.findall(r"<(?:text|circle)[^>]*\sfill=", drawn) == []
     assert not set(re.findall(CODE, drawn)) & TAKEN
@@ -93,9 +124,15 @@ def test_a_place_in_a_picture_has_the_colour_of_text_and_a_way_is_grey(backgroun
     view = Viewer(arm, background=background)
     try:
         lesson02.play_tool_comparison(view, limp, still)
-        made = {path: c for (path, kind, _), c in view.window.scene.commands().items() if kind == "set_object"}
+        made = {
+            path: c
+            for (path, kind, _), c in view.window.scene.commands().items()
+            if kind == "set_object"
+        }
     finally:
         view.close()
     for part, colour in (("home/pin", view.painter.text_colour), ("way", GREYS[2])):
-        (command,) = (command for path, command in made.items() if path.startswith(f"/meshcat/{part}"))
+        (command,) = (
+            command for path, command in made.items() if path.startswith(f"/meshcat/{part}")
+        )
         assert f"#{command['object']['materials'][0]['color']:06X}" == hex_code(colour)

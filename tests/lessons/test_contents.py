@@ -1,4 +1,6 @@
-"""What the map of equations and the page of conventions are made of; `.ci/lint.py` checks that they are up to date."""
+"""What the map of equations and the page of conventions are made of; `.ci/lint.py` checks that they
+are up to date.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ def entries() -> list[equations.Entry]:
     return equations.entries()
 
 
-def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(entries: list[equations.Entry]) -> None:
+def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(
+    entries: list[equations.Entry],
+) -> None:
     paths = [entry.path for entry in entries]
     assert len(set(paths)) == len(paths)
     for path in paths:
@@ -33,7 +37,9 @@ def test_a_test_counts_only_where_it_names_the_function(entries: list[equations.
     assert not any(test.startswith("qp/") for test in entry.tests)
 
 
-def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_every_tolerance() -> None:
+def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_every_tolerance() -> (
+    None
+):
     shown = {(file, name): value for file, name, value, _ in conventions.tolerances()}
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
     assert float(shown["dynamics/constraint_rank", "CONSTRAINT_NOISE"]) == CONSTRAINT_NOISE

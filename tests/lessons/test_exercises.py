@@ -55,7 +55,9 @@ def test_an_answer_beside_the_placeholder_is_a_try() -> None:
     assert progress.load() == {name: {"tries": 1, "right": 0} for name in all_exercises()}
 
 
-def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     solution = all_exercises()["02.1"].solution
     for _ in range(3):
         check("02.1", (3, 8))
@@ -97,7 +99,9 @@ def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
     assert not check("00.1", 3.0).right
     assert progress.load() == {}
     show_progress()
-    said = rf"\nTries and predictions cannot be kept in {tmp_path / 'file'}.*: .*\. Set FLOATBASE_HOME"
+    said = (
+        rf"\nTries and predictions cannot be kept in {tmp_path / 'file'}.*: .*\. Set FLOATBASE_HOME"
+    )
     assert re.search(said, capsys.readouterr().out)
 
 
@@ -112,15 +116,19 @@ def test_without_any_home_a_check_still_works(monkeypatch: pytest.MonkeyPatch) -
 
 
 DAMAGED = (
-    "null", "5", "[1]", '"a"', "", "\0", "[" * 100_000, '{"00.1": 5}', '{"00.1": {}}', '{"00.1": {"tries": 1}}',
-    '{"00.1": {"tries": "1", "right": null}}', '{"00.1": {"tries": 1, "right": 2}}', '{"00.1": {"tries": 1e400, "right": 0}}',
+    "null", "5", "[1]", '"a"', "", "\0", "[" * 100_000, '{"00.1": 5}', '{"00.1": {}}',
+    '{"00.1": {"tries": 1}}',
+    '{"00.1": {"tries": "1", "right": null}}', '{"00.1": {"tries": 1, "right": 2}}',
+    '{"00.1": {"tries": 1e400, "right": 0}}',
     '{"00.1": {"tries": 3, "rig',
 )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["progress.json", "progress.jsonl"])
 @pytest.mark.parametrize("text", DAMAGED)
-def test_damage_is_left_out_and_left_as_it_is(tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damage_is_left_out_and_left_as_it_is(
+    tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / name).write_text(text)
     check("00.1", 3.0)
     check("00.1", LIFTED)
@@ -151,9 +159,13 @@ def record_often(name: str) -> None:
 
 
 @pytest.mark.parametrize("worker", [threading.Thread, multiprocessing.get_context("fork").Process])
-def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(tmp_path: Path, worker: Any) -> None:
+def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(
+    tmp_path: Path, worker: Any
+) -> None:
     older = {f"old.{i}": {"tries": 2, "right": 1} for i in range(50)}
-    (tmp_path / "progress.json").write_text(json.dumps(older, indent=1))  # as floatbase 0.2.0 wrote it
+    (tmp_path / "progress.json").write_text(
+        json.dumps(older, indent=1)
+    )  # as floatbase 0.2.0 wrote it
     names = ["00.1", "00.1", "01.1"]
     workers = [worker(target=record_often, args=(name,)) for name in names]
     for one in workers:

@@ -1,4 +1,6 @@
-"""Exercises: right answers are right in each of their forms, and a wrong one gets the hint that its mistake is named by."""
+"""Exercises: right answers are right in each of their forms, and a wrong one gets the hint that its
+mistake is named by.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,20 @@ from floatbase.lessons import NumericJudge, all_exercises
 
 EXERCISES = all_exercises()
 LESSONS = sorted({name.split(".")[0] for name in EXERCISES})
-NAMED = {"Verdict": 2, "_Way": 0, "_Drop": 0}  # what gives a hint its name -> which argument that is
-GENERAL = {"no_answer", "not_numbers", "not_finite", "no_cost", "no_least_point"}  # tried below, on all exercises
-# lesson -> hints that no answer is known to get, or not on every machine: what comes that far has passed other conditions
+NAMED = {
+    "Verdict": 2,
+    "_Way": 0,
+    "_Drop": 0,
+}  # what gives a hint its name -> which argument that is
+GENERAL = {
+    "no_answer",
+    "not_numbers",
+    "not_finite",
+    "no_cost",
+    "no_least_point",
+}  # tried below, on all exercises
+# lesson -> hints that no answer is known to get, or not on every machine: what comes that far has
+# passed other conditions
 GUARDS = {
     "03": {"pulls"}, "05": {"slips"}, "07": {"input_error"}, "08": {"input_error"},
     "09": {"input_error", "falls", "in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
@@ -42,13 +55,22 @@ def names_in(lesson: str) -> set[str]:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in NAMED
     ]
     given = [call.args[NAMED[ast.unparse(call.func)] :][:1] for call in calls]
-    return {str(constant.value) for found in given for constant in found if isinstance(constant, ast.Constant)}
+    return {
+        str(constant.value)
+        for found in given
+        for constant in found
+        if isinstance(constant, ast.Constant)
+    }
 
 
 @pytest.mark.parametrize("name", EXERCISES)
 def test_right_answers_are_right_and_each_mistake_gets_its_hint(name: str) -> None:
     told = [(hint, EXERCISES[name].judge(answer)) for answer, hint in examples(name)]
-    assert [(hint, verdict) for hint, verdict in told if (verdict.right, verdict.hint) != (not hint, hint)] == []
+    assert [
+        (hint, verdict)
+        for hint, verdict in told
+        if (verdict.right, verdict.hint) != (not hint, hint)
+    ] == []
     assert all(verdict.text for _, verdict in told)
     judge = getattr(EXERCISES[name].judge, "judge", EXERCISES[name].judge)
     assert {"", *getattr(judge, "hints", ())} <= {hint for hint, _ in told}
@@ -56,7 +78,9 @@ def test_right_answers_are_right_and_each_mistake_gets_its_hint(name: str) -> No
 
 @pytest.mark.parametrize("lesson", LESSONS)
 def test_every_hint_of_a_lesson_has_an_example(lesson: str) -> None:
-    tried = {hint for name in EXERCISES if name.startswith(f"{lesson}.") for _, hint in examples(name)}
+    tried = {
+        hint for name in EXERCISES if name.startswith(f"{lesson}.") for _, hint in examples(name)
+    }
     assert names_in(lesson) - GENERAL - tried == GUARDS.get(lesson, set())
 
 
@@ -65,23 +89,33 @@ def test_nothing_that_a_learner_may_give_makes_a_check_fail(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         told = {kind: EXERCISES[name].judge(odd) for kind, odd in ODD.items()}
-    assert [kind for kind, verdict in told.items() if verdict.right or not verdict.text or not verdict.hint] == []
+    assert [
+        kind
+        for kind, verdict in told.items()
+        if verdict.right or not verdict.text or not verdict.hint
+    ] == []
     assert told["nothing"].hint == told["Ellipsis"].hint == "no_answer"
 
 
 @pytest.mark.parametrize(
     ("answer", "hint"),
     [
-        ([[1.0, 2.0], [3.0, 4.0]], ""), ([[1.0, 2.0], [3.0, 4.05]], "nearly"), ([[-1, -2], [-3, -4]], "sign"),
-        ([[1, 3], [2, 4]], "transpose"), (np.ones((2, 2)), "unknown"), ([1.0, 2.0, 3.0, 4.0], "shape"), (1.0, "shape"),
+        ([[1.0, 2.0], [3.0, 4.0]], ""), ([[1.0, 2.0], [3.0, 4.05]], "nearly"),
+        ([[-1, -2], [-3, -4]], "sign"),
+        ([[1, 3], [2, 4]], "transpose"), (np.ones((2, 2)), "unknown"),
+        ([1.0, 2.0, 3.0, 4.0], "shape"), (1.0, "shape"),
         (np.full((2, 2), np.nan), "not_finite"), ("heavy", "not_numbers"), (..., "no_answer"),
     ],
 )  # fmt: skip
-def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(answer: Any, hint: str) -> None:
+def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(
+    answer: Any, hint: str
+) -> None:
     assert NumericJudge(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
 
 
-@pytest.mark.parametrize(("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))])
+@pytest.mark.parametrize(
+    ("name", "count"), [("03.1", 8), ("03.1", 7), ("04.2", -6), ("02.1", (8, 13))]
+)
 def test_a_wrong_count_is_told_to_say_what_it_counts(name: str, count: Any) -> None:
     assert EXERCISES[name].judge(count).hint == "unknown_count"
 

@@ -44,7 +44,9 @@ def test_a_servo_turns_joints_without_limits_back_too() -> None:
 
 
 @pytest.mark.parametrize("thrust", [30.0, -30.0])
-def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(go2: Robot, thrust: float) -> None:
+def test_thrusters_are_drawn_below_the_feet_where_no_leg_hides_them(
+    go2: Robot, thrust: float
+) -> None:
     view, contacts = fb.Viewer(go2, scale=0.003), fb.Contacts.points(go2)
     try:
         sliders = lesson01.thruster_panel(view, go2.standing(), contacts).sliders
@@ -66,7 +68,10 @@ def pressing(arm: Robot) -> Robot:
 
 def outcome(pressing: Robot, width: float, press: float) -> str:
     """How two seconds of pressing end on a plate of that width, m, on the physics engine."""
-    corners = [[x * width / 2, y * width / 2, -PLATE_SIZE[1]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    corners = [
+        [x * width / 2, y * width / 2, -PLATE_SIZE[1]]
+        for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    ]
     robot = replace(pressing, feet=(Foot(pressing.base, corners=np.array(corners)),))
     state, force = robot.standing(), np.array([-press, 0.0, 0.0])
     hold = (state.h - state.frame_jacobian("tool0")[:3].T @ force)[6:]
@@ -85,7 +90,9 @@ def test_the_centre_of_mass_leaves_every_point_of_the_base(go2: Robot) -> None:
             seen.append((view.renderer.picture, panel.note.value))
         (back, note), (forth, other_note) = seen
         np.testing.assert_array_equal(back["axes/axes"].matrix, forth["axes/axes"].matrix)
-        assert (forth["com/ball"].matrix - back["com/ball"].matrix)[0, 3] > 0.02 and note != other_note
+        assert (forth["com/ball"].matrix - back["com/ball"].matrix)[
+            0, 3
+        ] > 0.02 and note != other_note
         assert "ground" not in back
     finally:
         view.close()

@@ -23,12 +23,16 @@ def test_the_worst_foot_is_how_far_a_stance_strayed(go2: Robot) -> None:
     lifted = state.replace(q=state.integrate(0.03 * np.eye(18)[2]))
     bent = state.replace(q=state.integrate(0.1 * np.eye(18)[8]))  # the first foot's knee
     far = np.linalg.norm(contacts.positions(bent)[0] - contacts.positions(state)[0])
-    assert np.allclose(lesson02.foot_displacement([state, lifted, bent], contacts), [0.0, 0.03, far])
+    assert np.allclose(
+        lesson02.foot_displacement([state, lifted, bent], contacts), [0.0, 0.03, far]
+    )
 
 
 def test_constant_torques_record_what_the_equation_says(go2: Robot) -> None:
     contacts = fb.Contacts.points(go2)
-    record = lesson02.run_constant_torques(go2, contacts, np.zeros(12), judges.constrained, duration=0.01)
+    record = lesson02.run_constant_torques(
+        go2, contacts, np.zeros(12), judges.constrained, duration=0.01
+    )
     eom = fb.equations_of_motion(record.state(3), contacts)
     assert np.allclose(record.planned[3], judges.constrained(eom, np.zeros(12), eom.b)[1])
     assert not record.tau.any()
@@ -38,16 +42,29 @@ def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
     state, contacts = go2.standing(), fb.Contacts.points(go2)
     figure = lesson02.draw_equation(fb.equations_of_motion(state, contacts))
     assert [axis.get_title() for axis in figure.axes] == ["M q̈", "+ h", "= S τ", "+ Jᵀ λ"]
-    assert [label.get_text() for label in figure.axes[3].get_xticklabels()] == ["FL", "FR", "RL", "RR"]
-    states = [state.replace(q=state.integrate(height * np.eye(18)[2])) for height in (0.0, 0.01, 0.02)]
+    assert [label.get_text() for label in figure.axes[3].get_xticklabels()] == [
+        "FL",
+        "FR",
+        "RL",
+        "RR",
+    ]
+    states = [
+        state.replace(q=state.integrate(height * np.eye(18)[2])) for height in (0.0, 0.01, 0.02)
+    ]
     view = fb.Viewer(go2)
     try:
-        drawn = str(lesson02.play_collapse_comparison(view, states, states, contacts, 0.02).window.scene.file_commands())
+        drawn = str(
+            lesson02.play_collapse_comparison(
+                view, states, states, contacts, 0.02
+            ).window.scene.file_commands()
+        )
         assert "with b" in drawn
         assert "way" in drawn
     finally:
         view.close()
-    axis = lesson02.plot_foot_displacement({"a": lesson02.foot_displacement(states, contacts)}, 0.02)
+    axis = lesson02.plot_foot_displacement(
+        {"a": lesson02.foot_displacement(states, contacts)}, 0.02
+    )
     assert axis.get_yscale() == "log"
 
 

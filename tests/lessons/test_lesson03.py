@@ -20,7 +20,9 @@ from floatbase.lessons.lesson03 import (
 )
 
 GO2 = fb.load("go2")
-RANK_TOLERANCE = 1e-9  # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
+RANK_TOLERANCE = (
+    1e-9  # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
+)
 
 
 def test_the_solo8_of_03_4_moves_without_asking_its_feet_for_the_impossible() -> None:
@@ -33,7 +35,9 @@ def test_the_solo8_of_03_4_moves_without_asking_its_feet_for_the_impossible() ->
 
 
 @pytest.mark.parametrize("frames", [(), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)], ids=len)
-def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forces(frames: tuple[str, ...]) -> None:
+def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forces(
+    frames: tuple[str, ...],
+) -> None:
     space = standing_space(GO2, *frames)
     desired = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
     step = beta_direction(space, base=desired)
@@ -46,26 +50,45 @@ def test_a_direction_gives_the_base_what_was_requested_with_least_change_of_forc
 def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> None:
     solo12 = fb.load("solo12")
     state = upright_solo12(solo12, bend)
-    assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [0.0] * 4
+    assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [
+        0.0
+    ] * 4
     straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
     assert straight.rank_J == (11 if bend == 0 else 12)
 
 
 def test_every_bar_says_its_name_its_number_and_its_unit() -> None:
     numbers = np.arange(42.0) - 3
-    said = re.findall(r"<title>(.*?): (.*?) (.*?)</title>", motion_bars(numbers[:18], numbers[18:30], numbers[30:]))
+    said = re.findall(
+        r"<title>(.*?): (.*?) (.*?)</title>",
+        motion_bars(numbers[:18], numbers[18:30], numbers[30:]),
+    )
     assert [float(number) for _, number, _ in said] == list(numbers)
     assert said[0] == ("q̈ base x", "-3", "m/s²") and said[3] == ("q̈ turning x", "0", "rad/s²")
-    assert said[6] == ("q̈ front left hip", "3", "rad/s²") and said[20] == ("τ front left knee", "17", "N·m")
+    assert said[6] == ("q̈ front left hip", "3", "rad/s²") and said[20] == (
+        "τ front left knee",
+        "17",
+        "N·m",
+    )
     assert said[-1] == ("λ rear right z", "38", "N")
-    assert re.findall("<title>(.*?)</title>", motion_bars(np.full(18, -1e-12), np.zeros(12), np.zeros(12)))[0] == "q̈ base x: 0 m/s²"
+    assert (
+        re.findall(
+            "<title>(.*?)</title>", motion_bars(np.full(18, -1e-12), np.zeros(12), np.zeros(12))
+        )[0]
+        == "q̈ base x: 0 m/s²"
+    )
 
 
 def test_bars_are_as_long_as_their_numbers_and_those_that_are_longer_have_an_end() -> None:
     def heights(drawn: str) -> list[float]:
         return [float(height) for height in re.findall(r'height="([\d.]+)" fill="#', drawn)]
 
-    drawn = motion_bars(np.zeros(18), np.array([10.0, -5.0, 20.0] * 4), np.array([0.0, 50.0, 300.0] * 4), full=(20.0, 20.0, 100.0))
+    drawn = motion_bars(
+        np.zeros(18),
+        np.array([10.0, -5.0, 20.0] * 4),
+        np.array([0.0, 50.0, 300.0] * 4),
+        full=(20.0, 20.0, 100.0),
+    )
     full = heights(drawn)[20]
     assert heights(drawn) == [0.0] * 18 + [full / 2, full / 4, full] * 4 + [0.0, full / 2, full] * 4
     assert drawn.count('height="3"') == 4  # 20 of 20 fits, 300 of 100 does not

@@ -26,15 +26,23 @@ EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
 
 
 def com_cost(eom: Any, desired: Any = DESIRED_ACCELERATION) -> fb.Quadratic:
-    return fb.Quadratic.from_residual(eom.state.com_jacobian, np.asarray(desired) - eom.state.com_drift)
+    return fb.Quadratic.from_residual(
+        eom.state.com_jacobian, np.asarray(desired) - eom.state.com_drift
+    )
 
 
 def turn_cost(eom: Any) -> fb.Quadratic:
-    return fb.Quadratic.from_residual(eom.state.frame_jacobian("base")[3:], -eom.state.frame_drift("base")[3:])
+    return fb.Quadratic.from_residual(
+        eom.state.frame_jacobian("base")[3:], -eom.state.frame_drift("base")[3:]
+    )
 
 
-@pytest.mark.parametrize("feet", [("FL_foot", "FR_foot", "RL_foot"), ("FL_foot", "FR_foot", "RL_foot", "RR_foot")])
-def test_04_2_counts_the_flat_directions_that_accelerate_the_free_foot(feet: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "feet", [("FL_foot", "FR_foot", "RL_foot"), ("FL_foot", "FR_foot", "RL_foot", "RR_foot")]
+)
+def test_04_2_counts_the_flat_directions_that_accelerate_the_free_foot(
+    feet: tuple[str, ...],
+) -> None:
     space = standing_space(GO2, *feet)
     eom = space.eom
     flat = null_space((com_cost(eom) + turn_cost(eom)).pullback(space.qdd).H)
@@ -47,9 +55,13 @@ def test_the_engine_measures_what_is_desired(desired: list[float]) -> None:
     contacts = fb.Contacts.points(GO2)
 
     def cost(eom: Any) -> fb.Quadratic:
-        return (com_cost(eom, desired) + turn_cost(eom)).pullback(fb.accelerations_from_torques(eom)) + 1e-4 * EFFORT
+        return (com_cost(eom, desired) + turn_cost(eom)).pullback(
+            fb.accelerations_from_torques(eom)
+        ) + 1e-4 * EFFORT
 
-    record = fb.rollout(fb.Simulation(GO2), MinimumCostController(GO2, contacts, cost), 0.1, control_period=0.005)
+    record = fb.rollout(
+        fb.Simulation(GO2), MinimumCostController(GO2, contacts, cost), 0.1, control_period=0.005
+    )
     np.testing.assert_allclose(measured_acceleration(record), desired, atol=0.01)
 
 
@@ -66,15 +78,22 @@ def test_the_pictures_are_drawn() -> None:
     bowl = fb.Quadratic.from_residual([[2.0, 0.0], [0.0, 1.0]], [2.0, 1.0])
     valley = fb.Quadratic.from_residual([[1.0, 1.0]], [1.0])
     assert len(cost_slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes) == 2
-    dots = [len(axis.lines) for axis in cost_slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes]
+    dots = [
+        len(axis.lines)
+        for axis in cost_slices(one=(bowl, "x", "y", 2.0), two=(valley, "x", "y", 2.0)).axes
+    ]
     assert dots == [1, 0]  # a valley has no least point
     drawn = level_curves(bowl, [1.0, 1.0], 2.0, "x", "y")
-    assert "translate(195.0 65.0)" in drawn and 'cx="195.0" cy="65.0"' in drawn  # both at (1, 1): right of and above the middle
+    assert (
+        "translate(195.0 65.0)" in drawn and 'cx="195.0" cy="65.0"' in drawn
+    )  # both at (1, 1): right of and above the middle
     assert "nan" not in level_curves(valley, [0.0, 0.0], 2.0, "x", "y")
     assert len(effort_picture({"a": ([0, 1], [0, 1])}).axes) == 1
     space = standing_space(GO2)
     view = fb.Viewer(GO2)
     try:
-        np.testing.assert_allclose(show_torques(view, space.eom, space(standing_still_beta(space))[1]), 0.0, atol=1e-9)
+        np.testing.assert_allclose(
+            show_torques(view, space.eom, space(standing_still_beta(space))[1]), 0.0, atol=1e-9
+        )
     finally:
         view.close()

@@ -38,7 +38,9 @@ def leaning(weight: float = 1e-3, direction: Any = FORCE) -> fb.Quadratic:
 
 
 def test_05_4_is_out_of_reach_of_weights() -> None:
-    """No α and no weight of (23) keeps both the wish and the lean, whatever the normal force it prefers."""
+    """No α and no weight of (23) keeps both the wish and the lean, whatever the normal force it
+    prefers.
+    """
     tangential = tangential_bias(EOM.contacts)
     for a in (0.0, 20.0, GO2.weight / 4, 60.0):
         normal = normal_bias(EOM.contacts, a)
@@ -52,11 +54,15 @@ def test_a_lean_is_friction_over_normal_force(normal: list[float]) -> None:
     contacts = fb.Contacts.points(GO2, normals=normal)
     n, t = np.array(normal), np.array([0.0, 1.0, 0.0])
     forces = [10 * n + 5 * t, 10 * n, -10 * n + t, t]
-    np.testing.assert_allclose(friction_ratios(contacts, np.ravel(forces)), [0.5, 0.0, np.inf, np.inf], atol=ROUNDING)
+    np.testing.assert_allclose(
+        friction_ratios(contacts, np.ravel(forces)), [0.5, 0.0, np.inf, np.inf], atol=ROUNDING
+    )
 
 
 def test_the_arm_takes_the_centre_of_mass_along() -> None:
-    ahead, left, right_hand = (com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2))
+    ahead, left, right_hand = (
+        com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2)
+    )
     assert left[1] > 0.04 > 0.005 > abs(ahead[1]) and right_hand[1] < -0.04
     assert ahead[0] > left[0] + 0.04
     state = stretched_arm_state(1.0).replace(v=None)
@@ -67,8 +73,12 @@ def test_the_arm_takes_the_centre_of_mass_along() -> None:
 
 def test_given_forces_are_measured_on_the_physics() -> None:
     forces = leaning().minimiser()
-    record = fb.rollout(fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1)
-    np.testing.assert_allclose(record.measured[-1], forces, atol=1.0)  # N: the robot has moved by 2 cm
+    record = fb.rollout(
+        fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1
+    )
+    np.testing.assert_allclose(
+        record.measured[-1], forces, atol=1.0
+    )  # N: the robot has moved by 2 cm
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)
 
@@ -80,12 +90,19 @@ def test_the_pictures_are_drawn() -> None:
         note = show_forces(view, EOM.state, EOM.contacts, forces, wish=[60, 0, 0])
         assert "(60, 0, 0) N" in note and "(0, 0, 0) N·m" in note
         assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.renderer.picture}
-        assert "(60" in show_forces(view, EOM.state, EOM.contacts, forces) and "wish" not in view.renderer.picture
+        assert (
+            "(60" in show_forces(view, EOM.state, EOM.contacts, forces)
+            and "wish" not in view.renderer.picture
+        )
     finally:
         view.close()
     arm_view = fb.Viewer(stretched_arm_state(0.0).robot)
     try:
-        drawn = show_moved_com(arm_view, stretched_arm_state(1.0), stretched_arm_state(0.0), "before").renderer.picture
-        np.testing.assert_allclose(drawn["earlier/spot"].matrix[:2, 3], stretched_arm_state(0.0).com[:2], atol=ROUNDING)
+        drawn = show_moved_com(
+            arm_view, stretched_arm_state(1.0), stretched_arm_state(0.0), "before"
+        ).renderer.picture
+        np.testing.assert_allclose(
+            drawn["earlier/spot"].matrix[:2, 3], stretched_arm_state(0.0).com[:2], atol=ROUNDING
+        )
     finally:
         arm_view.close()

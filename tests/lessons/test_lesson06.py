@@ -39,18 +39,30 @@ def test_the_smallest_cost_within_rows_is_found() -> None:
     rows = FrictionPolyhedron(UP, 0.5, 4).face_matrix
     found = constrained_minimiser(cost, rows)
     assert np.allclose(found, FrictionPolyhedron(UP, 0.5, 4).project([3.0, 0.0, 1.0]), atol=SOLVED)
-    assert np.allclose(constrained_minimiser(cost, FrictionPolyhedron(UP, 5.0, 4).face_matrix), [3.0, 0.0, 1.0], atol=SOLVED)
+    assert np.allclose(
+        constrained_minimiser(cost, FrictionPolyhedron(UP, 5.0, 4).face_matrix),
+        [3.0, 0.0, 1.0],
+        atol=SOLVED,
+    )
 
 
 def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed() -> None:
     controller = make_controller()
     assert isinstance(controller, ConeController)
     still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
-    assert still.outcome == "completed" and np.allclose(still.planned[-1], still.measured[-1], atol=1.0)
+    assert still.outcome == "completed" and np.allclose(
+        still.planned[-1], still.measured[-1], atol=1.0
+    )
     push = fb.Push(np.array([0.0, 90.0, 0.0]), start=0.0, duration=0.1)
     pushed = fb.rollout(fb.Simulation(controller.robot), controller, 0.3, [push])
-    cones = [FrictionPolyhedron(n, mu, 4) for n, mu in zip(controller.contacts.normals, controller.contacts.mus, strict=True)]
-    margins = [[c.margin(f) for c, f in zip(cones, row.reshape(4, 3), strict=True)] for row in pushed.planned]
+    cones = [
+        FrictionPolyhedron(n, mu, 4)
+        for n, mu in zip(controller.contacts.normals, controller.contacts.mus, strict=True)
+    ]
+    margins = [
+        [c.margin(f) for c, f in zip(cones, row.reshape(4, 3), strict=True)]
+        for row in pushed.planned
+    ]
     assert np.min(margins) > -SOLVED  # always inside
     assert np.min(margins) < SOLVED  # and at some time at a limit
     assert pushed.outcome == "completed"
@@ -58,13 +70,22 @@ def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed
 
 def test_dearer_moments_are_missed_by_less() -> None:
     state = make_controller().state
-    aside = state.replace(v=np.eye(18)[1] * 1.5)  # 1.5 m/s to the left: more than the cones can stop at once
+    aside = state.replace(
+        v=np.eye(18)[1] * 1.5
+    )  # 1.5 m/s to the left: more than the cones can stop at once
     gaps = []
     for weight in (1.0, 100.0):
-        controller = ConeController(state.robot, make_controller().contacts, state, moment_weight=weight)
+        controller = ConeController(
+            state.robot, make_controller().contacts, state, moment_weight=weight
+        )
         forces = controller(aside.q, aside.v).forces
         assert forces is not None
-        gaps.append(abs(com_wrench_map(aside, controller.contacts).A @ forces - np.concatenate(controller.wrench_goal(aside))))
+        gaps.append(
+            abs(
+                com_wrench_map(aside, controller.contacts).A @ forces
+                - np.concatenate(controller.wrench_goal(aside))
+            )
+        )
     (force, moment), (force_then, moment_then) = ((each[:3].max(), each[3:].max()) for each in gaps)
     assert moment_then < 0.5 * moment and force_then > force > 1.0
 
@@ -84,7 +105,10 @@ def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> Non
 def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
     robot = judges.load("go2")
     home = robot.standing()
-    places = {foot.frame: np.array(home.frame_pose(foot.frame).translation) + [0.02, 0.01, 0.03] for foot in robot.feet}
+    places = {
+        foot.frame: np.array(home.frame_pose(foot.frame).translation) + [0.02, 0.01, 0.03]
+        for foot in robot.feet
+    }
     reached = state_with_feet_at(robot, home.q[:3], places)
     for name, place in places.items():
         assert np.allclose(reached.frame_pose(name).translation, place, atol=LENGTHS)
@@ -98,7 +122,10 @@ def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:
     assert np.allclose(friction_ratios([0, 0, 50.0], slope_normal(20)), np.tan(np.deg2rad(20)))
 
 
-@pytest.mark.parametrize(("force", "status"), [((20, 0, 40), "inside"), ((28, 0, 40), "active"), ((0, 30, 40), "outside")])
+@pytest.mark.parametrize(
+    ("force", "status"),
+    [((20, 0, 40), "inside"), ((28, 0, 40), "active"), ((0, 30, 40), "outside")],
+)
 def test_a_single_cone_has_the_colour_of_its_force(force: tuple[float, ...], status: str) -> None:
     view = fb.Viewer(judges.load("go2"))
     try:
@@ -123,7 +150,9 @@ def test_the_pictures_are_drawn() -> None:
     view = fb.Viewer(robot)
     try:
         assert "4 facets" in (drawn := show_polyhedron(view, 0.7, 4))
-        assert "inside 64 %" in drawn and "outside 127 %" in drawn and "weakest 0.49 inside" in drawn
+        assert (
+            "inside 64 %" in drawn and "outside 127 %" in drawn and "weakest 0.49 inside" in drawn
+        )
         assert "front 0.84" in show_slope(view, 22.0, 0.0)
         level = show_slope(view, 0.0, 0.0)
         assert all(float(x) < 0.1 for x in re.findall(r"(?:front|rear) (\d\.\d+)", level))
@@ -132,7 +161,10 @@ def test_the_pictures_are_drawn() -> None:
     finally:
         view.close()
     state, contacts = robot.standing(), fb.Contacts.points(robot)
-    figure = compass_row(one=wrench_set(state, contacts), two_turned=wrench_set(state, contacts, facet_rotation=np.pi / 4))
+    figure = compass_row(
+        one=wrench_set(state, contacts),
+        two_turned=wrench_set(state, contacts, facet_rotation=np.pi / 4),
+    )
     assert [axis.get_title() for axis in figure.axes] == ["one", "two turned"]
     feet = contacts.positions(state)
     assert region_picture(state, feet, feet[[0, 1, 3, 2], :2]).count("<polygon") == 2
@@ -144,7 +176,10 @@ def test_drawings_from_above_have_greys_and_the_colour_of_text() -> None:
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     view = fb.Viewer(robot)
     try:
-        drawn = [show_polyhedron(view, 0.7, 4), region_picture(state, contacts.positions(state), np.zeros((0, 2)))]
+        drawn = [
+            show_polyhedron(view, 0.7, 4),
+            region_picture(state, contacts.positions(state), np.zeros((0, 2))),
+        ]
     finally:
         view.close()
     for svg in drawn:

@@ -34,7 +34,7 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
 
 
-# helpers --------------------------------------------------------------------------------------------------------------------
+# helpers ------------------------------------------------------------------------------------------
 
 
 def test_a_moved_body_keeps_its_feet() -> None:
@@ -64,7 +64,13 @@ def test_a_record_tells_its_speed_tilt_margin_and_jumps() -> None:
     assert np.isclose(mean_velocity(crawls, 2.2)[0], 0.12, atol=0.01)  # of one period
     assert 1e3 * (crawls.com[-1, 0] - crawls.com[0, 0]) > 600.0
     assert 1e3 * smallest_support_margin(crawls) > 32.0 and crawls.measured[:, 2::3].max() < 80.0
-    steep = Walk(robot, fb.Contacts.points(robot), Gait.crawl(robot, 0.3, 0.25, start=0.5), (0.12, 0.0), ramp=0.0)
+    steep = Walk(
+        robot,
+        fb.Contacts.points(robot),
+        Gait.crawl(robot, 0.3, 0.25, start=0.5),
+        (0.12, 0.0),
+        ramp=0.0,
+    )
     assert torque_jump(run_go2(steep, 2.0)) > 2 * torque_jump(crawls)
 
 
@@ -76,7 +82,7 @@ def test_a_push_of_a_run_acts_when_it_is_asked_to() -> None:
     assert np.isclose(pushed.time[1], 2e-3) and pushed.robot == robot
 
 
-# pictures -------------------------------------------------------------------------------------------------------------------
+# pictures -----------------------------------------------------------------------------------------
 
 
 def test_plots_have_greys_and_the_colours_of_forces_alone() -> None:
@@ -108,7 +114,9 @@ def test_footholds_lie_on_the_ground_and_others_have_a_label() -> None:
 def together() -> Iterator[PushComparison]:
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot)
-    made = PushComparison({"stands": Stand(robot, contacts), "steps": Stand(robot, contacts, Gait.trot(robot))})
+    made = PushComparison(
+        {"stands": Stand(robot, contacts), "steps": Stand(robot, contacts, Gait.trot(robot))}
+    )
     yield made
     made.close()
 

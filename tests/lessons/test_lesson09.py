@@ -64,7 +64,7 @@ def view() -> Iterator[fb.Viewer]:
     made.close()
 
 
-# exercises ------------------------------------------------------------------------------------------------------------------
+# exercises ----------------------------------------------------------------------------------------
 
 
 def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,11 +72,13 @@ def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go(monkeypatch: pytest.Monk
     assert judge([1.5, 0.0]).hint in ("falls", "in_the_air")
     record = run_lean(1.5, 0.01)
     jump = replace(record, measured=0.0 * record.measured)
-    monkeypatch.setattr("floatbase.lessons.lesson09.exercises.run_lean", lambda seconds, posture: jump)
+    monkeypatch.setattr(
+        "floatbase.lessons.lesson09.exercises.run_lean", lambda seconds, posture: jump
+    )
     assert judge([1.5, 0.01]).hint == "in_the_air"
 
 
-# helpers --------------------------------------------------------------------------------------------------------------------
+# helpers ------------------------------------------------------------------------------------------
 
 
 def test_talos_stands_and_the_pressure_of_a_record_is_the_centre_of_pressure() -> None:
@@ -90,21 +92,29 @@ def test_talos_stands_and_the_pressure_of_a_record_is_the_centre_of_pressure() -
 def test_how_a_record_ended_in_words() -> None:
     record = stood()
     assert outcome_text(record) == "stands"
-    ways = {"falls forwards": [0.2, 0.1, 0], "falls backwards": [-0.2, 0.1, 0], "falls aside": [0.1, -0.2, 0]}
+    ways = {
+        "falls forwards": [0.2, 0.1, 0],
+        "falls backwards": [-0.2, 0.1, 0],
+        "falls aside": [0.1, -0.2, 0],
+    }
     for words, way in ways.items():
         q = np.array(record.q)
         q[-1, :3] += way
         assert outcome_text(replace(record, outcome="fell", q=q)) == words
 
 
-def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> None:
+def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> (
+    None
+):
     possible = np.array([20.0, -30.0, 443.0, 5.0, -12.0, 6.0])
     forces = corner_forces(STATE, LEFT, possible)
     assert np.max(limits().face_matrix @ possible) < 0.0
     assert np.allclose(contact_wrench(STATE, LEFT, forces, MIDDLE), possible, atol=SOLVED)
     beyond = np.array([0.0, 0.0, 443.0, 0.0, -60.0, 0.0])  # beyond the toes
     nearest = contact_wrench(STATE, LEFT, corner_forces(STATE, LEFT, beyond), MIDDLE)
-    assert np.max(limits().face_matrix @ nearest) < SOLVED and not np.allclose(nearest, beyond, atol=1.0)
+    assert np.max(limits().face_matrix @ nearest) < SOLVED and not np.allclose(
+        nearest, beyond, atol=1.0
+    )
 
 
 def test_rows_of_a_sole_have_names() -> None:
@@ -113,29 +123,42 @@ def test_rows_of_a_sole_have_names() -> None:
 
 
 def test_a_lean_goes_where_it_should_at_its_time() -> None:
-    path = next(task for task in leaning_controller(6.0, 1.0, 0.01).tasks if isinstance(task, fb.CoMTask)).position
+    path = next(
+        task for task in leaning_controller(6.0, 1.0, 0.01).tasks if isinstance(task, fb.CoMTask)
+    ).position
     assert isinstance(path, Swing)
-    assert np.allclose(path(0.1)[0], STATE.com) and np.allclose(path(1.3)[0], STATE.com + [0.06, 0.0, 0.0])
+    assert np.allclose(path(0.1)[0], STATE.com) and np.allclose(
+        path(1.3)[0], STATE.com + [0.06, 0.0, 0.0]
+    )
     record = run_lean(1.5, 0.01)
     assert np.isclose(record.final.com[0] - STATE.com[0], 0.06, atol=2e-3)
 
 
 def test_the_roses_are_of_talos_with_and_without_steps() -> None:
-    assert make_controller().stepping_gait is not None and make_standing_controller().stepping_gait is None
+    assert (
+        make_controller().stepping_gait is not None
+        and make_standing_controller().stepping_gait is None
+    )
     assert make_controller().robot is make_standing_controller().robot is TALOS
 
 
-# pictures -------------------------------------------------------------------------------------------------------------------
+# pictures -----------------------------------------------------------------------------------------
 
 
 def test_soles_are_drawn_with_their_forces_and_crosses(view: fb.Viewer) -> None:
     forces = np.tile([0.0, 0.0, TALOS.weight / 8], 8)
     drawn = show_soles(view, STATE, SOLES, forces)
-    assert drawn.count("<polygon") == 2 and drawn.count("<circle") == 8 + 1 and drawn.count("<path") == 3
+    assert (
+        drawn.count("<polygon") == 2
+        and drawn.count("<circle") == 8 + 1
+        and drawn.count("<path") == 3
+    )
     assert sum(path.startswith("planned/") for path in view.renderer.picture) == 8
     right_foot_up = np.concatenate([forces[:12], np.zeros(12)])
     assert soles_picture(STATE, SOLES, right_foot_up).count("<path") == 2
-    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(colour) for colour in (*GREYS, PLANNED)}
+    assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {
+        hex_code(colour) for colour in (*GREYS, PLANNED)
+    }
 
 
 def test_one_sole_says_which_rows_are_broken(view: fb.Viewer) -> None:
@@ -177,7 +200,13 @@ def test_a_walk_and_a_lean_are_plotted_in_greys() -> None:
     for i, corners in alone.items():
         (foot,) = record.contacts_at(i).names
         assert np.allclose(corners.mean(axis=0), record.state(i).point(foot)[:2], atol=1e-6)
-    for axis, patches in ((plot_walk(record, walk.history), 1), (plot_lean(run_lean(1.5, 0.01)), 0)):
+    for axis, patches in (
+        (plot_walk(record, walk.history), 1),
+        (plot_lean(run_lean(1.5, 0.01)), 0),
+    ):
         colours = {to_hex(line.get_color()).upper() for line in axis.get_lines()}
-        assert colours == {hex_code(GREYS[0]), hex_code(GREYS[1])} and hex_code(MEASURED) not in colours
+        assert (
+            colours == {hex_code(GREYS[0]), hex_code(GREYS[1])}
+            and hex_code(MEASURED) not in colours
+        )
         assert sum(isinstance(patch, Polygon) for patch in axis.patches) >= patches

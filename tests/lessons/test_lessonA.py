@@ -49,7 +49,9 @@ def test_the_tools_error_is_its_distance_from_the_path() -> None:
 
 
 @pytest.mark.parametrize("phase", [90.0, -90.0, 0.0])
-def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(phase: float) -> None:
+def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(
+    phase: float,
+) -> None:
     path, d = elliptic_rotation(0.3, 0.35, 0.6, 6, phase), 1e-4
     for t in (0.0, 10.0, 12.0):
         R, omega, alpha = path(t)
@@ -70,7 +72,11 @@ def circled(yaw: float, phase: float) -> tuple[Rollout, np.ndarray]:
     robot = fb.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     com, _, _ = fb.standing_tasks(state)
-    tasks = [com, fb.OrientationTask("base", elliptic_rotation(0.3, yaw, 0.6, 6, phase)), fb.PostureTask(state.q, weight=1e-3)]
+    tasks = [
+        com,
+        fb.OrientationTask("base", elliptic_rotation(0.3, yaw, 0.6, 6, phase)),
+        fb.PostureTask(state.q, weight=1e-3),
+    ]
     controller = fb.WholeBodyController(robot, contacts, tasks)
     record = fb.rollout(fb.Simulation(robot), controller, 10.2, control_period=0.002)
     return record, 1000 * np.array([record.final.point(f) - state.point(f) for f in contacts.names])
@@ -113,10 +119,18 @@ def test_both_ways_to_write_a_tumble_give_one_acceleration() -> None:
     finally:
         view.close()
     assert told.endswith("0.0 m/s² apart") and still.endswith("0.0 m/s² apart")
-    pushed, less = (float(re.findall(r"base's axes \((-?\d+),", text)[0]) for text in (told, slower))
-    assert abs(pushed + judges.load("go2").mass * 3.0 * 2.0) < 5  # N: m ω × v, backwards, and the legs' own few newtons
-    assert abs(less - pushed - judges.load("go2").mass * 2.0 * 2.0) < 1  # 1 m/s for 3; the text has two digits
-    assert called == ["called/base"] and none == []  # about the vertical, in the world's axes hardly anything is left
+    pushed, less = (
+        float(re.findall(r"base's axes \((-?\d+),", text)[0]) for text in (told, slower)
+    )
+    assert (
+        abs(pushed + judges.load("go2").mass * 3.0 * 2.0) < 5
+    )  # N: m ω × v, backwards, and the legs' own few newtons
+    assert (
+        abs(less - pushed - judges.load("go2").mass * 2.0 * 2.0) < 1
+    )  # 1 m/s for 3; the text has two digits
+    assert (
+        called == ["called/base"] and none == []
+    )  # about the vertical, in the world's axes hardly anything is left
 
 
 def test_errors_are_plotted_with_their_slopes() -> None:
@@ -128,7 +142,9 @@ def test_errors_are_plotted_with_their_slopes() -> None:
 
 def test_the_travelling_feet_are_played_with_marks_where_they_began() -> None:
     robot = judges.load("go2")
-    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+    )
     view = fb.Viewer(robot)
     try:
         play_travelling_feet(view, fb.rollout(fb.Simulation(robot), controller, 0.3))
@@ -137,4 +153,6 @@ def test_the_travelling_feet_are_played_with_marks_where_they_began() -> None:
         view.close()
     pins = np.array([picture[f"pin/{i}"].matrix[:3, 3] for i in range(4)])
     feet = fb.Contacts.points(robot).positions(robot.standing())
-    assert np.allclose(pins[:, 1], feet[:, 1], atol=1e-3) and np.all(abs(pins[:, 0]) > abs(feet[:, 0]) + 0.04)
+    assert np.allclose(pins[:, 1], feet[:, 1], atol=1e-3) and np.all(
+        abs(pins[:, 0]) > abs(feet[:, 0]) + 0.04
+    )

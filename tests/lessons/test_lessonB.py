@@ -53,7 +53,12 @@ def knee(hydraulics: Hydraulics) -> HydraulicActuators:
 
 @pytest.mark.parametrize(
     ("bandwidth", "speed", "wanted", "supply"),
-    [(50.0, 0.5, 12.0, 160e5), (5.0, 4.0, -20.0, 160e5), (1.0, 15.0, 12.0, 60e5), (20.0, 2.0, 60.0, 160e5)],
+    [
+        (50.0, 0.5, 12.0, 160e5),
+        (5.0, 4.0, -20.0, 160e5),
+        (1.0, 15.0, 12.0, 60e5),
+        (20.0, 2.0, 60.0, 160e5),
+    ],
 )
 def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
     bandwidth: float, speed: float, wanted: float, supply: float
@@ -68,16 +73,25 @@ def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
         actuators.step(np.full(12, wanted), centre + angle, np.full(12, velocity), 1e-3)
         got = actuators.torques(centre + after.angle)[KNEE]
         assert after.torque == pytest.approx(got, abs=ROUNDING * 1e2)
-        assert np.allclose(actuators.state.pressures[:, KNEE], [after.pressure_a, after.pressure_b], rtol=ROUNDING)
+        assert np.allclose(
+            actuators.state.pressures[:, KNEE], [after.pressure_a, after.pressure_b], rtol=ROUNDING
+        )
 
 
 def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
     actuators = HydraulicActuators(ROBOT)
     cylinders, angle = actuators.cylinders, 0.4
-    bench, geometry = Bench(lambda t: (angle, 0.0)), cylinders.geometry(cylinders.max_lever_angle + angle)
-    assert bench.stiffness == pytest.approx(geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12)
+    bench, geometry = (
+        Bench(lambda t: (angle, 0.0)),
+        cylinders.geometry(cylinders.max_lever_angle + angle),
+    )
+    assert bench.stiffness == pytest.approx(
+        geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12
+    )
     assert bench.volumes == pytest.approx(tuple(geometry.volumes[:, KNEE]), rel=1e-12)
-    assert bench.torque_range() == pytest.approx(tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12)
+    assert bench.torque_range() == pytest.approx(
+        tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12
+    )
     pressures = np.array([[bench.pressure_a], [bench.pressure_b]]) * np.ones(12)
     for side in (1.0, -1.0):
         rates = cylinders.pressure_rates(np.full(12, side), pressures, geometry, np.zeros(12))
@@ -88,43 +102,70 @@ def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
 
 def test_the_joint_is_held_then_turned_then_held() -> None:
     motion = hold_then_turn(2.0, start=0.1, end=0.6)
-    assert motion(0.05) == (0.0, 0.0) and motion(0.3) == pytest.approx((0.4, 2.0)) and motion(0.9) == (0.6, 0.0)
+    assert (
+        motion(0.05) == (0.0, 0.0)
+        and motion(0.3) == pytest.approx((0.4, 2.0))
+        and motion(0.9) == (0.6, 0.0)
+    )
 
 
 def test_a_valve_told_to_open_more_than_it_can_is_all_open() -> None:
     wide, full = Bench(), Bench()
     wide.step(7.0)
     full.step(1.0)
-    assert wide.samples == full.samples and wide.samples[-1].u == 1.0 and wide.samples[-1].time == pytest.approx(1e-3)
+    assert (
+        wide.samples == full.samples
+        and wide.samples[-1].u == 1.0
+        and wide.samples[-1].time == pytest.approx(1e-3)
+    )
 
 
 # pictures
 
 
-def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(view: fb.Viewer) -> None:
+def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(
+    view: fb.Viewer,
+) -> None:
     best = show_crank(view, 0.0, 12.0)
     picture = view.renderer.picture
     rod, crank = picture["cylinder/rod"].matrix, picture["crank"].matrix
-    assert np.allclose(rod[:3, 2] / np.linalg.norm(rod[:3, 2]) @ crank[:3, 2], 0.0, atol=1e-6)  # square
+    assert np.allclose(
+        rod[:3, 2] / np.linalg.norm(rod[:3, 2]) @ crank[:3, 2], 0.0, atol=1e-6
+    )  # square
     assert np.allclose(rod[:3, 3] + rod[:3, 2], crank[:3, 3] + crank[:3, 2])
-    for name, chamber in (("A", "base chamber"), ("B", "rod chamber")):  # each label beside the middle of its chamber
+    for name, chamber in (
+        ("A", "base chamber"),
+        ("B", "rod chamber"),
+    ):  # each label beside the middle of its chamber
         filled = picture[f"cylinder/{chamber}"].matrix
         off = picture[f"chamber {name}"].matrix[:3, 3] - filled[:3, 3] - 0.5 * filled[:3, 2]
-        assert off @ filled[:3, 2] == pytest.approx(0.0, abs=1e-9) and 0.03 < np.linalg.norm(off) < 0.1
+        assert (
+            off @ filled[:3, 2] == pytest.approx(0.0, abs=1e-9) and 0.03 < np.linalg.norm(off) < 0.1
+        )
     assert "lever <b>36 mm</b>" in best and "within reach: -45 to 76 N·m" in best
-    assert "more than the supply gives" not in best and "more than the supply gives" in show_crank(view, -80.0, 12.0)
+    assert "more than the supply gives" not in best and "more than the supply gives" in show_crank(
+        view, -80.0, 12.0
+    )
     a, b = (int(bar) for bar in re.findall(r"(\d+) bar", best))
     bench = Bench()
-    assert bench.lever * 1e5 * (a * bench.piston_area - b * bench.ring_area) == pytest.approx(12.0, abs=0.4)  # N·m: bars are rounded
+    assert bench.lever * 1e5 * (a * bench.piston_area - b * bench.ring_area) == pytest.approx(
+        12.0, abs=0.4
+    )  # N·m: bars are rounded
 
 
 def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> None:
-    quick, slow, torn = show_torque_step(50.0, 160.0, 0.0), show_torque_step(5.0, 160.0, 0.0), show_torque_step(50.0, 60.0, 20.0)
+    quick, slow, torn = (
+        show_torque_step(50.0, 160.0, 0.0),
+        show_torque_step(5.0, 160.0, 0.0),
+        show_torque_step(50.0, 60.0, 20.0),
+    )
     comes = [int(re.findall(r"after <b>(\d+) ms", text)[0]) for text in (quick, slow)]
     assert comes[0] < 15 < comes[1] < 120
     assert "no oil boils" in quick and "no oil boils" in slow and "the oil boils for" in torn
     bench = Bench(hold_then_turn(20.0), hydraulics=replace(Hydraulics(), supply_pressure=60e5))
-    boiled = sum(min(row.pressure_a, row.pressure_b) <= VACUUM for row in run_force_loop(bench, 50.0, 0.4))
+    boiled = sum(
+        min(row.pressure_a, row.pressure_b) <= VACUUM for row in run_force_loop(bench, 50.0, 0.4)
+    )
     assert f"boils for {boiled} ms" in torn
     assert set(re.findall(r"#[0-9A-F]{6}", torn)) <= {hex_code(grey) for grey in GREYS}
     assert re.findall(r"<text[^>]*\sfill=", torn) == []
@@ -137,7 +178,10 @@ def test_plots_show_what_they_are_given() -> None:
     record = fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.02)
     gone = 1000 * (record.com - record.com[0])[:, 1]
     torques, sways = plot_torques(runs), plot_com_sway({"perfect": record}, side=-1)
-    levers, watts = plot_lever([0, 1], [36, 0]), plot_power(np.arange(6.0).reshape(3, 2), ("pump", "joint"))
+    levers, watts = (
+        plot_lever([0, 1], [36, 0]),
+        plot_power(np.arange(6.0).reshape(3, 2), ("pump", "joint")),
+    )
     assert np.allclose(torques.lines[1].get_ydata(), [row.torque for row in bench.samples])
     assert np.allclose(sways.lines[0].get_ydata(), -gone) and "right" in sways.get_ylabel()
     assert np.allclose(levers.lines[0].get_ydata(), [36, 0])

@@ -31,10 +31,12 @@ from floatbase.lessons.lessonC import (
 )
 from floatbase.qp import active_set, solve
 
-# exercises ----------------------------------------------------------------------------------------------------------------
+# exercises ----------------------------------------------------------------------------------------
 
 
-def test_functions_and_names_that_stand_in_a_stub_count_no_try(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_functions_and_names_that_stand_in_a_stub_count_no_try(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
     for name in ("C.2", "C.3", "C.4"):
         made: dict[str, Any] = {}
@@ -46,16 +48,20 @@ def test_functions_and_names_that_stand_in_a_stub_count_no_try(monkeypatch: pyte
     assert progress.load() == {name: {"tries": 1, "right": 0} for name in ("C.2", "C.4")}
 
 
-def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     examples = all_exercises()["C.2"].examples()
-    mine, wrong = (next(answer for answer, hint in examples if hint == name) for name in ("", "nearest"))
+    mine, wrong = (
+        next(answer for answer, hint in examples if hint == name) for name in ("", "nearest")
+    )
     assert answer_or_default("C.2", mine, longest_step) is mine
     assert "with yours" in capsys.readouterr().out
     assert answer_or_default("C.2", wrong, longest_step) is longest_step
     assert "not yet right" in capsys.readouterr().out
 
 
-# problems in the plane ----------------------------------------------------------------------------------------------------
+# problems in the plane ----------------------------------------------------------------------------
 
 
 def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> None:
@@ -63,7 +69,9 @@ def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> 
     seen = []
     for _ in range(5):
         solved_by, names = [], list(game.rows)
-        for i in range(1, 17):  # Gray's code: each set is the one before but for one row, and the last is empty again
+        for i in range(
+            1, 17
+        ):  # Gray's code: each set is the one before but for one row, and the last is empty again
             code, before = (n ^ (n >> 1) for n in (i % 16, i - 1))
             game.rows[names[(code ^ before).bit_length() - 1]].click()
             assert game.working == tuple(name for k, name in enumerate(names) if code >> k & 1)
@@ -79,19 +87,27 @@ def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> 
 
 def test_the_game_tells_what_is_broken_what_pulls_and_what_has_no_point() -> None:
     game = ActiveSetGame([(0.5, -1.0)])
-    assert "table is broken by 1;" in game.message and "0 clicks" in game.message and not game.solved
+    assert (
+        "table is broken by 1;" in game.message and "0 clicks" in game.message and not game.solved
+    )
     game.rows["table"].click()
     assert "solved" in game.message and "1 click:" in game.message and game.solved
     game.rows["ramp"].click()
     assert "ramp pulls: its price is -1.5" in game.message and not game.solved
     game.rows["roof"].click()
     assert "no point" in game.message and not game.solved
-    assert "✓" not in game.message and game.rows["roof"].icon == "check" and game.rows["wall"].icon == ""
+    assert (
+        "✓" not in game.message
+        and game.rows["roof"].icon == "check"
+        and game.rows["wall"].icon == ""
+    )
 
 
 def test_the_rows_of_a_qp_are_those_that_the_lesson_describes() -> None:
     along, up = 0.7, 0.1
-    assert np.allclose(corner_table().G @ [along, up], [-up, along - 3 * up, 2 * along + 3 * up, -along])
+    assert np.allclose(
+        corner_table().G @ [along, up], [-up, along - 3 * up, 2 * along + 3 * up, -along]
+    )
     edges = hexagon_table()
     assert np.allclose(np.linalg.norm(edges.G, axis=1), 1.0) and np.all(edges.h == 2.0)
     assert np.allclose(np.linalg.solve(edges.H, -edges.g), [1.0, 3.9])
@@ -107,11 +123,13 @@ def test_the_soft_walls_lead_through_the_middle_to_the_optimum() -> None:
             slack = qp.h - qp.G @ x
             assert np.all(slack > 0)
             slope = qp.H @ x + qp.g
-            assert np.allclose(slope + qp.G.T @ (t / slack), 0.0, atol=1e-6 * (1 + np.abs(slope).max()))
+            assert np.allclose(
+                slope + qp.G.T @ (t / slack), 0.0, atol=1e-6 * (1 + np.abs(slope).max())
+            )
         assert np.allclose(points[-1], solve(qp).x, atol=1e-5)
 
 
-# in the loop --------------------------------------------------------------------------------------------------------------
+# in the loop --------------------------------------------------------------------------------------
 
 
 def test_any_solver_may_drive_the_robot_and_the_same_answer_gives_the_same_torques() -> None:
@@ -121,7 +139,9 @@ def test_any_solver_may_drive_the_robot_and_the_same_answer_gives_the_same_torqu
         found = SolverController(controller, solver)(state.q, state.v, 0.0)
         expected = controller(state.q, state.v)
         assert np.allclose(found.tau, expected.tau, atol=1e-6)
-        assert found.forces is not None and np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
+        assert found.forces is not None and np.allclose(
+            np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6
+        )
     with pytest.raises(fb.FloatbaseError, match="x has shape"):
         SolverController(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
 
@@ -159,13 +179,17 @@ def walked(qp: fb.QP, x: Any, most: int) -> tuple[Any, int]:
 
 
 def test_the_solver_of_the_lesson_ends_at_every_tick_of_a_large_push() -> None:
-    """At 150 N four facets of one foot are met at once: a speed that is rounding once let it go round for ever."""
+    """At 150 N four facets of one foot are met at once: a speed that is rounding once let it go
+    round for ever.
+    """
     controller = standing_controller()
     quarter = np.tile([0.0, 0.0, controller.robot.weight / 4], 4)
 
     def solver(qp: fb.QP) -> Any:
         space = qp.equality_space
-        beta, rounds = walked(qp.reduced, np.linalg.solve(space.A[30:], quarter - space.b[30:]), most=60)
+        beta, rounds = walked(
+            qp.reduced, np.linalg.solve(space.A[30:], quarter - space.b[30:]), most=60
+        )
         assert rounds <= 60
         assert np.allclose(space(beta), solve(qp).x, atol=1e-6)
         return space(beta)
@@ -179,14 +203,16 @@ def test_a_push_goes_where_it_is_sent() -> None:
     assert (push.start, push.duration) == (0.05, 0.1)
 
 
-# pictures -----------------------------------------------------------------------------------------------------------------
+# pictures -----------------------------------------------------------------------------------------
 
 
 def test_pictures_show_what_they_are_given() -> None:
     assert "does not touch" in show_table(1.0) and "price of the row: <b>3</b>" in show_table(-1.5)
     edges = hexagon_table()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
-    assert "on: no row" in show_solver_path(edges, ways, 0) and "on: edge 0" in show_solver_path(edges, ways, 1)
+    assert "on: no row" in show_solver_path(edges, ways, 0) and "on: edge 0" in show_solver_path(
+        edges, ways, 1
+    )
     between = show_solver_path(edges, ways, 0.5)
     assert "on: no row" in between and between != show_solver_path(edges, ways, 0)
     assert rounded(edges.objective(np.array([0.5, 0.0])), digits=3) in between

@@ -25,7 +25,11 @@ def test_an_unknown_bag_stretches_the_spring(kp: float) -> None:
 def _shift() -> np.ndarray:
     """By the formula for the foot of a plumb line on a line through two points."""
     state = GO2.standing()
-    (x1, y1, _), (x2, y2, _), (x0, y0, _) = state.point("FL_foot"), state.point("RR_foot"), state.com
+    (x1, y1, _), (x2, y2, _), (x0, y0, _) = (
+        state.point("FL_foot"),
+        state.point("RR_foot"),
+        state.com,
+    )
     a, b, c = y1 - y2, x2 - x1, x1 * y2 - x2 * y1
     return -(a * x0 + b * y0 + c) / (a**2 + b**2) * np.array([a, b, 0.0])
 
@@ -33,14 +37,19 @@ def _shift() -> np.ndarray:
 def test_it_stays_up_on_two_feet_for_longest_where_p_2_puts_it() -> None:
     shift = _shift()
     best = time_on_two_feet(shift)
-    assert best > 1.0 > 0.2 + time_on_two_feet(-shift) and best > 1.3 * time_on_two_feet(np.zeros(3))
+    assert best > 1.0 > 0.2 + time_on_two_feet(-shift) and best > 1.3 * time_on_two_feet(
+        np.zeros(3)
+    )
     assert best > 1.2 * time_on_two_feet(2 * shift)
 
 
 def test_p_2_solves_the_first_challenge() -> None:
     x, y, _ = _shift()
     challenge = CHALLENGES[0]
-    session, judge = Session(GO2, replace(challenge.start, com_shift=(x, y, 0.0))), challenge.judge()
+    session, judge = (
+        Session(GO2, replace(challenge.start, com_shift=(x, y, 0.0))),
+        challenge.judge(),
+    )
     for seconds, changes in ((1.0, {}), (2.4, {"lifted_feet": ("FR_foot", "RL_foot")})):
         session.change(**changes)
         for _ in range(round(seconds / 0.032)):

@@ -1,4 +1,6 @@
-"""Panels: a slider shows the number that is computed with; a push goes where its handle points, and a line tells of it."""
+"""Panels: a slider shows the number that is computed with; a push goes where its handle points, and
+a line tells of it.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,10 @@ from floatbase.lessons.slider_samples import panel_samples
 from floatbase.simulation import LiveSimulation
 
 RANGES = [
-    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05), (0, 60, 80, 1.0),
-    (0.0, 0.5, 1.0, 0.02), (0.0, 60.0, 120.0, 2.0), (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002),
+    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05),
+    (0, 60, 80, 1.0),
+    (0.0, 0.5, 1.0, 0.02), (0.0, 60.0, 120.0, 2.0), (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1),
+    (0, 0.003, 0.01, 0.0002),
     (0, 250, 5000, 50.0), (-180.0, 0.0, 180.0, 5.0),
 ]  # fmt: skip
 
@@ -29,14 +33,18 @@ def view() -> Iterator[fb.Viewer]:
     made.close()
 
 
-def slider_of(view: fb.Viewer, low: float, first: float, high: float) -> tuple[widgets.FloatSlider, list[float]]:
+def slider_of(
+    view: fb.Viewer, low: float, first: float, high: float
+) -> tuple[widgets.FloatSlider, list[float]]:
     """The slider of a panel that has one, and the values that its picture was drawn for."""
     drawn: list[float] = []
     return slider_panel(view, lambda x: drawn.append(x), x=(low, first, high)).sliders["x"], drawn
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_goes_through_its_first_value(view: fb.Viewer, low: float, first: float, high: float, step: float) -> None:
+def test_a_slider_goes_through_its_first_value(
+    view: fb.Viewer, low: float, first: float, high: float, step: float
+) -> None:
     slider, drawn = slider_of(view, low, first, high)
     assert slider.step == pytest.approx(step, rel=1e-12)
     for bound in (low, first, high):
@@ -46,11 +54,15 @@ def test_a_slider_goes_through_its_first_value(view: fb.Viewer, low: float, firs
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_shows_what_is_computed_with(view: fb.Viewer, low: float, first: float, high: float, step: float) -> None:
+def test_a_slider_shows_what_is_computed_with(
+    view: fb.Viewer, low: float, first: float, high: float, step: float
+) -> None:
     slider, drawn = slider_of(view, low, first, high)
     for i in range(60):
         slider.value = min(low + i * slider.step, high)  # as a browser adds them up
-        assert format(drawn[-1], slider.readout_format) == format(slider.value, slider.readout_format)
+        assert format(drawn[-1], slider.readout_format) == format(
+            slider.value, slider.readout_format
+        )
         assert drawn[-1] == round(drawn[-1], 4)
     assert len(drawn) > 50
 
@@ -61,11 +73,17 @@ def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
     assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
 
 
-def test_a_picture_keeps_its_share_beside_a_note_and_has_a_line_of_its_own_where_it_is_narrow(view: fb.Viewer) -> None:
+def test_a_picture_keeps_its_share_beside_a_note_and_has_a_line_of_its_own_where_it_is_narrow(
+    view: fb.Viewer,
+) -> None:
     panel = slider_panel(view, lambda x: "long " * 200, beside=True, x=(0.0, 0.5, 1.0))
     row = panel.children[0]
     picture, note = row.children
-    assert (picture.layout.flex, note.layout.flex, row.layout.flex_flow) == ("1 1 62%", "1 1 30%", "row wrap")
+    assert (picture.layout.flex, note.layout.flex, row.layout.flex_flow) == (
+        "1 1 62%",
+        "1 1 30%",
+        "row wrap",
+    )
     assert picture.layout.min_width == "min(380px, 100%)" and note is panel.note
 
 
@@ -73,7 +91,9 @@ def test_a_range_with_no_width_does_not_fail(view: fb.Viewer) -> None:
     assert slider_of(view, 2.0, 2.0, 2.0)[1] == [2.0]
 
 
-def test_a_slider_names_its_unit_and_what_the_package_refuses_stands_in_the_note(view: fb.Viewer) -> None:
+def test_a_slider_names_its_unit_and_what_the_package_refuses_stands_in_the_note(
+    view: fb.Viewer,
+) -> None:
     def draw(push_force: float) -> str:
         if push_force:
             raise fb.FloatbaseError("too hard")
@@ -100,7 +120,13 @@ def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside:
 def test_a_slider_of_whole_numbers_has_only_those_also_without_a_kernel() -> None:
     panel = slider_panel(None, lambda rounds: f"{rounds:g}", rounds=range(31))
     slider = panel.sliders["rounds"]
-    assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (0, 0, 30, 1, ".0f")
+    assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (
+        0,
+        0,
+        30,
+        1,
+        ".0f",
+    )
     assert {value % 1 for value in panel_samples(panel)["rounds"]} == {0.0}
 
 
@@ -116,11 +142,15 @@ class Pushed:
     """What a reader can touch of a push panel, and the run behind it."""
 
     def __init__(self, robot: fb.Robot):
-        controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+        controller = fb.WholeBodyController(
+            robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+        )
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
         self.run: LiveSimulation = live_run(self.sim, controller, self.view)
-        _, self.force, row, self.speed, buttons = push_panel(self.run, self.view, max_force=600.0).children
+        _, self.force, row, self.speed, buttons = push_panel(
+            self.run, self.view, max_force=600.0
+        ).children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
         self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}

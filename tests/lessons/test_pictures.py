@@ -1,4 +1,6 @@
-"""Pictures of a site: what panels keep for each stop, which files hold it, and that a browser draws it without a kernel."""
+"""Pictures of a site: what panels keep for each stop, which files hold it, and that a browser draws
+it without a kernel.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,10 @@ from floatbase.viewer.scene import protocol
 Pictures = pictures.Pictures
 STATIC = Path(pictures.__file__).with_name("site") / "static"
 RANGES = [
-    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0, 60, 80, 1.0), (0, 22, 25, 0.5),
-    (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002), (3, 4, 53, 1.0), (1, 3, 24, 0.2), (0, 0, 5, 0.1),
+    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0, 60, 80, 1.0),
+    (0, 22, 25, 0.5),
+    (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002), (3, 4, 53, 1.0), (1, 3, 24, 0.2),
+    (0, 0, 5, 0.1),
 ]  # fmt: skip
 ANIMATION = "set_animation"
 
@@ -48,7 +52,9 @@ def view(go2: fb.Robot) -> Iterator[fb.Viewer]:
 
 
 def squat(view: fb.Viewer, **ranges: Any) -> Any:
-    """A panel that moves the robot, and shows its forces from 20 N on: they come and go, and change their colour."""
+    """A panel that moves the robot, and shows its forces from 20 N on: they come and go, and change
+    their colour.
+    """
     standing, contacts = view.robot.standing(), fb.Contacts.points(view.robot)
 
     def draw(down: float, force: float = 0.0) -> str:
@@ -67,25 +73,33 @@ def data_of(shown: Any) -> dict[str, Any]:
     return dict(shown._repr_mimebundle_()[static_export.MIME])
 
 
-def scene_at(data: dict[str, Any], stop: str | None = None, view: int = 0) -> dict[tuple[str, ...], bytes]:
+def scene_at(
+    data: dict[str, Any], stop: str | None = None, view: int = 0
+) -> dict[tuple[str, ...], bytes]:
     """Key -> command of the first scene, or of that of a stop, put together as pictures.js does it."""
     commands, scene = static_export.commands(data), {}
     changes = data["stops"][stop][1 + view] if stop is not None else []
     for numbers in (data["first"][view], changes):
         for key, command in zip(numbers[::2], numbers[1::2], strict=True):
             scene[key] = None if command == static_export.REMOVED else commands[command]
-    return {tuple(data["keys"][key]): command for key, command in scene.items() if command is not None}
+    return {
+        tuple(data["keys"][key]): command for key, command in scene.items() if command is not None
+    }
 
 
-# stops ------------------------------------------------------------------------------------------------------------------
+# stops --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(low: float, first: float, high: float, step: float) -> None:
+def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(
+    low: float, first: float, high: float, step: float
+) -> None:
     found = sample_values(low, first, high, step)
     assert {low, first, high} <= set(found) and list(found) == sorted(set(found))
     assert 6 <= len(found) <= 16
-    assert np.allclose([(x - low) / step for x in found], [round((x - low) / step) for x in found], atol=1e-6)
+    assert np.allclose(
+        [(x - low) / step for x in found], [round((x - low) / step) for x in found], atol=1e-6
+    )
     assert max(np.diff(found)) < 0.3 * (high - low)
 
 
@@ -96,18 +110,32 @@ def test_a_slider_without_a_range_has_one_stop() -> None:
 def test_few_combinations_are_all_computed_and_of_many_one_slider_at_a_time() -> None:
     assert combinations([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
     alone, together = combinations([5, 5, 5], [1, 2, 4])
-    assert not together and len(alone) == 13 and len(set(alone)) == 13  # 5 + 5 + 5, the first place once
+    assert (
+        not together and len(alone) == 13 and len(set(alone)) == 13
+    )  # 5 + 5 + 5, the first place once
     assert all(sum(a != b for a, b in zip(place, (1, 2, 4), strict=True)) <= 1 for place in alone)
-    assert combinations([MAX_COMBINATIONS], [0])[1] and not combinations([MAX_COMBINATIONS + 1], [0])[1]
+    assert (
+        combinations([MAX_COMBINATIONS], [0])[1]
+        and not combinations([MAX_COMBINATIONS + 1], [0])[1]
+    )
 
 
-# panels -----------------------------------------------------------------------------------------------------------------
+# panels -------------------------------------------------------------------------------------------
 
 
-def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more(view: fb.Viewer) -> None:
-    panel = squat(view, samples={"down": (0, 0.05, 0.1), "force": (0, 30, 60)}, down=(0, 0.05, 0.1, "m"), force=(0, 30, 60, "N"))
+def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more(
+    view: fb.Viewer,
+) -> None:
+    panel = squat(
+        view,
+        samples={"down": (0, 0.05, 0.1), "force": (0, 30, 60)},
+        down=(0, 0.05, 0.1, "m"),
+        force=(0, 30, 60, "N"),
+    )
     data = data_of(panel)
-    assert data["together"] and set(data["stops"]) == {f"{i},{k}" for i in range(3) for k in range(3)}
+    assert data["together"] and set(data["stops"]) == {
+        f"{i},{k}" for i in range(3) for k in range(3)
+    }
     assert data["stops"]["1,1"][1] == []  # where all began
     for stop in data["stops"]:
         down, force = ((0, 0.05, 0.1)[int(stop[0])], (0, 30, 60)[int(stop[2])])
@@ -119,8 +147,17 @@ def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more
             == ("more than 50 &lt; 60" if force == 60 else f"<b>{down:.2f}</b> {force}")
         )
         assert kept == dict(view.window.scene.file_entries())
-    meshes = sum(len(command) for key, command in scene_at(data).items() if "/robot/" in key[0] and key[1] == "set_object")
-    changed = sum(len(static_export.commands(data)[n]) for stop in data["stops"].values() for n in stop[1][1::2] if n >= 0)
+    meshes = sum(
+        len(command)
+        for key, command in scene_at(data).items()
+        if "/robot/" in key[0] and key[1] == "set_object"
+    )
+    changed = sum(
+        len(static_export.commands(data)[n])
+        for stop in data["stops"].values()
+        for n in stop[1][1::2]
+        if n >= 0
+    )
     assert changed < 0.3 * meshes  # the robot's shape is held once
 
 
@@ -143,11 +180,16 @@ def test_many_sliders_move_one_at_a_time_and_the_page_says_so(view: fb.Viewer) -
     data = data_of(panel)
     assert not data["together"] and "one slider moves at a time" in data["words"]
     first = [control["first"] for control in data["controls"]]
-    assert all(sum(int(i) != k for i, k in zip(stop.split(","), first, strict=True)) <= 1 for stop in data["stops"])
+    assert all(
+        sum(int(i) != k for i, k in zip(stop.split(","), first, strict=True)) <= 1
+        for stop in data["stops"]
+    )
 
 
 def test_a_panel_without_a_view_keeps_its_notes() -> None:
-    data = data_of(slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2)))
+    data = data_of(
+        slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2))
+    )
     assert data["notes"] == [f"<img alt='{i}'>" for i in range(3)] and data["first"] == []
     assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
 
@@ -160,7 +202,9 @@ def test_stops_of_a_control_must_be_there() -> None:
 def test_a_picture_that_moves_no_more_keeps_no_animation(view: fb.Viewer) -> None:
     record = fb.rollout(fb.Simulation(view.robot), ConstantTorques(np.zeros(12)), 0.02)
     assert any(key[1] == ANIMATION for key in scene_at(data_of(view.play(record))))
-    assert not any(key[1] == ANIMATION for key in scene_at(data_of(view.show(view.robot.standing()))))
+    assert not any(
+        key[1] == ANIMATION for key in scene_at(data_of(view.show(view.robot.standing())))
+    )
 
 
 def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
@@ -168,26 +212,44 @@ def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
     controller = fb.WholeBodyController(view.robot, sim.feet, fb.standing_tasks(sim.state))
     view.show(sim.state, sim.feet)
     run = live_run(sim, controller, view)
-    fb.rollout(sim, controller, 0.6, [fb.Push([0.0, 480.0, 0.0], start=0.0)])  # the robot of the panel has fallen
+    fb.rollout(
+        sim, controller, 0.6, [fb.Push([0.0, 480.0, 0.0], start=0.0)]
+    )  # the robot of the panel has fallen
     data = data_of(push_panel(run, view, max_force=480.0))
     assert [len(control["values"]) for control in data["controls"]] == [5, 4]
     for unpushed in (scene_at(data), scene_at(data, "0,1")):
         assert not any(key[1] == ANIMATION for key in unpushed)
-        assert len({key[0].split("/measured/")[1].split("/")[0] for key in unpushed if "/measured/" in key[0]}) == 4
+        assert (
+            len(
+                {
+                    key[0].split("/measured/")[1].split("/")[0]
+                    for key in unpushed
+                    if "/measured/" in key[0]
+                }
+            )
+            == 4
+        )
     notes = {stop: data["notes"][about[0]] for stop, about in data["stops"].items()}
     assert notes["1,0"] == "it stands" and notes["4,1"].endswith("it falls") and notes["0,0"] == ""
     moving = [
-        {key: c for key, c in scene_at(data, f"{i},{k}").items() if key[1] == ANIMATION} for i in (1, 4) for k in range(4)
+        {key: c for key, c in scene_at(data, f"{i},{k}").items() if key[1] == ANIMATION}
+        for i in (1, 4)
+        for k in range(4)
     ]
-    assert all(len(one) == 1 for one in moving) and len({c for one in moving for c in one.values()}) == 8
+    assert (
+        all(len(one) == 1 for one in moving)
+        and len({c for one in moving for c in one.values()}) == 8
+    )
     assert run.status == "paused" and sim.time == 0.0
 
 
-# files ------------------------------------------------------------------------------------------------------------------
+# files --------------------------------------------------------------------------------------------
 
 
 def parts_of(path: Path) -> list[bytes]:
-    found = re.fullmatch(r'floatbasePictures\.take\("([^"]+)","([^"]+)"\)\n', path.read_text(encoding="ascii"))
+    found = re.fullmatch(
+        r'floatbasePictures\.take\("([^"]+)","([^"]+)"\)\n', path.read_text(encoding="ascii")
+    )
     assert found is not None and found.group(1) == path.stem
     return protocol.unframe(gzip.decompress(base64.b64decode(found.group(2))))
 
@@ -196,7 +258,9 @@ def placed(html: str) -> str:
     return re.findall(r'data-picture="([^"]+)"', html)[0]
 
 
-def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tmp_path: Path) -> None:
+def test_files_hold_what_outputs_held_and_shared_meshes_once(
+    view: fb.Viewer, tmp_path: Path
+) -> None:
     made, data, names = Pictures(tmp_path), [], []
     for title in ("one", "two"):
         bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
@@ -204,7 +268,10 @@ def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tm
         names.append(placed(made.place(bundle) or ""))
     made.write()
     files = {path.stem: path for path in (tmp_path / "pictures").glob("go2-*.js")}
-    assert len(files) == 1 and {path.name for path in (tmp_path / "pictures").glob("viewer.*")} == {"viewer.html", "viewer.js"}
+    assert len(files) == 1 and {path.name for path in (tmp_path / "pictures").glob("viewer.*")} == {
+        "viewer.html",
+        "viewer.js",
+    }
     (shared,) = (parts_of(path) for path in files.values())
     for name, about in zip(names, data, strict=True):
         head, *own = parts_of(tmp_path / "pictures" / f"{name}.js")
@@ -214,7 +281,9 @@ def test_files_hold_what_outputs_held_and_shared_meshes_once(view: fb.Viewer, tm
         assert sum(map(len, own)) < 0.05 * sum(map(len, shared))
 
 
-def test_a_later_build_leaves_files_of_pictures_that_it_did_not_place(view: fb.Viewer, tmp_path: Path) -> None:
+def test_a_later_build_leaves_files_of_pictures_that_it_did_not_place(
+    view: fb.Viewer, tmp_path: Path
+) -> None:
     view.show(view.robot.standing())
     first, second = Pictures(tmp_path), Pictures(tmp_path)
     first.place(view._repr_mimebundle_())
@@ -230,7 +299,13 @@ def test_what_is_no_picture_is_not_placed_and_texts_are_escaped(tmp_path: Path) 
     assert made.place({"text/html": "<b>3</b>"}) is None and made.place({}) is None
     panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})  # type: ignore[arg-type]
     html = made.place(panel._repr_mimebundle_())
-    assert html is not None and "<i>note</i>" in html and "a&lt;b" in html and "a<b" not in html and '"s"' not in html
+    assert (
+        html is not None
+        and "<i>note</i>" in html
+        and "a&lt;b" in html
+        and "a<b" not in html
+        and '"s"' not in html
+    )
     assert 'type="range"' in html and "aria-label" in html and "aria-valuetext" in html
 
 
@@ -256,14 +331,16 @@ def test_the_game_of_rows_has_every_set_of_rows() -> None:
     assert (game.working, game.clicks) == ((), 0)
 
 
-# in a browser -----------------------------------------------------------------------------------------------------------
+# in a browser -------------------------------------------------------------------------------------
 
 browser = browser_of_a_file
 
 
 @pytest.fixture(scope="module")
 def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page of a panel, a recording far below it and a note with a slider, one level deep as the pages of the site."""
+    """A page of a panel, a recording far below it and a note with a slider, one level deep as the
+    pages of the site.
+    """
     folder = tmp_path_factory.mktemp("site")
     made, views = Pictures(folder / "_static"), [fb.Viewer(go2, height=240) for _ in range(2)]
     with pytest.MonkeyPatch.context() as patch:
@@ -281,10 +358,19 @@ def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("pictures.js", "pictures.css"):
         shutil.copy(STATIC / name, folder / "_static" / name)
     (folder / "lessons").mkdir()
-    head = '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
-    scripts = '<link rel="stylesheet" href="../_static/pictures.css"><script src="../_static/pictures.js"></script>'
+    head = (
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" '
+        'href="data:,">'
+    )
+    scripts = (
+        '<link rel="stylesheet" href="../_static/pictures.css"><script '
+        'src="../_static/pictures.js"></script>'
+    )
     body = '<div style="height: 4000px"></div>'.join(map(str, (f"{shown[0]}{shown[1]}", shown[2])))
-    text = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">{head}{scripts}</head><body>{body}</body></html>'
+    text = (
+        f'<!DOCTYPE html><html lang="en"><head><meta '
+        f'charset="utf-8">{head}{scripts}</head><body>{body}</body></html>'
+    )
     (folder / "lessons" / "00.html").write_text(text, encoding="utf-8")
     return folder
 
@@ -302,7 +388,9 @@ def page(site: Path, browser: Any) -> Iterator[Any]:
         opened.goto(f"{address}/lessons/00.html")
         yield opened
         assert said == []
-        assert [url for url in requested if not url.startswith((address, "data:", "blob:", "about:"))] == []
+        assert [
+            url for url in requested if not url.startswith((address, "data:", "blob:", "about:"))
+        ] == []
         opened.close()
 
 
@@ -363,15 +451,22 @@ def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
             count += 1
             frame.wait_for_function(f"viewer.num_messages_received >= {count}")
             assert seen.setdefault(force, frame.evaluate(SIGNATURE)) == frame.evaluate(SIGNATURE)
-    arrows = {force: {path for path in found if "/measured/" in path} for force, found in seen.items()}
+    arrows = {
+        force: {path for path in found if "/measured/" in path} for force, found in seen.items()
+    }
     assert not arrows[0] and arrows[1] and seen[1] != seen[2]
 
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(page: Any) -> None:
+def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(
+    page: Any,
+) -> None:
     frame = inside(page, 1)
-    assert frame.evaluate("[viewer.animator.playing, viewer.animator.duration]") == [False, pytest.approx(0.2, abs=0.01)]
+    assert frame.evaluate("[viewer.animator.playing, viewer.animator.duration]") == [
+        False,
+        pytest.approx(0.2, abs=0.01),
+    ]
     arrow = "viewer.scene_tree.find(['meshcat', 'push']).object.visible"
     assert not frame.evaluate(arrow)  # it comes with the push
     frame.locator("#player button").click()
@@ -394,14 +489,19 @@ FRAMED = """(address) => new Promise((done) => {
 
 @pytest.mark.front_end
 @needs_chromium
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])  # the site's own, and another origin on the same machine
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "localhost"]
+)  # the site's own, and another origin on the same machine
 def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, host: str) -> None:
     page = browser.new_page()
     with served(site) as address:
         page.goto(f"{address}/_static/pictures.css".replace("127.0.0.1", host))
         page.evaluate(FRAMED, f"{address}/_static/pictures/viewer.html")
         frame = page.frames[-1]
-        frame.evaluate("() => { window.heard = new Promise((done) => window.addEventListener('message', done)); }")
+        frame.evaluate(
+            "() => { window.heard = new Promise((done) => window.addEventListener('message', "
+            "done)); }"
+        )
         page.evaluate("window[0].postMessage({seen: true}, '*')")
         frame.evaluate("window.heard.then(() => 0)")
         assert frame.evaluate("window.viewer !== undefined") == (host == "127.0.0.1")

@@ -1,4 +1,6 @@
-"""Predictions: kept in the learner's file, shown beside the result, and never a reason for an error."""
+"""Predictions: kept in the learner's file, shown beside the result, and never a reason for an
+error.
+"""
 
 from __future__ import annotations
 
@@ -38,10 +40,14 @@ def lines(home: Path) -> list[Any]:
 @pytest.mark.parametrize(
     ("given", "result", "shown"),
     [
-        (400, 69.2, ["69 mm", "400 mm", "5.8"]), (40, 69.2, ["69 mm", "40 mm", "0.58"]), (70, 69.2, ["69 mm", "70 mm"]),
-        (69, 69.2, ["69 mm"]), (-40, 69.2, ["69 mm", "-40 mm"]), (0, 69.2, ["69 mm", "0 mm"]), (3, 1e-12, ["0 mm", "3 mm"]),
-        (0, -1e-12, ["0 mm"]), (157.76, 1.0, ["1 mm", "157.76 mm", "160"]), (3, np.nan, ["3 mm"]), (3, np.inf, ["3 mm"]),
-        ([1, 2], [1.01, 3.3], ["(1, 3.3) mm", "(1, 2) mm", "1", "2"]), ([1, 2], [1.0, 2.0], ["(1, 2) mm"]),
+        (400, 69.2, ["69 mm", "400 mm", "5.8"]), (40, 69.2, ["69 mm", "40 mm", "0.58"]),
+        (70, 69.2, ["69 mm", "70 mm"]),
+        (69, 69.2, ["69 mm"]), (-40, 69.2, ["69 mm", "-40 mm"]), (0, 69.2, ["69 mm", "0 mm"]),
+        (3, 1e-12, ["0 mm", "3 mm"]),
+        (0, -1e-12, ["0 mm"]), (157.76, 1.0, ["1 mm", "157.76 mm", "160"]), (3, np.nan, ["3 mm"]),
+        (3, np.inf, ["3 mm"]),
+        ([1, 2], [1.01, 3.3], ["(1, 3.3) mm", "(1, 2) mm", "1", "2"]),
+        ([1, 2], [1.0, 2.0], ["(1, 2) mm"]),
         ([1, 2], [1.0, 2.0, 3.0], ["(1, 2, 3) mm", "(1, 2) mm"]),  # of a lesson that has changed
     ],
 )  # fmt: skip
@@ -57,7 +63,9 @@ def test_a_prediction_is_shown_beside_the_result_and_how_far_off_it_was(
 
 
 @pytest.mark.parametrize("skipped", [(), (...,), (None,)])
-def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(home: Path, said: Any, skipped: tuple[Any, ...]) -> None:
+def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(
+    home: Path, said: Any, skipped: tuple[Any, ...]
+) -> None:
     predict("02.c", *skipped, unit="mm")
     compare("02.c", 69.2)
     review("02")
@@ -76,7 +84,10 @@ def test_a_count_is_printed_whole_and_compared_by_difference(said: Any) -> None:
     predict("03.a", 5)
     for result in (np.int64(6), 5, 123, 4):
         compare("03.a", result)
-    numbers = [[int(number) for number in re.findall(r"\d+", line.removeprefix("03.a"))] for line in said()[1:]]
+    numbers = [
+        [int(number) for number in re.findall(r"\d+", line.removeprefix("03.a"))]
+        for line in said()[1:]
+    ]
     assert numbers == [[6, 5, 1], [5], [123, 5, 118], [4, 5, 1]]
 
 
@@ -87,7 +98,9 @@ def test_several_numbers_need_no_brackets(said: Any) -> None:
     assert first == second and "(1, 2) N" in first
 
 
-@pytest.mark.parametrize("answer", ["in the f", "IN THE FIRST MILLISECOND", " In The First ", "in the first millisecond"])
+@pytest.mark.parametrize(
+    "answer", ["in the f", "IN THE FIRST MILLISECOND", " In The First ", "in the first millisecond"]
+)
 def test_a_choice_is_known_by_its_beginning(said: Any, answer: str) -> None:
     predict("00.b", answer, choices=CHOICES)
     compare("00.b", CHOICES[2])
@@ -111,15 +124,19 @@ def test_what_is_no_choice_is_told_with_all_choices(home: Path, said: Any, answe
 
 
 UNUSABLE = {
-    "text": "40 mm", "truth": True, "not a number": np.nan, "endless": np.inf, "huge": 10**400, "complex": 1j, "function": abs,
-    "empty": [], "ragged": [[1.0], [1.0, 2.0]], "object": object(), "dictionary": {}, "decimal comma": (0, 58),
+    "text": "40 mm", "truth": True, "not a number": np.nan, "endless": np.inf, "huge": 10**400,
+    "complex": 1j, "function": abs,
+    "empty": [], "ragged": [[1.0], [1.0, 2.0]], "object": object(), "dictionary": {},
+    "decimal comma": (0, 58),
     "matrix": np.eye(1), "five": np.ones(5), "generator": (x for x in (1, 2)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", UNUSABLE)
 @pytest.mark.parametrize("count", [1, 3])
-def test_what_is_no_prediction_is_told_in_one_line(home: Path, said: Any, kind: str, count: int) -> None:
+def test_what_is_no_prediction_is_told_in_one_line(
+    home: Path, said: Any, kind: str, count: int
+) -> None:
     predict("02.c", UNUSABLE[kind], unit="mm", count=count)
     (line,) = said()
     assert "mm" in line and "..." in line
@@ -153,8 +170,14 @@ def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
     review("02")
     table = said()
     review()
-    assert [line.split()[:5] for line in table[1:]] == [["02.a", *["at", "rest"] * 2], ["02.c", "40", "mm", "69", "mm"]]
-    assert len({line.rindex(word) for line, word in zip(table[1:], ("at rest", "69 mm"), strict=True)}) == 1
+    assert [line.split()[:5] for line in table[1:]] == [
+        ["02.a", *["at", "rest"] * 2],
+        ["02.c", "40", "mm", "69", "mm"],
+    ]
+    assert (
+        len({line.rindex(word) for line, word in zip(table[1:], ("at rest", "69 mm"), strict=True)})
+        == 1
+    )
     assert [line.split()[0] for line in said()] == ["you", "02.a", "02.c", "03.d"]
     for name, rows in (("2", ["02.a", "02.c"]), ("02.c", ["02.c"]), ("03.d", ["03.d"])):
         review(name)
@@ -166,7 +189,12 @@ def test_a_lesson_named_by_a_letter_comes_after_the_numbered_ones(said: Any) -> 
         predict(name, 2)
         compare(name, 3)
     said()
-    for lesson, rows in (("", ["07.a", "A.a", "C.a", "C.b"]), ("C", ["C.a", "C.b"]), ("c", ["C.a", "C.b"]), ("C.b", ["C.b"])):
+    for lesson, rows in (
+        ("", ["07.a", "A.a", "C.a", "C.b"]),
+        ("C", ["C.a", "C.b"]),
+        ("c", ["C.a", "C.b"]),
+        ("C.b", ["C.b"]),
+    ):
         review(lesson)
         assert [line.split()[0] for line in said()][1:] == rows
     review("B")
@@ -175,9 +203,12 @@ def test_a_lesson_named_by_a_letter_comes_after_the_numbered_ones(said: Any) -> 
 
 
 DAMAGED = (
-    "null", "5", "[1]", '"a"', "\0", "[" * 100_000, '{"02.c": 5}', '{"02.c": {}}', '{"02.c": {"said": null}}',
-    '{"02.c": {"said": NaN, "is": Infinity}}', '{"02.c": {"said": [], "unit": 3}}', '{"02.c": {"said": [1, "a"]}}',
-    '{"02.c": {"said": true}}', '{"02.c": {"said": 1e400}}', '{"02.c": {"said": {"is": 1}}}', '{"02.c": {"said": "\\ud800"}}',
+    "null", "5", "[1]", '"a"', "\0", "[" * 100_000, '{"02.c": 5}', '{"02.c": {}}',
+    '{"02.c": {"said": null}}',
+    '{"02.c": {"said": NaN, "is": Infinity}}', '{"02.c": {"said": [], "unit": 3}}',
+    '{"02.c": {"said": [1, "a"]}}',
+    '{"02.c": {"said": true}}', '{"02.c": {"said": 1e400}}', '{"02.c": {"said": {"is": 1}}}',
+    '{"02.c": {"said": "\\ud800"}}',
     '{"\\ud800": {"said": 1}}', '{"02.c": {"said": 1' + "0" * 400 + "}}", '{"02.c": {"said": 4',
 )  # fmt: skip
 
@@ -197,7 +228,9 @@ def test_damage_is_left_out_and_left_as_it_is(home: Path, said: Any, text: str) 
 
 
 @pytest.mark.parametrize("before", ["a text", [1, 2]])
-def test_what_was_said_to_another_question_of_that_name_does_no_harm(said: Any, before: Any) -> None:
+def test_what_was_said_to_another_question_of_that_name_does_no_harm(
+    said: Any, before: Any
+) -> None:
     progress.append("02.c", {"said": before, "unit": "mm"})
     compare("02.c", 69.2)
     review()

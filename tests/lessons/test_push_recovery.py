@@ -1,4 +1,6 @@
-"""The push roses of the lessons: what is kept is what the physics says, and the former lesson's lies below in grey."""
+"""The push roses of the lessons: what is kept is what the physics says, and the former lesson's
+lies below in grey.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,20 @@ import pytest
 import floatbase as fb
 from floatbase import lessons
 from floatbase.errors import InputError
-from floatbase.lessons import controller_factory, draw_push_recovery, measured_push_recovery, plot_push_recovery
+from floatbase.lessons import (
+    controller_factory,
+    draw_push_recovery,
+    measured_push_recovery,
+    plot_push_recovery,
+)
 
 SECOND = "09 standing"  # a second rose of a lesson's own
-STORED = json.loads((Path(lessons.__file__).parent / "push_recovery.json").read_text(encoding="utf-8"))
-PART = 0.6  # of the kept push is survived and 1 / PART of it is not, on any processor: a fall amplifies rounding
+STORED = json.loads(
+    (Path(lessons.__file__).parent / "push_recovery.json").read_text(encoding="utf-8")
+)
+# of the kept push is survived and 1 / PART of it is not, on any processor: a fall amplifies
+# rounding
+PART = 0.6
 
 
 @pytest.mark.parametrize("lesson", sorted(STORED))
@@ -25,8 +36,14 @@ def test_what_is_kept_is_what_the_physics_says(lesson: str) -> None:
     outcomes = []
     for factor in (PART, 1 / PART):
         controller = controller_factory(lesson)()
-        push = fb.Push(factor * recovery.pushes[2] * recovery.unit_vectors[2], start=0.2, duration=recovery.duration)
-        outcomes.append(fb.rollout(fb.Simulation(controller.robot), controller, 1.8, [push]).outcome)
+        push = fb.Push(
+            factor * recovery.pushes[2] * recovery.unit_vectors[2],
+            start=0.2,
+            duration=recovery.duration,
+        )
+        outcomes.append(
+            fb.rollout(fb.Simulation(controller.robot), controller, 1.8, [push]).outcome
+        )
     assert outcomes[0] == "completed" != outcomes[1]
 
 
@@ -40,11 +57,18 @@ def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: st
     expected = [measured_push_recovery(name).pushes for name in [lesson, *former]]
     assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in draw_push_recovery(lesson)} == {"push_recovery", *["previous" for _ in former]}
+    assert {path.split("/")[0] for path in draw_push_recovery(lesson)} == {
+        "push_recovery",
+        *["previous" for _ in former],
+    }
 
 
 def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
-    assert controller_factory(SECOND)().stepping_gait is None is not controller_factory(SECOND.split()[0])().stepping_gait
+    assert (
+        controller_factory(SECOND)().stepping_gait
+        is None
+        is not controller_factory(SECOND.split()[0])().stepping_gait
+    )
     assert len(plot_push_recovery(SECOND).get_lines()) == 1
     plt.close("all")
     with pytest.raises(InputError, match="no controller to push"):
@@ -54,7 +78,10 @@ def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> Non
 @pytest.mark.parametrize("scale", [0.002, 0.003])
 def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float) -> None:
     items = draw_push_recovery("06", scale)
-    apart = items["push_recovery/label 200 N"].matrix[:2, 3] - items["push_recovery/label 100 N"].matrix[:2, 3]
+    apart = (
+        items["push_recovery/label 200 N"].matrix[:2, 3]
+        - items["push_recovery/label 100 N"].matrix[:2, 3]
+    )
     assert np.isclose(np.linalg.norm(apart), 100.0 * scale)
 
 

@@ -19,13 +19,26 @@ NONE = np.zeros((0, 2)), np.zeros(0)
 
 def qp_of(H: Any, g: Any, G: Any, h: Any, names: Any = ()) -> QP:
     """A QP of two variables without equalities."""
-    return QP(np.asarray(H), np.asarray(g), *NONE, np.reshape(G, (-1, 2)), np.asarray(h), inequality_names=names)
+    return QP(
+        np.asarray(H),
+        np.asarray(g),
+        *NONE,
+        np.reshape(G, (-1, 2)),
+        np.asarray(h),
+        inequality_names=names,
+    )
 
 
 def random_qp(seed: int) -> QP:
     rng = np.random.default_rng(seed)
     rows = int(rng.integers(1, 7))
-    return QP(np.eye(2), rng.normal(size=2), *NONE, rng.normal(size=(rows, 2)), rng.uniform(-0.3, 2.0, rows))
+    return QP(
+        np.eye(2),
+        rng.normal(size=2),
+        *NONE,
+        rng.normal(size=(rows, 2)),
+        rng.uniform(-0.3, 2.0, rows),
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -42,7 +55,10 @@ def test_the_grey_region_is_what_the_rows_leave_of_the_box(seed: int) -> None:
 
 
 def test_rows_that_leave_nothing_leave_no_corner() -> None:
-    assert len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX)) == 0
+    assert (
+        len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX))
+        == 0
+    )
 
 
 def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick() -> None:
@@ -61,7 +77,11 @@ def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick(
 
 def test_level_curves_are_curves_of_one_objective() -> None:
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
-    for qp in (qp_of(H, [1.0, -0.5], [], []), table_top(), qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], [])):
+    for qp in (
+        qp_of(H, [1.0, -0.5], [], []),
+        table_top(),
+        qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], []),
+    ):
         axis: Any = qp_plots.plot(qp, BOX)
         curves = [path for path in axis.collections[0].get_paths() if len(path.vertices)]
         spread = [np.ptp([qp.objective(point) for point in path.vertices]) for path in curves]
@@ -73,8 +93,17 @@ def test_level_curves_are_curves_of_one_objective() -> None:
 
 def test_problems_that_do_not_lie_in_the_plane_are_refused() -> None:
     with raises(InputError, "QP", 3):
-        qp_plots.plot(QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0)))
+        qp_plots.plot(
+            QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
+        )
     with raises(InputError, "QP", 2, 1):
         qp_plots.plot(QP(np.eye(2), np.zeros(2), np.eye(1, 2), np.zeros(1), *NONE))
-    refused(lambda: qp_plots.plot(table_top(), working_set=["tabel"]), UnknownNameError, "tabel", "table")
-    refused(lambda: qp_plots.plot(table_top(), (1.0, -1.0, 0.0, 2.0)), InputError, "box", 1, -1, 0, 2)
+    refused(
+        lambda: qp_plots.plot(table_top(), working_set=["tabel"]),
+        UnknownNameError,
+        "tabel",
+        "table",
+    )
+    refused(
+        lambda: qp_plots.plot(table_top(), (1.0, -1.0, 0.0, 2.0)), InputError, "box", 1, -1, 0, 2
+    )

@@ -1,4 +1,6 @@
-"""Numbers as text: two significant digits, zero below a floor, and nothing that the last bits decide."""
+"""Numbers as text: two significant digits, zero below a floor, and nothing that the last bits
+decide.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,21 @@ from floatbase.errors import InputError
 from floatbase.lessons import rounded
 
 LAST_BITS = 1e-7  # relative: far more than what processors differ by in a lesson's numbers
-HALF_A_STEP = 0.05  # relative: the second of two digits is off by a half at most, and the first is 1 at least
+HALF_A_STEP = (
+    0.05  # relative: the second of two digits is off by a half at most, and the first is 1 at least
+)
 SECOND_ROUNDING = 1e-5  # relative: what the first rounding, to six digits, adds
 
 
 @pytest.mark.parametrize(
     ("number", "text"),
     [
-        (69.2, "69"), (157.8, "160"), (0.578, "0.58"), (1.0, "1"), (2.04, "2"), (9.96, "10"), (-99.6, "-100"), (5, "5"),
-        (np.float32(0.1), "0.1"), (np.int64(7), "7"), (0.00012, "0.00012"), (3e-5, "3e-5"), (123456, "120000"),
-        (1.6e7, "1.6e7"), (-1.25e6, "-1.3e6"), (1e-7, "0"), (-1e-9, "0"), (-0.0, "0"), (np.nan, "not a number"),
+        (69.2, "69"), (157.8, "160"), (0.578, "0.58"), (1.0, "1"), (2.04, "2"), (9.96, "10"),
+        (-99.6, "-100"), (5, "5"),
+        (np.float32(0.1), "0.1"), (np.int64(7), "7"), (0.00012, "0.00012"), (3e-5, "3e-5"),
+        (123456, "120000"),
+        (1.6e7, "1.6e7"), (-1.25e6, "-1.3e6"), (1e-7, "0"), (-1e-9, "0"), (-0.0, "0"),
+        (np.nan, "not a number"),
         (np.inf, "infinite"), (-np.inf, "minus infinite"), (np.array(3.0), "3"),
     ],
 )  # fmt: skip
@@ -31,7 +38,11 @@ def test_a_number_has_two_digits_and_no_minus_zero(number: Any, text: str) -> No
 
 
 def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
-    assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == ("69 mm", "30°", "not a number")
+    assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == (
+        "69 mm",
+        "30°",
+        "not a number",
+    )
     assert (rounded(157.76, "N", digits=4), rounded(157.76, "N", digits=1)) == ("157.8 N", "200 N")
     assert (rounded(3e-14, floor=0.0), rounded(0.04, "N", floor=0.05)) == ("3e-14", "0 N")
 
@@ -39,11 +50,15 @@ def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
 @pytest.mark.parametrize(
     ("numbers", "text"),
     [
-        ([0.1, 1e-12, -2], "(0.1, 0, -2)"), (np.array([43.4, 0.123, -0.0]), "(43, 0.12, 0)"), ([], "()"), ([3], "(3)"),
-        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"), ([np.nan, 1.0], "(not a number, 1)"),
+        ([0.1, 1e-12, -2], "(0.1, 0, -2)"), (np.array([43.4, 0.123, -0.0]), "(43, 0.12, 0)"),
+        ([], "()"), ([3], "(3)"),
+        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"), ([np.nan, 1.0], "(not a number, "
+                                                                                   "1)"),
     ],
 )  # fmt: skip
-def test_an_array_is_written_entry_by_entry_and_what_rounding_left_in_it_is_zero(numbers: Any, text: str) -> None:
+def test_an_array_is_written_entry_by_entry_and_what_rounding_left_in_it_is_zero(
+    numbers: Any, text: str
+) -> None:
     assert rounded(numbers) == text
 
 

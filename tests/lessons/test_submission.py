@@ -1,4 +1,6 @@
-"""Handing in: answers come back as they were given, are judged again, and no file runs code or ends a judgement."""
+"""Handing in: answers come back as they were given, are judged again, and no file runs code or ends
+a judgement.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,11 @@ def through_a_file(answer: Any) -> Any:
 
 def same(a: Any, b: Any) -> bool:
     if isinstance(a, fb.Quadratic):
-        return isinstance(b, fb.Quadratic) and bool(np.array_equal(a.H, b.H) and np.array_equal(a.g, b.g)) and a.c == b.c
+        return (
+            isinstance(b, fb.Quadratic)
+            and bool(np.array_equal(a.H, b.H) and np.array_equal(a.g, b.g))
+            and a.c == b.c
+        )
     if isinstance(a, tuple):
         return isinstance(b, tuple) and all(same(*pair) for pair in zip(a, b, strict=True))
     return bool(np.array_equal(a, b))
@@ -54,7 +60,9 @@ def test_odd_answers_are_kept_in_some_form_too() -> None:
         json.dumps(progress.as_json(odd))
 
 
-def test_a_file_is_judged_again_and_its_claims_do_not_count(learner: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_is_judged_again_and_its_claims_do_not_count(
+    learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for answer in (3.0, LIFTED, 4.0):
         check("00.1", answer)
     check("03.1", 5)
@@ -63,13 +71,19 @@ def test_a_file_is_judged_again_and_its_claims_do_not_count(learner: Path, capsy
     assert path.name == "answers-Ada_Lovelace.json" and "1 of" in capsys.readouterr().out
     marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
     assert (marks["00.1"].result, marks["00.1"].tries) == ("right", 3)
-    assert (marks["03.1"].result, marks["01.1"].result, grades.grade_file(path).predicted) == ("wrong", "·", 1)
+    assert (marks["03.1"].result, marks["01.1"].result, grades.grade_file(path).predicted) == (
+        "wrong",
+        "·",
+        1,
+    )
 
     claimed = json.loads(path.read_text())
     claimed["exercises"]["00.1"]["answer"] = 7.0
     claimed["exercises"]["01.1"] = {"tries": 1, "right": 1, "answer": [0.0, 0.0, 0.0]}
     path.write_text(json.dumps(claimed))
-    assert {mark.result for mark in grades.grade_file(path).results if mark.exercise in ("00.1", "01.1")} == {"wrong"}
+    assert {
+        mark.result for mark in grades.grade_file(path).results if mark.exercise in ("00.1", "01.1")
+    } == {"wrong"}
 
 
 def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_again(
@@ -97,11 +111,14 @@ def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
     out = grades.code_to_read([grades.grade_file(path)])
     assert len(ran) == before > 0
     assert "    def row_to_drop" in out and "--- Ada, C.3" in out
-    assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == ["--- Ada, C.3"]
+    assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == [
+        "--- Ada, C.3"
+    ]
 
 
 HOSTILE = (
-    {"tuple": 3}, {"H": [[1.0]], "g": "a", "c": None}, {"tuple": [[[1.0], [1.0, 2.0]]]}, {"code": 5}, {}, [[[[]]]],
+    {"tuple": 3}, {"H": [[1.0]], "g": "a", "c": None}, {"tuple": [[[1.0], [1.0, 2.0]]]},
+    {"code": 5}, {}, [[[[]]]],
     "a" * 10_000, {"other": "object"}, None, True, 1e400, [float("nan")] * 12, {"__import__": "os"},
 )  # fmt: skip
 
@@ -111,13 +128,23 @@ def test_an_answer_of_any_form_is_judged_without_an_error(learner: Path, kept: A
     entry = {"tries": 1, "right": 1, "answer": kept}
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
-    path.write_text(json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}}))
+    path.write_text(
+        json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}})
+    )
     handed_in = grades.grade_file(path)
     assert {mark.result for mark in handed_in.results} == {"wrong"}
     assert handed_in.name.isprintable()
 
 
-NO_FILE = ("", "null", "[]", "{", '{"form": 5}', "[" * 100_000, '{"form": "answers to the floatbase course", "name": 5}')
+NO_FILE = (
+    "",
+    "null",
+    "[]",
+    "{",
+    '{"form": 5}',
+    "[" * 100_000,
+    '{"form": "answers to the floatbase course", "name": 5}',
+)
 
 
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
@@ -146,9 +173,13 @@ def test_a_class_is_one_table(learner: Path) -> None:
     files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1")]
     (learner / "holiday.json").write_text("{}")
     command = [sys.executable, "-m", "floatbase.lessons.publish", "grade", "holiday.json"]
-    said = subprocess.run([*command, *files, "--table", "marks.csv"], capture_output=True, text=True, check=True)
+    said = subprocess.run(
+        [*command, *files, "--table", "marks.csv"], capture_output=True, text=True, check=True
+    )
     assert (
-        said.stdout.count("1 of ") == 3 and "Émilie du Châtelet" in said.stdout and "holiday.json is not a file" in said.stderr
+        said.stdout.count("1 of ") == 3
+        and "Émilie du Châtelet" in said.stdout
+        and "holiday.json is not a file" in said.stderr
     )
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
     assert len(rows) == 3 * len(all_exercises())
@@ -172,6 +203,8 @@ def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
     (path,) = write_solutions(learner / "solutions", [lesson])
     cells = read_notebook(path).cells
     solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
-    assert {c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata} == solutions
+    assert {
+        c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata
+    } == solutions
     explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
     assert len(cells) == len(read_notebook(lesson).cells) + explained

@@ -69,20 +69,28 @@ def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path
 
 
 def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> None:
-    question = new_code_cell('predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"})
-    claims = new_code_cell("assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}})
+    question = new_code_cell(
+        'predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"}
+    )
+    claims = new_code_cell(
+        "assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}}
+    )
     question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
     prepare_workspace(course)
     copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells
-    assert [(cell.source, cell.metadata) for cell in copied] == [(cell.source, cell.metadata) for cell in (question, claims)]
+    assert [(cell.source, cell.metadata) for cell in copied] == [
+        (cell.source, cell.metadata) for cell in (question, claims)
+    ]
     assert copied[0].outputs == []
 
     copied[0].source = 'predict("00.a", 40, unit="mm")'
     nbformat.write(new_notebook(cells=copied), course / MY_FOLDER / LESSON)
     update(course)
     prepare_workspace(course)
-    assert source(course / MY_FOLDER / LESSON) == copied[0].source  # what was predicted is the learner's writing
+    assert (
+        source(course / MY_FOLDER / LESSON) == copied[0].source
+    )  # what was predicted is the learner's writing
 
 
 def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
@@ -92,20 +100,27 @@ def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
     assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
 
 
-def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(course: Path, tmp_path: Path) -> None:
+def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
+    course: Path, tmp_path: Path
+) -> None:
     folders = [tmp_path / "homes" / name for name in ("ada", "bob")]
     (tmp_path / "homes").mkdir()
     for folder in folders:
         assert prepare_workspace(course, folder) == [f"{LESSON}: new"]
     write(folders[0] / LESSON, "first = 'my answer'")
     write(course / LESSON, "first = 2")
-    assert prepare_workspace(course, folders[0]) == [f"{LESSON}: yours is kept; the course's new text is in {NEW}"]
+    assert prepare_workspace(course, folders[0]) == [
+        f"{LESSON}: yours is kept; the course's new text is in {NEW}"
+    ]
     assert prepare_workspace(course, folders[1]) == [f"{LESSON}: updated"]
     assert not (course / MY_FOLDER).exists()
 
 
 def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"there are no lessons in .*notebooks\. Install floatbase from its repository"):
+    with pytest.raises(
+        InputError,
+        match=r"there are no lessons in .*notebooks\. Install floatbase from its repository",
+    ):
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
 
@@ -125,7 +140,9 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
         update(mine.parent, n)
         if forget:
             (mine / ".from.json").unlink()
-        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare_workspace(mine.parent)
+        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare_workspace(
+            mine.parent
+        )
         assert source(mine / name) == f"first = {n}"
         write(mine / name, f"first = 'an hour of work in {name}'")
         (mine / "page.md").write_text("my notes")
@@ -137,7 +154,9 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_once_removed(mine: Path) -> None:
+def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_once_removed(
+    mine: Path,
+) -> None:
     write(mine / LESSON, "first = 'my answer'")
     for n in (2, 3):
         update(mine.parent, n)
@@ -150,20 +169,37 @@ def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_on
 
 
 CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
-    "an attached picture": (True, lambda book: book.cells[0].update(attachments={"a.png": {"image/png": "AAAA"}})),
+    "an attached picture": (
+        True,
+        lambda book: book.cells[0].update(attachments={"a.png": {"image/png": "AAAA"}}),
+    ),
     "a tag": (True, lambda book: book.cells[0].metadata.update(tags=["mine"])),
     "a title": (True, lambda book: book.metadata.update(title="mine")),
     "a cell": (True, lambda book: book.cells.append(new_code_cell("mine"))),
     "another kind of cell": (True, lambda book: book.cells[0].update(cell_type="raw")),
     "an empty cell, as after Shift+Enter": (False, lambda book: book.cells.append(new_code_cell())),
-    "a run": (False, lambda book: book.cells[0].update(execution_count=3, outputs=[new_output("stream", text="1")])),
+    "a run": (
+        False,
+        lambda book: book.cells[0].update(
+            execution_count=3, outputs=[new_output("stream", text="1")]
+        ),
+    ),
     "times and looks": (
         False,
         lambda book: book.cells[0].metadata.update(
-            execution={"iopub.status.busy": "now"}, collapsed=True, scrolled=True, trusted=True, jupyter={"source_hidden": True}
+            execution={"iopub.status.busy": "now"},
+            collapsed=True,
+            scrolled=True,
+            trusted=True,
+            jupyter={"source_hidden": True},
         ),
     ),
-    "a kernel": (False, lambda book: book.metadata.update(kernelspec={"name": "p", "display_name": "P"}, widgets={"a": 1})),
+    "a kernel": (
+        False,
+        lambda book: book.metadata.update(
+            kernelspec={"name": "p", "display_name": "P"}, widgets={"a": 1}
+        ),
+    ),
 }
 
 
@@ -202,7 +238,10 @@ def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) 
     prepare_workspace(mine.parent)
     assert (mine / LESSON).read_text() == "half a noteb"
     assert source(mine / NEW) == source(mine / "01_b.new.ipynb") == "first = 2"
-    again = f"{LESSON}: yours is empty or damaged; to get the course's again, move it away and start again"
+    again = (
+        f"{LESSON}: yours is empty or damaged; to get the course's again, move it away and "
+        f"start again"
+    )
     assert prepare_workspace(mine.parent) == [again]
     (mine / LESSON).rename(mine / "away")
     assert prepare_workspace(mine.parent) == [f"{LESSON}: new"]
@@ -219,8 +258,12 @@ def folder(path: Path) -> None:
 
 
 OBSTACLES: dict[str, Callable[[Path], object]] = {
-    "a merge conflict in the course": lambda mine: (mine.parent / LESSON).write_text("<<<<<<< HEAD\n{}"),
-    "another form of JSON in the course": lambda mine: (mine.parent / LESSON).write_text('{"cells": [5], "metadata": null}'),
+    "a merge conflict in the course": lambda mine: (mine.parent / LESSON).write_text(
+        "<<<<<<< HEAD\n{}"
+    ),
+    "another form of JSON in the course": lambda mine: (mine.parent / LESSON).write_text(
+        '{"cells": [5], "metadata": null}'
+    ),
     "a broken link in the course": lambda mine: linked(mine.parent / LESSON, mine / "nowhere"),
     "a folder": lambda mine: folder(mine / LESSON),
     "a broken link": lambda mine: linked(mine / LESSON, mine.parent / "nowhere.ipynb"),
@@ -229,12 +272,18 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(mine: Path, obstacle: str) -> None:
+def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(
+    mine: Path, obstacle: str
+) -> None:
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line or "cannot be stored" in line]
+        (told,) = [
+            line
+            for line in prepare_workspace(mine.parent)
+            if "not brought" in line or "cannot be stored" in line
+        ]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -251,13 +300,19 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
     before = {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()}
     update(mine.parent)
     prepare_workspace(mine.parent)
-    assert {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()} == before
+    assert {
+        path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()
+    } == before
     assert all((mine / name).is_symlink() for name in before)
     assert source(mine / NEW2) == "first = 2"
 
 
-@pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")])
-def test_a_folder_that_cannot_be_is_told_in_words(course: Path, make: Callable[[Path], object]) -> None:
+@pytest.mark.parametrize(
+    "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
+)
+def test_a_folder_that_cannot_be_is_told_in_words(
+    course: Path, make: Callable[[Path], object]
+) -> None:
     make(course / MY_FOLDER)
     with pytest.raises(InputError, match="it must be a folder"):
         prepare_workspace(course)
@@ -298,12 +353,16 @@ def work(course: Path, first: int, acknowledged: int) -> None:
 
 
 @pytest.mark.front_end
-def test_a_kill_at_any_moment_loses_nothing(mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kill_at_any_moment_loses_nothing(
+    mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
     write(mine / LESSON, "first = 'my answer'")
     written, (read_end, write_end) = (mine / LESSON).read_bytes(), os.pipe()
     for i, moment in enumerate(np.random.default_rng(0).uniform(0.0, 0.06, KILLS)):
-        process = multiprocessing.get_context("fork").Process(target=work, args=(mine.parent, 1_000 * i, write_end))
+        process = multiprocessing.get_context("fork").Process(
+            target=work, args=(mine.parent, 1_000 * i, write_end)
+        )
         process.start()
         process.join(moment)
         process.kill()
@@ -326,7 +385,12 @@ def test_two_at_once_are_both_right(mine: Path) -> None:
     write(mine / LESSON, "first = 'my answer'")
     for n in range(2, 12):
         update(mine.parent, n)
-        both = [multiprocessing.get_context("fork").Process(target=prepare_workspace, args=(mine.parent,)) for _ in range(2)]
+        both = [
+            multiprocessing.get_context("fork").Process(
+                target=prepare_workspace, args=(mine.parent,)
+            )
+            for _ in range(2)
+        ]
         for process in both:
             process.start()
         for process in both:
@@ -346,5 +410,13 @@ def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Pat
 
 def test_preparing_loads_no_physics_no_pictures_and_no_kernel() -> None:
     heavy = ("mujoco", "meshcat", "matplotlib", "ipywidgets", "nbformat", "nbclient", "mistune")
-    code = f"import sys, floatbase.lessons.publish.__main__; print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    code = (
+        f"import sys, floatbase.lessons.publish.__main__; print([m for m in {heavy} if m in "
+        f"sys.modules])"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        == "[]\n"
+    )

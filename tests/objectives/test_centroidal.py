@@ -1,4 +1,6 @@
-"""The centre of mass steered by forces (20)-(25), judged by momentum that MuJoCo and Pinocchio compute, and by cvxpy."""
+"""The centre of mass steered by forces (20)-(25), judged by momentum that MuJoCo and Pinocchio
+compute, and by cvxpy.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,13 @@ from floatbase.affine import Quadratic
 from floatbase.dynamics import fixed_frame
 from floatbase.errors import InputError
 
-TIGHT = {"solver": cp.CLARABEL, "tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
+TIGHT = {
+    "solver": cp.CLARABEL,
+    "tol_gap_abs": 1e-10,
+    "tol_gap_rel": 1e-10,
+    "tol_feas": 1e-10,
+    "max_iter": 200,
+}
 LEAN = judges.random_normals(4, 5)
 
 
@@ -27,7 +35,9 @@ name = judges.every_floating_robot
 
 
 def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:
-    """Linear momentum and angular momentum about the centre of mass of the whole robot in MuJoCo, world, shape (6,)."""
+    """Linear momentum and angular momentum about the centre of mass of the whole robot in MuJoCo,
+    world, shape (6,).
+    """
     judge.data.qpos[:], judge.data.qvel[:] = qpos, qvel
     mujoco.mj_fwdPosition(judge.model, judge.data)
     mujoco.mj_fwdVelocity(judge.model, judge.data)
@@ -36,18 +46,27 @@ def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:
     return np.concatenate([mass * judge.data.subtree_linvel[0], judge.data.subtree_angmom[0]])
 
 
-def mujocos_momentum_rate(state: fb.State, contacts: fb.Contacts, forces: Array, tau: Array) -> tuple[Array, Array]:
-    """d/dt of MuJoCo's momentum when forces act at the contact points and torques on the joints, no ground: differences.
+def mujocos_momentum_rate(
+    state: fb.State, contacts: fb.Contacts, forces: Array, tau: Array
+) -> tuple[Array, Array]:
+    """d/dt of MuJoCo's momentum when forces act at the contact points and torques on the joints, no
+    ground: differences.
 
     And q̈ of MuJoCo, in our coordinates.
     """
     judge = judges.Mujoco(state.robot).move_to(state)
     model, data = judge.model, judge.data
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(
+        mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    )
     owners = [contact.name for contact in contacts for _ in contact.point_names]
     data.qfrc_applied[:] = 0.0
-    for frame, point, force in zip(owners, contacts.positions(state), forces.reshape(-1, 3), strict=True):
-        mujoco.mj_applyFT(model, data, force, np.zeros(3), np.array(point), judge.body(frame), data.qfrc_applied)
+    for frame, point, force in zip(
+        owners, contacts.positions(state), forces.reshape(-1, 3), strict=True
+    ):
+        mujoco.mj_applyFT(
+            model, data, force, np.zeros(3), np.array(point), judge.body(frame), data.qfrc_applied
+        )
     for joint, torque in zip(state.robot.joint_names, tau, strict=True):
         data.qfrc_applied[model.joint(joint).dofadr[0]] += torque
     mujoco.mj_forward(model, data)
@@ -57,13 +76,16 @@ def mujocos_momentum_rate(state: fb.State, contacts: fb.Contacts, forces: Array,
         there = qpos.copy()
         mujoco.mj_integratePos(model, there, qvel, sign * dt)
         ends.append(mujocos_momentum(judge, there, qvel + sign * dt * qacc))
-    # qacc = T q̈ + Ṫ v, where the base's velocity is constant in the base frame and turns in the world: Ṫ v = R (ω × v)
+    # qacc = T q̈ + Ṫ v, where the base's velocity is constant in the base frame and turns in the
+    # world: Ṫ v = R (ω × v)
     qacc[:3] -= judges.quaternion_rotation(state.q[3:7]) @ np.cross(state.v[3:6], state.v[:3])
     return (ends[0] - ends[1]) / (2.0 * dt), np.linalg.solve(judge.T, qacc)
 
 
 def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
-    """In motion, under random forces and torques; the rate against differences of MuJoCo's momentum along MuJoCo's motion."""
+    """In motion, under random forces and torques; the rate against differences of MuJoCo's momentum
+    along MuJoCo's motion.
+    """
     rng = np.random.default_rng(2)
     for state in judges.states(name, 3):
         judge, contacts = judges.Mujoco(state.robot).move_to(state), judges.stance(state.robot)
@@ -71,13 +93,19 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
         assert judges.relative(objectives.centroidal_momentum(state), found) < 1e-9
         forces = state.robot.weight * rng.normal(size=contacts.k)
         rate, qdd = mujocos_momentum_rate(state, contacts, forces, rng.normal(size=state.robot.d))
-        assert np.allclose(objectives.centroidal_momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum())
-        still = objectives.centroidal_momentum_rate(state, np.zeros(state.robot.nv))  # q̇ carries the momentum along, too
+        assert np.allclose(
+            objectives.centroidal_momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum()
+        )
+        still = objectives.centroidal_momentum_rate(
+            state, np.zeros(state.robot.nv)
+        )  # q̇ carries the momentum along, too
         assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
 
 
 def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> None:
-    """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix without columns."""
+    """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix
+    without columns.
+    """
     rng = np.random.default_rng(0)
     points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
     wrench = dynamics.grasp_matrix(points, about) @ forces.ravel()
@@ -86,11 +114,15 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
     assert dynamics.grasp_matrix(np.zeros((0, 3)), about).shape == (6, 0)
 
 
-# (20)(21) ----------------------------------------------------------------------------------------------------------------
+# (20)(21) -----------------------------------------------------------------------------------------
 
 
-def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravity(name: str) -> None:
-    """Σ f = ṗ - m g and Σ (x_i - x_c) × f_i = L̇, in motion, joint torques or not: they are internal."""
+def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravity(
+    name: str,
+) -> None:
+    """Σ f = ṗ - m g and Σ (x_i - x_c) × f_i = L̇, in motion, joint torques or not: they are
+    internal.
+    """
     rng = np.random.default_rng(0)
     for seed, state in enumerate(judges.states(name, 2)):
         contacts = judges.stance(state.robot)
@@ -104,8 +136,12 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         assert np.allclose(wrench["moment"](forces), rate[3:], atol=1e-6 * scale)
 
 
-def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_10_would_roll_it_left() -> None:
-    """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the course text prints x_c - x_i, the other way."""
+def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_10_would_roll_it_left() -> (
+    None
+):
+    """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the course text prints x_c -
+    x_i, the other way.
+    """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
     left = contacts.positions(state)[:, 1] > 0
@@ -114,7 +150,9 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_1
     moment = objectives.net_moment_matrix(state, contacts) @ up.ravel()
     assert moment[0] > 1.0
     rate = mujocos_momentum_rate(state, contacts, up.ravel(), np.zeros(12))[0][3:]
-    footnote = sum(np.cross(state.com - x, f) for x, f in zip(contacts.positions(state), up, strict=True))
+    footnote = sum(
+        np.cross(state.com - x, f) for x, f in zip(contacts.positions(state), up, strict=True)
+    )
     assert np.allclose(moment, rate, atol=1e-5)
     assert np.allclose(footnote, -rate, atol=1e-5)
 
@@ -140,16 +178,20 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
     assert dynamics.internal_forces(eom).shape[1] == contacts.k - 6
 
 
-# (22) --------------------------------------------------------------------------------------------------------------------
+# (22) ---------------------------------------------------------------------------------------------
 
 
 def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name: str) -> None:
-    """(22) is zero at its minimum on a full stance, and forces that attain it move CoM and momentum as desired."""
+    """(22) is zero at its minimum on a full stance, and forces that attain it move CoM and momentum
+    as desired.
+    """
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         contacts = judges.stance(state.robot)
         a, spin = rng.normal(size=3), rng.normal(size=3)
-        cost = objectives.wrench_objective(state, contacts, *objectives.desired_wrench(state, a, spin))
+        cost = objectives.wrench_objective(
+            state, contacts, *objectives.desired_wrench(state, a, spin)
+        )
         forces = cost.minimiser()
         assert cost(forces) < 1e-12 * state.robot.weight**2
         rate = mujocos_momentum_rate(state, contacts, forces, np.zeros(state.robot.d))[0]
@@ -158,7 +200,9 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name:
 
 
 def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
-    """(22) adds N² and (N·m)²: counted in N·mm, a moment weighs a million times as much. solo8 cannot push sideways alone."""
+    """(22) adds N² and (N·m)²: counted in N·mm, a moment weighs a million times as much. solo8
+    cannot push sideways alone.
+    """
     state = judges.load("solo8").standing()
     contacts = fb.Contacts.points(state.robot)
     zeta = fb.forces_from_torques(fb.equations_of_motion(state, contacts))
@@ -166,7 +210,9 @@ def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
     force = force[[1, 0, 2]]  # 5 N sideways
     got = {}
     for weight in (1.0, 1e6):
-        cost = objectives.wrench_objective(state, contacts, force, moment, moment_weight=weight).pullback(zeta)
+        cost = objectives.wrench_objective(
+            state, contacts, force, moment, moment_weight=weight
+        ).pullback(zeta)
         got[weight] = objectives.com_wrench_map(state, contacts)(zeta(cost.minimiser()))
     missed = {weight: wrench - np.concatenate([force, moment]) for weight, wrench in got.items()}
     assert np.linalg.norm(missed[1.0][:3]) < 0.1 < 0.15 < np.linalg.norm(missed[1.0][3:])
@@ -193,7 +239,7 @@ def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
         assert (cost(cost.minimiser()) > 1e-3) == (feet < 3)
 
 
-# (23) --------------------------------------------------------------------------------------------------------------------
+# (23) ---------------------------------------------------------------------------------------------
 
 
 def split(f: Array, n: Array) -> tuple[float, float]:
@@ -202,7 +248,9 @@ def split(f: Array, n: Array) -> tuple[float, float]:
     return float(np.sqrt(max(0.0, f @ f - normal**2))), normal
 
 
-def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_distance_of_the_normal_force_from_a() -> None:
+def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_distance_of_the_normal_force_from_a() -> (
+    None
+):
     rng = np.random.default_rng(0)
     contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
     for _ in range(20):
@@ -212,14 +260,18 @@ def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_dis
         normal = 0.5 * sum((s - ai) ** 2 for (_, s), ai in zip(pairs, a, strict=True))
         assert objectives.tangential_bias(contacts)(lam) == pytest.approx(tangential, rel=1e-10)
         assert objectives.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
-        assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(tangential + alpha * normal, rel=1e-10)
+        assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(
+            tangential + alpha * normal, rel=1e-10
+        )
 
 
 def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() -> None:
     """(22) + w (23): what §3.1.1 is for. Without the bias six directions cost nothing."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
-    wrench = objectives.wrench_objective(state, contacts, *objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2]))
+    wrench = objectives.wrench_objective(
+        state, contacts, *objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
+    )
     assert np.linalg.matrix_rank(wrench.H) == 6
     cost = wrench + 0.1 * objectives.force_bias(contacts, 0.5, 30.0)
     assert np.linalg.eigvalsh(cost.H)[0] > 1e-3
@@ -227,29 +279,42 @@ def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() ->
     points = contacts.positions(state)
     force, moment = objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
     terms = [0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)]
-    terms.append(0.5 * cp.sum_squares(sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points)) - moment))
+    terms.append(
+        0.5
+        * cp.sum_squares(sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points)) - moment)
+    )
     for i, n in enumerate(LEAN):
-        terms.append(0.05 * cp.sum_squares(x[i] - n * (n @ x[i])) + 0.025 * cp.square(n @ x[i] - 30.0))
+        terms.append(
+            0.05 * cp.sum_squares(x[i] - n * (n @ x[i])) + 0.025 * cp.square(n @ x[i] - 30.0)
+        )
     cp.Problem(cp.Minimize(sum(terms))).solve(**TIGHT)
     assert np.allclose(cost.minimiser().reshape(4, 3), x.value, atol=1e-4)
 
 
-# (24)(25) ----------------------------------------------------------------------------------------------------------------
+# (24)(25) -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)])
-def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name: str, sign: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)]
+)
+def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(
+    name: str, sign: int
+) -> None:
     eom = judges.at_rest(name, 0)
     found = objectives.torques_from_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
-    assert found.reachable.n_in == (9 if name == "solo8" else 12)  # solo8: 8 torques and one null(Jᵀ)
+    assert found.reachable.n_in == (
+        9 if name == "solo8" else 12
+    )  # solo8: 8 torques and one null(Jᵀ)
     assert found.null_torques.shape[1] == max(eom.d - eom.k, 0)
 
 
 @pytest.mark.parametrize("seed", [None, 0, 1])
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: int | None) -> None:
-    """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what random torques give."""
+    """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what
+    random torques give.
+    """
     rng = np.random.default_rng(0)
     eom = judges.at_rest(name, seed)
     found = objectives.torques_from_forces(eom)
@@ -282,18 +347,27 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
     more = found.null_torques @ rng.normal(size=found.null_torques.shape[1])
     assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
-    assert np.allclose(found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)  # the smallest has none of them
+    assert np.allclose(
+        found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8
+    )  # the smallest has none of them
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
-def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(exponent: int) -> None:
-    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter needs hundreds of N·m and more."""
+def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(
+    exponent: int,
+) -> None:
+    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter needs hundreds of
+    N·m and more.
+    """
     standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
     desired = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
-    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(v=0.1 * rng.normal(size=14))
+    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(
+        v=0.1 * rng.normal(size=14)
+    )
     there, here = (
-        objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired) for s in (standing, near)
+        objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired)
+        for s in (standing, near)
     )
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
@@ -344,7 +418,7 @@ def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration
     assert np.linalg.norm(left) == pytest.approx(np.linalg.norm(gap.value), rel=1e-6)
 
 
-# what does not fit -------------------------------------------------------------------------------------------------------
+# what does not fit --------------------------------------------------------------------------------
 
 
 GO2 = judges.load("go2")

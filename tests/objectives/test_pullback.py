@@ -36,17 +36,26 @@ def as_quadratics(residuals: dict[str, tuple[Array, Array]]) -> dict[str, Quadra
     return {block: Quadratic.from_residual(A, r) for block, (A, r) in residuals.items()}
 
 
-def least(eom: EquationsOfMotion, residuals: dict[str, tuple[Array, Array]], fixed: dict[str, Array] | None = None) -> float:
-    """The smallest sum of ½‖A x - r‖² over all (q̈, τ, λ) with (7), some blocks held, by its optimality conditions.
+def least(
+    eom: EquationsOfMotion,
+    residuals: dict[str, tuple[Array, Array]],
+    fixed: dict[str, Array] | None = None,
+) -> float:
+    """The smallest sum of ½‖A x - r‖² over all (q̈, τ, λ) with (7), some blocks held, by its
+    optimality conditions.
 
-    Stationarity and feasibility are solved as one linear system and checked: where they hold, a convex cost has its minimum.
+    Stationarity and feasibility are solved as one linear system and checked: where they hold, a
+    convex cost has its minimum.
     """
     n, ends = sizes(eom), np.cumsum([0, *sizes(eom).values()])
     at = {block: slice(*ends[i : i + 2]) for i, block in enumerate(n)}
     H, g = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
     for block, (A, r) in residuals.items():
         H[at[block], at[block]], g[at[block]] = A.T @ A, A.T @ r
-    rows = [np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([eom.A, np.zeros((len(eom.A), eom.d + eom.k))])]
+    rows = [
+        np.hstack([eom.M, -eom.S, -eom.J.T]),
+        np.hstack([eom.A, np.zeros((len(eom.A), eom.d + eom.k))]),
+    ]
     sides = [-eom.h, eom.b]
     for block, value in (fixed or {}).items():
         rows.append(np.eye(ends[-1])[at[block]])
@@ -57,14 +66,18 @@ def least(eom: EquationsOfMotion, residuals: dict[str, tuple[Array, Array]], fix
     found = np.linalg.lstsq(kkt, right, rcond=1e-12)[0]
     assert np.max(np.abs(kkt @ found - right)) < 1e-8 * np.max(np.abs(right))
     parts = {block: found[part] for block, part in at.items()}
-    return sum(0.5 * float(np.sum((A @ parts[block] - r) ** 2)) for block, (A, r) in residuals.items())
+    return sum(
+        0.5 * float(np.sum((A @ parts[block] - r) ** 2)) for block, (A, r) in residuals.items()
+    )
 
 
-# (15)(18) ----------------------------------------------------------------------------------------------------------------
+# (15)(18) -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(name: str) -> None:
+def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(
+    name: str,
+) -> None:
     """(15) at random torques, the acceleration by one solve of the whole system."""
     rng = np.random.default_rng(0)
     for seed in (None, 0):
@@ -74,7 +87,9 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
         for _ in range(5):
             tau = rng.normal(size=eom.d)
             kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-            qdd = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[0][: eom.nv]
+            qdd = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[
+                0
+            ][: eom.nv]
             assert seen(tau) == pytest.approx(cost(qdd), rel=1e-7)
 
 
@@ -88,7 +103,9 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("feet", [1, 4])
-def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(name: str, feet: int) -> None:
+def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(
+    name: str, feet: int
+) -> None:
     """(18): q̈, τ and λ weighed at once."""
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
@@ -96,9 +113,9 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
     seen = objectives.cost_on_space(space, **as_quadratics(residuals))
     beta = seen.minimiser()
     assert seen(beta) == pytest.approx(least(eom, residuals), rel=1e-6)
-    assert sum(Quadratic.from_residual(*residuals[b])(x) for b, x in zip(BLOCKS, space(beta), strict=True)) == pytest.approx(
-        seen(beta), rel=1e-9
-    )
+    assert sum(
+        Quadratic.from_residual(*residuals[b])(x) for b, x in zip(BLOCKS, space(beta), strict=True)
+    ) == pytest.approx(seen(beta), rel=1e-9)
 
 
 def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
@@ -108,7 +125,9 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
     values = {b: objectives.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
     for block, x in zip(BLOCKS, space(beta), strict=True):
         assert values[block] == pytest.approx(parts[block](x), rel=1e-10)
-    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(sum(values.values()), rel=1e-10)
+    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(
+        sum(values.values()), rel=1e-10
+    )
     assert objectives.cost_on_space(space)(beta) == 0.0
 
 
@@ -120,22 +139,31 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
     seen = Quadratic.from_residual(A, r).pullback(space.map)
     beta = rng.normal(size=space.dimension)
-    assert seen(beta) == pytest.approx(0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10)
+    assert seen(beta) == pytest.approx(
+        0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10
+    )
 
 
-# (19) --------------------------------------------------------------------------------------------------------------------
+# (19) ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("block", BLOCKS)
 @pytest.mark.parametrize("feet", [1, 2, 4])
-def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: str, block: str, feet: int) -> None:
-    """Every block, against the minimum with that block held and everything else free; the literal reading is never below it."""
+def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
+    name: str, block: str, feet: int
+) -> None:
+    """Every block, against the minimum with that block held and everything else free; the literal
+    reading is never below it.
+    """
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     cost = objectives.cost_on_space(space, **as_quadratics(residuals))
-    best, smallest = (f(cost, space, block) for f in (objectives.partial_minimum, objectives.minimum_norm_pullback))
+    best, smallest = (
+        f(cost, space, block)
+        for f in (objectives.partial_minimum, objectives.minimum_norm_pullback)
+    )
     rng = np.random.default_rng(0)
     for seed in range(2):
         x = space.map[block](3.0 * rng.normal(size=space.dimension))
@@ -147,14 +175,21 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name: 
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(name: str) -> None:
-    """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs visibly more."""
+def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(
+    name: str,
+) -> None:
+    """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs
+    visibly more.
+    """
     for feet, agree in ((1, True), (4, False)):
         eom = judges.at_rest(name, 0, feet)
         space, found = dynamics.feasible_space(eom), dynamics.dimensions(eom)
         assert (found.rank_V_qdd == found.null_B) == agree
         cost = objectives.cost_on_space(space, **as_quadratics(costs(eom)))
-        best, smallest = (f(cost, space, "qdd") for f in (objectives.partial_minimum, objectives.minimum_norm_pullback))
+        best, smallest = (
+            f(cost, space, "qdd")
+            for f in (objectives.partial_minimum, objectives.minimum_norm_pullback)
+        )
         rng = np.random.default_rng(0)
         for _ in range(4):
             x = space.qdd(rng.normal(size=space.dimension))
@@ -162,7 +197,9 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
 
 
 def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
-    """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the best β squeezes out."""
+    """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the
+    best β squeezes out.
+    """
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
@@ -172,16 +209,23 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
         forces=Quadratic.from_residual(sideways, np.zeros(12)),
     )
     still = np.zeros(18)
-    smallest, best = (f(cost, space, "qdd")(still) for f in (objectives.minimum_norm_pullback, objectives.partial_minimum))
+    smallest, best = (
+        f(cost, space, "qdd")(still)
+        for f in (objectives.minimum_norm_pullback, objectives.partial_minimum)
+    )
     expected = least(
-        eom, {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))}, {"qdd": still}
+        eom,
+        {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))},
+        {"qdd": still},
     )
     assert best == pytest.approx(expected, rel=1e-6)
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
 
 def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
-    """go2 bolted with its feet on the ground: V_q̈ = 0 but for rounding, so q̈ must not be turned into β by 1 / rounding."""
+    """go2 bolted with its feet on the ground: V_q̈ = 0 but for rounding, so q̈ must not be turned
+    into β by 1 / rounding.
+    """
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
     eom = fb.equations_of_motion(robot.standing(), contacts)
@@ -190,7 +234,9 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
     assert np.max(np.abs(objectives.minimum_norm_coordinates(space, "qdd").A)) < 1e6
     cost = objectives.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
     least = cost(cost.minimiser())  # q̈ leaves everything free
-    assert objectives.partial_minimum(cost, space, "qdd")(np.zeros(18)) == pytest.approx(least, abs=1e-6)
+    assert objectives.partial_minimum(cost, space, "qdd")(np.zeros(18)) == pytest.approx(
+        least, abs=1e-6
+    )
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
@@ -206,7 +252,9 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
 
 
 def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
-    """Negative curvature has no minimum either: the stationary point there is the worst, not the best."""
+    """Negative curvature has no minimum either: the stationary point there is the worst, not the
+    best.
+    """
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
@@ -224,9 +272,11 @@ def test_directions_that_cost_nothing_are_left_alone() -> None:
 
 
 def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
-    """A force cost of 1e-10 beside a torque cost of 1 still decides where the torque cost is silent.
+    """A force cost of 1e-10 beside a torque cost of 1 still decides where the torque cost is
+    silent.
 
-    solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small weight.
+    solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small
+    weight.
     """
     eom = judges.at_rest("solo8")
     space = dynamics.feasible_space(eom)

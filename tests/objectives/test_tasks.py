@@ -14,7 +14,8 @@ from floatbase.dynamics import EquationsOfMotion
 
 N = 5
 STILL = 1e-3  # rad/s or m/s: two seconds and a half after a target 30 mm away was set; it is 2e-5
-DRIFT = 0.01  # rad: gravity against a posture of small weight leaves half of it, on the arm of anymal_kinova
+# rad: gravity against a posture of small weight leaves half of it, on the arm of anymal_kinova
+DRIFT = 0.01
 
 
 name = judges.every_robot
@@ -51,22 +52,33 @@ def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name: str) 
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(name: str) -> None:
+def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(
+    name: str,
+) -> None:
     for eom, qdd, rng in cases(name):
         frame = eom.robot.frames[-1]
         R = eom.state.frame_pose(frame).rotation
         error, velocity, feed = 0.5 * rng.normal(size=(3, 3))
         # R R_dᵀ = exp(error): the frame is ahead of its target by `error`, about axes of the world
-        task = fb.OrientationTask(frame, judges.rotation(-error) @ R, velocity, feed, kp=7.0, kd=3.0)
-        actual = judges.turning_acceleration_of(lambda s, f=frame: s.frame_pose(f).rotation, eom.state, qdd)
+        task = fb.OrientationTask(
+            frame, judges.rotation(-error) @ R, velocity, feed, kp=7.0, kd=3.0
+        )
+        actual = judges.turning_acceleration_of(
+            lambda s, f=frame: s.frame_pose(f).rotation, eom.state, qdd
+        )
         step = 1e-5
-        ahead, behind = (judges.along(eom.state, eom.state.v, t).frame_pose(frame).rotation for t in (step, -step))
+        ahead, behind = (
+            judges.along(eom.state, eom.state.v, t).frame_pose(frame).rotation
+            for t in (step, -step)
+        )
         moving = judges.turn_between(ahead, behind) / (2.0 * step)
         desired = feed - 7.0 * error - 3.0 * (moving - velocity)
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=5e-5)
 
 
-def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(name: str) -> None:
+def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(
+    name: str,
+) -> None:
     for eom, qdd, rng in cases(name):
         robot, state = eom.robot, eom.state
         target = robot.random_state(int(rng.integers(1000)), 0.2)
@@ -106,7 +118,11 @@ def test_targets_may_be_functions_of_time() -> None:
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     p, v, a = [2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0]
-    R, q, w = judges.rotation([0.0, 0.0, 0.3]), state.integrate(np.full(18, 0.1)), np.linspace(-1.0, 1.0, 12)
+    R, q, w = (
+        judges.rotation([0.0, 0.0, 0.3]),
+        state.integrate(np.full(18, 0.1)),
+        np.linspace(-1.0, 1.0, 12),
+    )
     kinds = [
         (partial(fb.CoMTask, kp=4.0), (p, v, a)),
         (partial(fb.FrameTask, "FL_foot"), (p, v, a)),
@@ -126,14 +142,20 @@ def test_targets_may_be_functions_of_time() -> None:
 
 
 def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> None:
-    """A critically damped task lags behind a slow target by (kd / kp) times its velocity, unless it is given that too."""
+    """A critically damped task lags behind a slow target by (kd / kp) times its velocity, unless it
+    is given that too.
+    """
     robot, amplitude, rate = judges.load("go2"), 0.01, 2.0  # m, rad/s
     state, asked = robot.standing(), []
 
     def path(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         asked.append(t)
         side = np.array([0.0, amplitude, 0.0])
-        return state.com + side * np.sin(rate * t), side * rate * np.cos(rate * t), -side * rate**2 * np.sin(rate * t)
+        return (
+            state.com + side * np.sin(rate * t),
+            side * rate * np.cos(rate * t),
+            -side * rate**2 * np.sin(rate * t),
+        )
 
     def error(position: Callable[[float], Any]) -> float:
         tasks = [fb.CoMTask(position, weight=1e3), *fb.standing_tasks(state)[1:]]
@@ -151,7 +173,9 @@ def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> 
 
 
 def test_damping_is_critical_unless_it_is_given() -> None:
-    """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp: the fastest return without overshoot."""
+    """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp: the fastest return without
+    overshoot.
+    """
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     for make in (
@@ -188,18 +212,37 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
         tasks = [fb.CoMTask(target), *fb.standing_tasks(standing)[1:]]
         controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
         run = fb.rollout(fb.Simulation(robot), controller, 2.5, control_period=2e-3)
-        left, speed = 1e3 * float(np.linalg.norm(target - run.com[-1])), float(np.abs(run.final.v).max())
-        wrong += [] if left < 1.0 and speed < STILL else [f"{name}: {left:.2f} mm short, {speed:.1e} rad/s or m/s"]
+        left, speed = (
+            1e3 * float(np.linalg.norm(target - run.com[-1])),
+            float(np.abs(run.final.v).max()),
+        )
+        wrong += (
+            []
+            if left < 1.0 and speed < STILL
+            else [f"{name}: {left:.2f} mm short, {speed:.1e} rad/s or m/s"]
+        )
     assert wrong == []
 
 
 def test_standing_tasks_keep_the_arms_where_they_were() -> None:
-    """Without contacts that need them, nothing but posture holds these joints; gravity and a push want them elsewhere."""
+    """Without contacts that need them, nothing but posture holds these joints; gravity and a push
+    want them elsewhere.
+    """
     for name, part in (("anymal_kinova", "j2s6s200"), ("talos", "arm"), ("ur5", "")):
         robot = judges.load(name)
         standing = robot.standing()
-        arms = [robot.nv - robot.d + i for i, joint in enumerate(robot.joint_names) if joint.startswith(part)]
+        arms = [
+            robot.nv - robot.d + i
+            for i, joint in enumerate(robot.joint_names)
+            if joint.startswith(part)
+        ]
         assert arms
-        pushes = [fb.Push([0.0, 0.15 * robot.weight, 0.0], start=0.2, duration=0.1)] if robot.is_floating else []
-        run = fb.rollout(fb.Simulation(robot), judges.controller_of(name), 3.0, pushes, control_period=2e-3)
+        pushes = (
+            [fb.Push([0.0, 0.15 * robot.weight, 0.0], start=0.2, duration=0.1)]
+            if robot.is_floating
+            else []
+        )
+        run = fb.rollout(
+            fb.Simulation(robot), judges.controller_of(name), 3.0, pushes, control_period=2e-3
+        )
         assert np.abs(run.final.difference(standing.q)[arms]).max() < DRIFT, name

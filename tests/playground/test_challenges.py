@@ -1,4 +1,6 @@
-"""Each challenge has a solution, is not solved by waiting, and has a judge that sees what may not be changed."""
+"""Each challenge has a solution, is not solved by waiting, and has a judge that sees what may not
+be changed.
+"""
 
 from __future__ import annotations
 
@@ -28,16 +30,24 @@ def change(**changes: object) -> Act:
 
 def push(force: float, towards: float) -> Act:
     angle = np.deg2rad(towards)
-    return lambda session: fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), session.sim.time)
+    return lambda session: fb.Push(
+        force * np.array([np.cos(angle), np.sin(angle), 0.0]), session.sim.time
+    )
 
 
 SOLUTIONS: dict[str, list[tuple[float, Act]]] = {
-    "Stand on two feet": [(0.0, change(com_shift=(-0.02, 0.0, 0.0))), (0.5, change(lifted_feet=("FR_foot", "RL_foot")))],
+    "Stand on two feet": [
+        (0.0, change(com_shift=(-0.02, 0.0, 0.0))),
+        (0.5, change(lifted_feet=("FR_foot", "RL_foot"))),
+    ],
     "Survive 300 N": [(0.0, change(steps_when_pushed=True)), (0.3, push(300.0, 90.0))],
     "Down an icy slope": [(0.0, change(slope=(20.0, 20.0), friction=(0.2, 0.2)))],
     "On an edge": [(0.0, change(friction=(0.1, 0.7))), (0.5, push(60.0, 45.0))],
     "No answer": [(0.2, change(torque_fraction=0.1, min_normal_force=60.0))],
-    "Quick foot": [(0.0, change(com_shift=(-0.05, -0.03, 0.0))), (1.0, change(lifted_feet=("FL_foot",)))],
+    "Quick foot": [
+        (0.0, change(com_shift=(-0.05, -0.03, 0.0))),
+        (1.0, change(lifted_feet=("FL_foot",))),
+    ],
     "Feet that travel": [(0.0, change(nod=0.3))],
     "On ice": [(0.0, change(friction=(0.05, 0.05))), (0.5, push(10.0, 0.0))],
     "How many facets?": [(0.0, change(facets=13))],
@@ -57,18 +67,28 @@ def play(challenge: Challenge, script: list[tuple[float, Act]], seconds: float =
         acting = [p for p in pushes if session.sim.time < p.start + p.duration]
         duration = max(1, round(SLICE / PERIOD)) * PERIOD
         record = fb.rollout(
-            session.sim, session.controller, duration, acting, control_period=PERIOD, actuators=session.actuators
+            session.sim,
+            session.controller,
+            duration,
+            acting,
+            control_period=PERIOD,
+            actuators=session.actuators,
         )
         session.observe(record)
         judge.observe(record, session)
         if record.outcome != "completed":
-            judge.run_ended(record.outcome if record.error is None else f"{record.outcome}: {record.error}", session)
+            judge.run_ended(
+                record.outcome if record.error is None else f"{record.outcome}: {record.error}",
+                session,
+            )
             break
     return judge
 
 
 def test_there_are_ten() -> None:
-    assert [challenge.title for challenge in CHALLENGES] == list(SOLUTIONS) and len(CHALLENGES) == 10
+    assert [challenge.title for challenge in CHALLENGES] == list(SOLUTIONS) and len(
+        CHALLENGES
+    ) == 10
 
 
 @pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
@@ -83,7 +103,11 @@ def test_nobody_wins_by_waiting(challenge: Challenge) -> None:
     assert not judge.won and judge.message
 
 
-@pytest.mark.parametrize("challenge", [challenge for challenge in CHALLENGES if "mass" in challenge.locked], ids=lambda challenge: challenge.title)
+@pytest.mark.parametrize(
+    "challenge",
+    [challenge for challenge in CHALLENGES if "mass" in challenge.locked],
+    ids=lambda challenge: challenge.title,
+)
 def test_what_may_not_be_changed_is_seen(challenge: Challenge) -> None:
     judge = play(challenge, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[challenge.title]], 2.0)
     assert not judge.won and "mass" in judge.message
@@ -112,10 +136,19 @@ CHEATS = {
     "on grippy ground": ("On ice", [(0.0, change(friction=(0.7, 1.0))), (0.5, push(10.0, 0.0))]),
     "on level ground": (
         "Down an icy slope",
-        [(0.0, change(slope=(0.0, 0.0), friction=(0.7, 1.0))), (0.1, change(gait="trot", velocity=(0.4, 0.0, 0.0)))],
+        [
+            (0.0, change(slope=(0.0, 0.0), friction=(0.7, 1.0))),
+            (0.1, change(gait="trot", velocity=(0.4, 0.0, 0.0))),
+        ],
     ),
-    "pushed three times": ("The weakest side", [(0.3, push(215.0, 0.0)), (0.45, push(150.0, 0.0)), (0.6, push(150.0, 0.0))]),
-    "on weak motors": ("The weakest side", [(0.0, change(torque_fraction=0.5)), (0.3, push(190.0, 90.0))]),
+    "pushed three times": (
+        "The weakest side",
+        [(0.3, push(215.0, 0.0)), (0.45, push(150.0, 0.0)), (0.6, push(150.0, 0.0))],
+    ),
+    "on weak motors": (
+        "The weakest side",
+        [(0.0, change(torque_fraction=0.5)), (0.3, push(190.0, 90.0))],
+    ),
     "past the number": ("How many facets?", [(0.1 * i, change(facets=3 + i)) for i in range(14)]),
     "without weight for a while": (
         "Stand on two feet",
@@ -131,19 +164,28 @@ CHEATS = {
 @pytest.mark.parametrize("how", CHEATS)
 def test_nobody_wins_by_a_trick(how: str) -> None:
     title, script = CHEATS[how]
-    judge = play(next(challenge for challenge in CHALLENGES if challenge.title == title), script, 7.0)
+    judge = play(
+        next(challenge for challenge in CHALLENGES if challenge.title == title), script, 7.0
+    )
     assert not judge.won, judge.message
 
 
 @pytest.mark.parametrize("title", [challenge.title for challenge in CHALLENGES])
 def test_a_judge_watches_a_robot_whose_stance_changes(title: str) -> None:
     lift, lower = change(lifted_feet=("FL_foot",)), change(lifted_feet=())
-    judge = play(next(challenge for challenge in CHALLENGES if challenge.title == title), [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)], 0.9)
+    judge = play(
+        next(challenge for challenge in CHALLENGES if challenge.title == title),
+        [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)],
+        0.9,
+    )
     assert judge.message
 
 
 def test_a_push_of_300_n_counts_in_every_direction() -> None:
-    judge, session = next(challenge for challenge in CHALLENGES if challenge.title == "Survive 300 N").judge(), Session(GO2)
+    judge, session = (
+        next(challenge for challenge in CHALLENGES if challenge.title == "Survive 300 N").judge(),
+        Session(GO2),
+    )
     record = fb.rollout(session.sim, session.controller, 0.008, control_period=4e-3)
     for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
         judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
@@ -153,4 +195,6 @@ def test_a_push_of_300_n_counts_in_every_direction() -> None:
 
 def test_a_start_is_a_setting_that_the_card_itself_allows() -> None:
     for challenge in CHALLENGES:
-        assert isinstance(challenge.start, Settings) and all(hasattr(challenge.start, name) for name in challenge.locked)
+        assert isinstance(challenge.start, Settings) and all(
+            hasattr(challenge.start, name) for name in challenge.locked
+        )

@@ -11,15 +11,28 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.playground import BaseMotors, Playground, Session, Settings, nodding_rotation, term_arrows
+from floatbase.playground import (
+    BaseMotors,
+    Playground,
+    Session,
+    Settings,
+    nodding_rotation,
+    term_arrows,
+)
 
 GO2 = judges.load("go2")
 EACH = {
     "as it begins": Settings(),
-    "believed otherwise": Settings(friction=(0.5, 0.9), slope=(8.0, 10.0), mass=(1.2, 1.0), bandwidth=(8.0, 12.0)),
-    "another world": Settings(mass=(1.0, 1.2), actual_off=("velocity", "cones"), friction=(0.6, 0.4)),
+    "believed otherwise": Settings(
+        friction=(0.5, 0.9), slope=(8.0, 10.0), mass=(1.2, 1.0), bandwidth=(8.0, 12.0)
+    ),
+    "another world": Settings(
+        mass=(1.0, 1.2), actual_off=("velocity", "cones"), friction=(0.6, 0.4)
+    ),
     "another stance": Settings(com_shift=(-0.05, -0.03, -0.01), lifted_feet=("FL_foot",), facets=6),
-    "another program": Settings(weights=(2.0, 10.0, 0.1), torque_fraction=0.8, min_normal_force=5.0),
+    "another program": Settings(
+        weights=(2.0, 10.0, 0.1), torque_fraction=0.8, min_normal_force=5.0
+    ),
     "it nods": Settings(nod=0.2),
     "it trots": Settings(gait="trot", velocity=(0.2, 0.05, 0.1), friction=(0.6, 0.8)),
     "it steps": Settings(steps_when_pushed=True),
@@ -40,33 +53,55 @@ def run_of(code: str) -> fb.Rollout:
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_the_program_runs_and_makes_the_same_robot(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_program_runs_and_makes_the_same_robot(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     settings, period = EACH[name], 4e-3
     session = Session(GO2, settings)
     push = fb.Push([20.0, -10.0, 0.0], 0.5)
-    here = fb.rollout(session.sim, session.controller, SECONDS, [push], control_period=period, actuators=session.actuators)
+    here = fb.rollout(
+        session.sim,
+        session.controller,
+        SECONDS,
+        [push],
+        control_period=period,
+        actuators=session.actuators,
+    )
     program = settings.code(GO2, period, push)
     assert ", controller, 3, [" in program
     there = run_of(program.replace(", controller, 3, [", f", controller, {SECONDS}, ["))
-    assert here.outcome == there.outcome and np.array_equal(here.q, there.q) and np.array_equal(here.planned, there.planned)
+    assert (
+        here.outcome == there.outcome
+        and np.array_equal(here.q, there.q)
+        and np.array_equal(here.planned, there.planned)
+    )
     assert there.outcome in capsys.readouterr().out
 
 
-def test_the_program_of_a_robot_of_ones_own_loads_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_program_of_a_robot_of_ones_own_loads_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "my.urdf").write_text(judges.load("solo12").urdf)
     monkeypatch.chdir(tmp_path)
     assert "fb.load('double_pendulum')" in Settings().code(judges.load("double_pendulum"), 4e-3)
-    own = fb.load_urdf("my.urdf", feet=["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"], foot_radius=0.02)
+    own = fb.load_urdf(
+        "my.urdf", feet=["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"], foot_radius=0.02
+    )
     assert run_of(Settings().code(own, 4e-3)).robot == own
 
 
 @pytest.mark.parametrize("name", EACH)
 def test_changes_lead_where_a_beginning_with_them_leads(name: str) -> None:
-    """On its feet and at rest, a session that is changed has the controller, world and actuators of one that begins so."""
+    """On its feet and at rest, a session that is changed has the controller, world and actuators of
+    one that begins so.
+    """
     changed, begun = Session(GO2), Session(GO2, EACH[name])
     changed.change(**{field: getattr(EACH[name], field) for field in Settings.__dataclass_fields__})
     assert changed.refusal == ""
-    runs = [fb.rollout(s.sim, s.controller, 0.2, control_period=4e-3, actuators=s.actuators) for s in (changed, begun)]
+    runs = [
+        fb.rollout(s.sim, s.controller, 0.2, control_period=4e-3, actuators=s.actuators)
+        for s in (changed, begun)
+    ]
     assert np.array_equal(runs[0].q, runs[1].q)
 
 
@@ -80,14 +115,18 @@ def test_what_cannot_be_is_told_and_the_robot_goes_on() -> None:
 
 
 def test_the_program_is_what_runs_after_a_change_was_refused() -> None:
-    """Nothing of a refused change stays, in the world or on the page, and a reset after it finds its controller."""
+    """Nothing of a refused change stays, in the world or on the page, and a reset after it finds
+    its controller.
+    """
     session = Session(GO2)
     for changes in ({"facets": 2, "mass": (1.0, 1.3)}, {"facets": 2, "slope": (10.0, 10.0)}):
         assert session.change(**changes) == ("slope" in changes)
         assert session.refusal and np.isclose(session.sim.model.body_mass.sum(), GO2.mass)
         session.sim.reset()
         session.after_reset()
-        here = fb.rollout(session.sim, session.controller, 0.2, control_period=4e-3, actuators=session.actuators)
+        here = fb.rollout(
+            session.sim, session.controller, 0.2, control_period=4e-3, actuators=session.actuators
+        )
         there = run_of(session.settings.code(GO2, 4e-3))
         assert np.array_equal(here.q, there.q[: len(here)])
 
@@ -108,7 +147,9 @@ def test_motors_of_the_base_do_not_mend_what_else_a_controller_mistakes(believed
 
 
 def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() -> None:
-    """With them and without gravity in its plan's torques, the base carries itself: joints need next to nothing."""
+    """With them and without gravity in its plan's torques, the base carries itself: joints need
+    next to nothing.
+    """
     used = {}
     for believed in ((), ("zeros",)):
         session = Session(GO2, Settings(assumed_off=believed, actual_off=("zeros",)))
@@ -122,19 +163,27 @@ def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() 
 def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
     session = Session(GO2)
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
-    assert list(term_arrows("gravity", record, 1e-3, 0.4)) == ["term gravity/m g", "term gravity/m g label"]
+    assert list(term_arrows("gravity", record, 1e-3, 0.4)) == [
+        "term gravity/m g",
+        "term gravity/m g label",
+    ]
     (word,) = term_arrows("gravity", record, 1e-3, 0.4, ("gravity",)).values()
     assert word.shape.name == "m g: switched off"
     (word,) = term_arrows("velocity", record, 1e-3, 0.4).values()
     assert word.shape.name == "C q̇ ≈ 0"
-    assert term_arrows("zeros", record, 1e-2, 0.4, ("zeros",)), "torques are there with motors of the base, too"
+    assert term_arrows("zeros", record, 1e-2, 0.4, ("zeros",)), (
+        "torques are there with motors of the base, too"
+    )
 
 
 def test_arrows_of_masses_are_those_of_the_world() -> None:
     session = Session(GO2, Settings(mass=(1.0, 1.5)))
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
     lengths = [
-        np.linalg.norm(term_arrows("gravity", record, 1e-3, 0.4, (), mass)["term gravity/m g"].matrix[:3, 2]) for mass in (1, 1.5)
+        np.linalg.norm(
+            term_arrows("gravity", record, 1e-3, 0.4, (), mass)["term gravity/m g"].matrix[:3, 2]
+        )
+        for mass in (1, 1.5)
     ]
     assert lengths[1] == pytest.approx(1.5 * lengths[0])
     assert lengths[0] == pytest.approx(1e-3 * GO2.weight)
@@ -161,9 +210,15 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
         playground.set(nod=0.1, start_time=0.5)
         playground.session.sim.data.time = 2.0
         playground.set_nodding(0.2)
-        assert (playground.session.settings.nod, playground.session.settings.start_time) == (0.2, 0.5)
+        assert (playground.session.settings.nod, playground.session.settings.start_time) == (
+            0.2,
+            0.5,
+        )
         playground.set_nodding(0.0)
         playground.set_nodding(0.3)
-        assert (playground.session.settings.nod, playground.session.settings.start_time) == (0.3, 2.0)
+        assert (playground.session.settings.nod, playground.session.settings.start_time) == (
+            0.3,
+            2.0,
+        )
     finally:
         playground.close()

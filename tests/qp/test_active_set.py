@@ -21,7 +21,9 @@ Array = np.ndarray
 BOX = np.vstack([np.eye(2), -np.eye(2)])
 
 
-def problem(H: object, g: object, G: object = (), h: object = (), A: object = (), b: object = ()) -> QP:
+def problem(
+    H: object, g: object, G: object = (), h: object = (), A: object = (), b: object = ()
+) -> QP:
     """A QP of small arrays; rows that are not given are none."""
     n = len(np.asarray(g))
     rows = [np.asarray(M, dtype=np.float64).reshape(-1, n) for M in (A, G)]
@@ -38,7 +40,9 @@ def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
 
 
 def check_record(run: ActiveSetRun) -> None:
-    """Each iteration starts where the last arrived, satisfies all rows, raises no objective and says what it did."""
+    """Each iteration starts where the last arrived, satisfies all rows, raises no objective and
+    says what it did.
+    """
     qp = run.solution.qp
     scale = 1.0 + abs(run.iterations[0].objective)
     for now, after in pairwise(run.iterations):
@@ -65,7 +69,7 @@ def check_record(run: ActiveSetRun) -> None:
         assert after.objective <= now.objective + 1e-12
 
 
-# the course text's table ------------------------------------------------------------------------------------------------
+# the course text's table --------------------------------------------------------------------------
 
 
 def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:
@@ -81,7 +85,9 @@ def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equal
     assert found.active == ("table",)
     assert np.allclose(found.x, [0.5, 0.0])
     assert np.allclose(found.x, equality.x)
-    assert found.multipliers["table"] == pytest.approx(1.0)  # the minimum lies 1 m below, at curvature 1
+    assert found.multipliers["table"] == pytest.approx(
+        1.0
+    )  # the minimum lies 1 m below, at curvature 1
 
 
 def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
@@ -95,7 +101,9 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> No
 
 
 def test_a_row_that_would_have_to_pull_is_dropped() -> None:
-    first, second = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]).iterations
+    first, second = active_set(
+        table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]
+    ).iterations
     assert first.multipliers == {"table": pytest.approx(-1.0)} and first.dropped == "table"
     assert second.working_set == ()
     assert np.allclose(second.x_next, [0.5, 1.0])
@@ -109,7 +117,7 @@ def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised(
     check_record(run)
 
 
-# stopped before the end ----------------------------------------------------------------------------------------------
+# stopped before the end ---------------------------------------------------------------------------
 
 
 def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so() -> None:
@@ -131,7 +139,9 @@ def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may()
         whole = active_set(qp)
         for most in range(1, whole.solution.iterations):
             run = active_set(qp, max_iterations=most)
-            broken = run.solution.residuals.inequality > 10 * FEASIBILITY_TOLERANCE * float(np.max(qp.row_norms))
+            broken = run.solution.residuals.inequality > 10 * FEASIBILITY_TOLERANCE * float(
+                np.max(qp.row_norms)
+            )
             assert not (broken and run.iterations)
             seen.add((broken, bool(run.iterations)))
     assert {(True, False), (False, True)} <= seen
@@ -147,15 +157,21 @@ def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
         assert np.allclose(run.solution.x, solve(qp).x, atol=1e-7)
 
 
-# the controller's problems -------------------------------------------------------------------------------------------
+# the controller's problems ------------------------------------------------------------------------
 
 
 def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP]:
-    """n problems of random states near standing, half of them calm, half far off; motors with part of their torque."""
+    """n problems of random states near standing, half of them calm, half far off; motors with part
+    of their torque.
+    """
     robot = judges.load(name)
     limits = torque * robot.torque_limits
     controller = fb.WholeBodyController(
-        robot, judges.stance(robot, mu), fb.standing_tasks(robot.standing()), torque_limits=limits, backend="reference"
+        robot,
+        judges.stance(robot, mu),
+        fb.standing_tasks(robot.standing()),
+        torque_limits=limits,
+        backend="reference",
     )
     return [controller.qp(robot.random_state(seed, (0.05, 0.15)[seed % 2])) for seed in range(n)]
 
@@ -174,14 +190,18 @@ def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_an_honest_way
 
 
 def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
-    """The problems of consecutive ticks while the centre of mass has a target that sways more than a slippery floor allows."""
+    """The problems of consecutive ticks while the centre of mass has a target that sways more than
+    a slippery floor allows.
+    """
     robot = judges.load(name)
     state = robot.standing()
     com = fb.CoMTask(lambda t: state.com + np.array([0.0, 0.1 * np.sin(6.0 * t), 0.0]), kp=300.0)
     tasks = [com, *fb.standing_tasks(state)[1:]]
     contacts = judges.stance(robot, mu=0.25)
     limits = 0.6 * robot.torque_limits
-    controller = fb.WholeBodyController(robot, contacts, tasks, torque_limits=limits, backend="reference")
+    controller = fb.WholeBodyController(
+        robot, contacts, tasks, torque_limits=limits, backend="reference"
+    )
     qps: list[QP] = []
     for tick in range(ticks):
         qps.append(controller.qp(state, 0.2 + tick * dt))
@@ -210,13 +230,15 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks
 def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name: str) -> None:
     robot = judges.load(name)
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
-    controller = fb.WholeBodyController(robot, contacts, tasks, min_normal_force=2000.0, solver="active_set")
+    controller = fb.WholeBodyController(
+        robot, contacts, tasks, min_normal_force=2000.0, solver="active_set"
+    )
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, robot.standing().v)
     assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
 
 
-# degenerate, infeasible, unbounded -----------------------------------------------------------------------------------
+# degenerate, infeasible, unbounded ----------------------------------------------------------------
 
 
 CORNER = [[1, 0], [0, 1], [1, 1], [2, 1], [1, 2], [1, 0]]  # six rows through one point of the plane
@@ -232,13 +254,23 @@ DEGENERATE = {
         np.zeros(64),
     ),
     "a single point": problem(np.eye(2), [1, 2], BOX, [1, 1, -1, -1]),
-    "a single point between three walls": problem(np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1]], [-1, -1, 2]),
-    "a single point left by the equalities": problem(np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]),
+    "a single point between three walls": problem(
+        np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1]], [-1, -1, 2]
+    ),
+    "a single point left by the equalities": problem(
+        np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]
+    ),
     "an equality written as two rows": problem(np.eye(2), [-3, -1], [[1, 1], [-1, -1]], [1, -1]),
-    "equalities that repeat": problem(np.eye(2), [1, 2], -np.eye(2), [0, 0], [[1, 1], [1, 1], [2, 2]], [1, 1, 2]),
-    "a row that the equalities decide": problem(np.eye(3), [1, 2, 3], [[1, 1, 1]], [1], [[1, 1, 1]], [1]),
+    "equalities that repeat": problem(
+        np.eye(2), [1, 2], -np.eye(2), [0, 0], [[1, 1], [1, 1], [2, 2]], [1, 1, 2]
+    ),
+    "a row that the equalities decide": problem(
+        np.eye(3), [1, 2, 3], [[1, 1, 1]], [1], [[1, 1, 1]], [1]
+    ),
     "a row of zeros": problem(np.eye(2), [1, 2], [[0, 0], [1, 0]], [0, -2]),
-    "the same table in other units": problem(np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]),
+    "the same table in other units": problem(
+        np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]
+    ),
     "a weakly active row": problem(np.eye(2), [-1, 0], [[1, 0], [0, -1]], [1, 0]),
     "no curvature, a box": problem(np.zeros((2, 2)), [1, -2], BOX, np.ones(4)),
     "no curvature along one axis": problem(np.diag([1.0, 0.0]), [1, -2], [[1, 1]], [3]),
@@ -255,13 +287,22 @@ def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, .
     check_optimum(run)
     check_record(run)
     assert run.solution.objective == pytest.approx(solve(qp, "cvxpy").objective, abs=1e-6)
-    again = active_set(qp, run.solution.x, qp.inequality_names)  # every row at once: dependent ones are left out
+    again = active_set(
+        qp, run.solution.x, qp.inequality_names
+    )  # every row at once: dependent ones are left out
     assert np.allclose(again.solution.objective, run.solution.objective)
 
 
 def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None:
-    """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back to its start."""
-    rows = [[0.25, -60.0, -1 / 25, 9.0], [0.5, -90.0, -1 / 50, 3.0], [0.0, 0.0, 1.0, 0.0], *-np.eye(4)]
+    """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back
+    to its start.
+    """
+    rows = [
+        [0.25, -60.0, -1 / 25, 9.0],
+        [0.5, -90.0, -1 / 50, 3.0],
+        [0.0, 0.0, 1.0, 0.0],
+        *-np.eye(4),
+    ]
     qp = problem(np.zeros((4, 4)), [-0.75, 150.0, -1 / 50, 6.0], rows, [0, 0, 1, 0, 0, 0, 0])
     run = active_set(qp, np.zeros(4), [f"inequality {i}" for i in range(3, 7)])
     assert run.solution.objective == pytest.approx(-1 / 20)
@@ -297,11 +338,13 @@ def test_curvature_only_counts_where_the_equalities_hold() -> None:
     assert np.allclose(found.x, [2.0, 3.0])
 
 
-# random problems -----------------------------------------------------------------------------------------------------
+# random problems ----------------------------------------------------------------------------------
 
 
 def random_qp(seed: int) -> QP:
-    """Whole numbers, so that rows repeat, depend and meet; H of any rank; feasible or not, bounded or not."""
+    """Whole numbers, so that rows repeat, depend and meet; H of any rank; feasible or not, bounded
+    or not.
+    """
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 7))
     rows, equalities = int(rng.integers(0, 4 * n + 1)), int(rng.integers(0, min(3, n) + 1))
@@ -309,17 +352,32 @@ def random_qp(seed: int) -> QP:
     def whole(*shape: int) -> Array:
         return rng.integers(-2, 3, shape).astype(np.float64)
 
-    root, G, A, inside = whole(int(rng.integers(0, n + 1)), n), whole(rows, n), whole(equalities, n), whole(n)
+    root, G, A, inside = (
+        whole(int(rng.integers(0, n + 1)), n),
+        whole(rows, n),
+        whole(equalities, n),
+        whole(n),
+    )
     h = whole(rows) if rng.random() < 0.3 else G @ inside + rng.integers(0, 2, rows)
     return QP(root.T @ root, whole(n), A, A @ inside, G, h)
 
 
 def verdict(qp: QP) -> str:
-    """By linear programs: is there a point, and a direction without curvature or row where the objective falls?"""
+    """By linear programs: is there a point, and a direction without curvature or row where the
+    objective falls?
+    """
     if not judges.is_feasible(qp, list(range(len(qp.G)))):
         return "infeasible"
     flat = np.vstack([qp.H, qp.A])
-    falls = linprog(qp.g, qp.G, np.zeros(len(qp.G)), flat, np.zeros(len(flat)), bounds=(-1.0, 1.0), method="highs")
+    falls = linprog(
+        qp.g,
+        qp.G,
+        np.zeros(len(qp.G)),
+        flat,
+        np.zeros(len(flat)),
+        bounds=(-1.0, 1.0),
+        method="highs",
+    )
     return "unbounded" if falls.fun < -1e-9 else "optimal"
 
 
@@ -350,7 +408,9 @@ def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, othe
     run = active_set(qp, 3.0 * rng.normal(size=qp.n), working)
     check_optimum(run)
     check_record(run)
-    assert run.solution.objective == pytest.approx(active_set(qp).solution.objective, rel=1e-8, abs=1e-8)
+    assert run.solution.objective == pytest.approx(
+        active_set(qp).solution.objective, rel=1e-8, abs=1e-8
+    )
 
 
 def test_a_run_is_a_value() -> None:

@@ -39,7 +39,9 @@ seeds = st.integers(0, 100_000)
 
 
 def random_qp(rng: np.random.Generator, n: int, m: int, inequalities: int) -> QP:
-    """A strictly convex problem that has feasible points, some rows of which are active at the optimum."""
+    """A strictly convex problem that has feasible points, some rows of which are active at the
+    optimum.
+    """
     root, inside = rng.normal(size=(n, n)), rng.normal(size=n)
     A, G = rng.normal(size=(m, n)), rng.normal(size=(inequalities, n))
     h = G @ inside + rng.uniform(0.0, 0.3, inequalities)
@@ -52,7 +54,9 @@ def empty(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @settings(max_examples=60)
 @given(seeds, st.integers(2, 8), st.integers(0, 3), st.integers(0, 12))
-def test_every_solver_gives_the_same_optimum_and_proves_it(seed: int, n: int, m: int, inequalities: int) -> None:
+def test_every_solver_gives_the_same_optimum_and_proves_it(
+    seed: int, n: int, m: int, inequalities: int
+) -> None:
     qp = random_qp(np.random.default_rng(seed), n, min(m, n - 1), inequalities)
     found = {solver: solve(qp, solver) for solver in solvers()}
     for solution in found.values():
@@ -65,8 +69,17 @@ def test_every_solver_gives_the_same_optimum_and_proves_it(seed: int, n: int, m:
 
 
 def test_active_rows_are_named_and_their_multipliers_say_what_room_is_worth() -> None:
-    """min ½‖x - (3, 1)‖² with x0 ≤ 1, x1 ≤ 5: the first row is active with the multiplier 2, the second is not."""
-    qp = QP(np.eye(2), [-3.0, -1.0], *empty(2), np.eye(2), [1.0, 5.0], inequality_names=("left wall", "roof"))
+    """min ½‖x - (3, 1)‖² with x0 ≤ 1, x1 ≤ 5: the first row is active with the multiplier 2, the
+    second is not.
+    """
+    qp = QP(
+        np.eye(2),
+        [-3.0, -1.0],
+        *empty(2),
+        np.eye(2),
+        [1.0, 5.0],
+        inequality_names=("left wall", "roof"),
+    )
     for solver in solvers():
         solution = solve(qp, solver)
         assert np.allclose(solution.x, [1.0, 1.0], atol=1e-7)
@@ -74,11 +87,15 @@ def test_active_rows_are_named_and_their_multipliers_say_what_room_is_worth() ->
         assert solution.multipliers["left wall"] == pytest.approx(2.0, abs=1e-5)
         step = 1e-4
         wider = QP(qp.H, qp.g, qp.A, qp.b, qp.G, qp.h + [step, 0.0])
-        assert (solution.objective - solve(wider, solver).objective) / step == pytest.approx(2.0, abs=1e-2)
+        assert (solution.objective - solve(wider, solver).objective) / step == pytest.approx(
+            2.0, abs=1e-2
+        )
 
 
 @given(seeds, st.integers(3, 8), st.integers(1, 3), st.integers(0, 2))
-def test_the_equality_space_holds_all_solutions_and_nothing_else(seed: int, n: int, rank: int, repeated: int) -> None:
+def test_the_equality_space_holds_all_solutions_and_nothing_else(
+    seed: int, n: int, rank: int, repeated: int
+) -> None:
     rng = np.random.default_rng(seed)
     rank = min(rank, n - 1)
     A = rng.normal(size=(rank, n))
@@ -96,7 +113,15 @@ def test_the_equality_space_holds_all_solutions_and_nothing_else(seed: int, n: i
 @pytest.mark.parametrize("solver", solvers())
 def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) -> None:
     problems = {
-        right: QP(np.eye(2), [-3.0, 0.0], np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [right], inequality_names=("wall",))
+        right: QP(
+            np.eye(2),
+            [-3.0, 0.0],
+            np.eye(2),
+            [1.0, 2.0],
+            [[1.0, 0.0]],
+            [right],
+            inequality_names=("wall",),
+        )
         for right in (5.0, 1.0, 0.5)
     }
     for right in (5.0, 1.0):
@@ -107,7 +132,7 @@ def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) ->
     assert caught.value.constraints == ("wall",)
 
 
-# residuals ---------------------------------------------------------------------------------------------------------------
+# residuals ----------------------------------------------------------------------------------------
 
 SQUARE = QP(np.eye(2), [-3.0, 0.0], [[0.0, 1.0]], [1.0], [[1.0, 0.0], [-1.0, 0.0]], [1.0, 4.0])
 
@@ -120,7 +145,9 @@ class ByHand(Solution):
 
 
 def answer(x: list[float], nu: float, mu: list[float]) -> Residuals:
-    return ByHand(SQUARE, np.array(x), np.array(mu), "by hand", equality_multipliers=np.array([nu])).residuals
+    return ByHand(
+        SQUARE, np.array(x), np.array(mu), "by hand", equality_multipliers=np.array([nu])
+    ).residuals
 
 
 def test_an_optimum_found_by_hand_leaves_nothing() -> None:
@@ -137,17 +164,21 @@ def test_an_optimum_found_by_hand_leaves_nothing() -> None:
         (answer([1.0, 1.0], -1.0, [1.0, -1.0]), {"dual": 1.0, "complementarity": 5.0}),
     ],
 )
-def test_each_residual_measures_its_own_mistake(residuals: Residuals, fields: dict[str, float]) -> None:
+def test_each_residual_measures_its_own_mistake(
+    residuals: Residuals, fields: dict[str, float]
+) -> None:
     for name in ("stationarity", "equality", "inequality", "complementarity", "dual"):
         assert getattr(residuals, name) == pytest.approx(fields.get(name, 0.0), abs=1e-12), name
 
 
-# infeasible problems ---------------------------------------------------------------------------------------------------------
+# infeasible problems ------------------------------------------------------------------------------
 
 
 @settings(max_examples=40)
 @given(seeds, st.integers(1, 3), st.integers(2, 8))
-def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed: int, n: int, rows: int) -> None:
+def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(
+    seed: int, n: int, rows: int
+) -> None:
     rng = np.random.default_rng(seed)
     G, h = rng.normal(size=(rows, n)), rng.normal(size=rows) - 0.5
     qp, found = QP(np.eye(n), np.zeros(n), *empty(n), G, h), conflicting_constraints(G, h)
@@ -156,19 +187,30 @@ def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed: int
         return
     names = qp.inequality_names
     some = (some for size in range(1, n + 2) for some in combinations(range(rows), size))
-    assert found in [rows for rows in some if judges.is_smallest_conflict(qp, [names[i] for i in rows])]
+    assert found in [
+        rows for rows in some if judges.is_smallest_conflict(qp, [names[i] for i in rows])
+    ]
 
 
 @pytest.mark.parametrize(
     ("G", "h", "conflict"),
     [
-        *((scale * np.array([[1.0], [-1.0], [1.0]]), scale * np.array([1.0, -2.0, 3.0]), (0, 1)) for scale in (1e-6, 1.0, 1e6)),
-        (np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([-1.0, 0.0]), (0,)),  # one row alone is impossible
+        *(
+            (scale * np.array([[1.0], [-1.0], [1.0]]), scale * np.array([1.0, -2.0, 3.0]), (0, 1))
+            for scale in (1e-6, 1.0, 1e6)
+        ),
+        (
+            np.array([[0.0, 0.0], [1.0, 0.0]]),
+            np.array([-1.0, 0.0]),
+            (0,),
+        ),  # one row alone is impossible
         (np.array([[1.0], [-1.0]]), np.array([1.0, -1.0]), ()),  # they only just meet
         (np.zeros((0, 3)), np.zeros(0), ()),
     ],
 )
-def test_rows_in_conflict_are_told_from_those_that_can_be_met(G: np.ndarray, h: np.ndarray, conflict: tuple[int, ...]) -> None:
+def test_rows_in_conflict_are_told_from_those_that_can_be_met(
+    G: np.ndarray, h: np.ndarray, conflict: tuple[int, ...]
+) -> None:
     assert conflicting_constraints(G, h) == conflict
 
 
@@ -182,35 +224,61 @@ def test_the_error_of_an_infeasible_problem_names_its_rows(solver: str) -> None:
 
 
 def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
-    qp = QP(np.eye(2), np.ones(2), np.ones((1, 2)), np.ones(1), np.eye(2), np.ones(2), blocks={"tau": slice(0, 1)})
+    qp = QP(
+        np.eye(2),
+        np.ones(2),
+        np.ones((1, 2)),
+        np.ones(1),
+        np.eye(2),
+        np.ones(2),
+        blocks={"tau": slice(0, 1)},
+    )
     solution = solve(qp)
     for copied in (copy.deepcopy(solution), pickle.loads(pickle.dumps(solution))):
         assert np.array_equal(copied["tau"], solution["tau"]) and copied.active == solution.active
-        assert copied.qp.reduced.row_norms.tolist() == pickle.loads(pickle.dumps(qp.reduced)).row_norms.tolist()
+        assert (
+            copied.qp.reduced.row_norms.tolist()
+            == pickle.loads(pickle.dumps(qp.reduced)).row_norms.tolist()
+        )
     assert np.array_equal(replace(qp.reduced, h=np.zeros(2)).row_norms, qp.row_norms)
     space = Affine.stack(first=qp.equality_space, second=qp.equality_space)
-    assert np.array_equal(pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A)
+    assert np.array_equal(
+        pickle.loads(pickle.dumps(space))["second"].A, copy.deepcopy(space)["first"].A
+    )
 
 
 def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
     label = ConstraintLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
-        assert (same, same.kind, same.owner, same.number) == ("FL_foot facet 2", "friction", "FL_foot", 2)
-    qp = QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof"))
+        assert (same, same.kind, same.owner, same.number) == (
+            "FL_foot facet 2",
+            "friction",
+            "FL_foot",
+            2,
+        )
+    qp = QP(
+        np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof")
+    )
     assert [name.kind for name in qp.inequality_names] == ["friction", "other constraints"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
 
 
 def test_rows_can_be_left_out_by_kind() -> None:
-    """Facets say already that no foot pulls, for their rows add up to -n μ' nᵀ f ≤ 0; without both kinds a foot does pull."""
+    """Facets say already that no foot pulls, for their rows add up to -n μ' nᵀ f ≤ 0; without both
+    kinds a foot does pull.
+    """
     controller = judges.controller_of("go2")
     state = controller.robot.standing()
     pushed = fb.CoMTask(state.com, acceleration=[0.0, 12.0, 0.0])
     qp = controller.replace(tasks=[pushed, *controller.tasks[1:]]).qp(state)
     smaller = qp.without("normal force")
-    assert len(qp.G) - len(smaller.G) == 4 and "FL_foot normal force" not in smaller.inequality_names
-    assert str(smaller.inequality_names[4]).startswith("FR_foot facet") and np.array_equal(smaller.A, qp.A)
+    assert (
+        len(qp.G) - len(smaller.G) == 4 and "FL_foot normal force" not in smaller.inequality_names
+    )
+    assert str(smaller.inequality_names[4]).startswith("FR_foot facet") and np.array_equal(
+        smaller.A, qp.A
+    )
 
     def least(*kinds: str) -> float:
         return float(solve(qp.without(*kinds))["forces"][2::3].min())
@@ -222,20 +290,35 @@ def test_rows_can_be_left_out_by_kind() -> None:
 
 def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_name() -> None:
     """Six variables, each at least 1, whose sum is at most 5."""
-    normal = [ConstraintLabel(f"{foot} normal force", "normal force", foot) for foot in ("FL", "FR", "RL")]
+    normal = [
+        ConstraintLabel(f"{foot} normal force", "normal force", foot) for foot in ("FL", "FR", "RL")
+    ]
     facets = [ConstraintLabel(f"FL facet {i}", "friction", "FL", i) for i in (2, 3)]
     G, h = np.vstack([-np.eye(6), np.ones(6)]), np.append(-np.ones(6), 5.0)
     with pytest.raises(InfeasibleError) as caught:
-        solve(QP(np.eye(6), np.zeros(6), *empty(6), G, h, inequality_names=(*normal, *facets, "sixth", "sum")))
+        solve(
+            QP(
+                np.eye(6),
+                np.zeros(6),
+                *empty(6),
+                G,
+                h,
+                inequality_names=(*normal, *facets, "sixth", "sum"),
+            )
+        )
     for line, named in zip(
         str(caught.value).splitlines()[1:-1],
-        ((3, "normal force", "FL", "FR", "RL"), (2, "friction", "FL facet 2", "FL facet 3"), (2, "sixth", "sum")),
+        (
+            (3, "normal force", "FL", "FR", "RL"),
+            (2, "friction", "FL facet 2", "FL facet 3"),
+            (2, "sixth", "sum"),
+        ),
         strict=True,
     ):
         assert not missing(line, *named)
 
 
-# bad input ---------------------------------------------------------------------------------------------------------------
+# bad input ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -246,15 +329,43 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
         (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), InputError, "b", 1, 2),
         (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), InputError, "h", 1, 2),
         (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), InputError, "g", np.nan),
-        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), InputError, "h", np.inf),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=("a",)), InputError, 1, 2),
-        (lambda: QP(np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1], inequality_names=("a", "a")), InputError, "a"),
+        (
+            lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]),
+            InputError,
+            "h",
+            np.inf,
+        ),
+        (
+            lambda: QP(
+                np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=("a",)
+            ),
+            InputError,
+            1,
+            2,
+        ),
+        (
+            lambda: QP(
+                np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1], inequality_names=("a", "a")
+            ),
+            InputError,
+            "a",
+        ),
         (lambda: solve(SQUARE)["torques"], InputError, "torques"),
         (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
         (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
-        (lambda: active_set(table_top(), working_set=["tabel"]), UnknownNameError, "tabel", "table"),
+        (
+            lambda: active_set(table_top(), working_set=["tabel"]),
+            UnknownNameError,
+            "tabel",
+            "table",
+        ),
         *[
-            (lambda most=most: active_set(table_top(), max_iterations=most), InputError, "most", most)
+            (
+                lambda most=most: active_set(table_top(), max_iterations=most),
+                InputError,
+                "most",
+                most,
+            )
             for most in (0, -1, 1.5, "3")
         ],
         (lambda: active_set(table_top(), max_iterations=True), InputError, "most", "True"),
@@ -269,4 +380,7 @@ def test_a_linear_program_says_optimal_infeasible_or_unbounded() -> None:
     assert linear_program(one, (np.eye(1), one)).status == OPTIMAL
     assert linear_program(one, (np.eye(1), -one)).status == INFEASIBLE
     assert linear_program(-one).status == UNBOUNDED
-    assert linear_program(-one, inequalities=(-np.eye(1), -one), bounds=(None, None)).status == UNBOUNDED
+    assert (
+        linear_program(-one, inequalities=(-np.eye(1), -one), bounds=(None, None)).status
+        == UNBOUNDED
+    )

@@ -14,12 +14,16 @@ from floatbase.errors import InfeasibleError, SolverError
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
-LAST_DIGITS = 1e-7  # N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave some 1e-9
+# N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave
+# some 1e-9
+LAST_DIGITS = 1e-7
 EXACT = ("daqp", "active_set")  # solvers that end at a vertex of rows rather than near it
 
 
 def corner(scale: float = 1.0, row_scale: float = 1.0, equality_scale: float = 1.0) -> QP:
-    """min ½ x² + ½ y² + ½ z² - 3 x, x ≤ 1, y ≥ 0.5, x + z = 2, in other units: (1, 0.5, 1), μ = (3, 0.5), ν = -1."""
+    """min ½ x² + ½ y² + ½ z² - 3 x, x ≤ 1, y ≥ 0.5, x + z = 2, in other units: (1, 0.5, 1), μ = (3,
+    0.5), ν = -1.
+    """
     return QP(
         scale * np.eye(3),
         scale * np.array([-3.0, 0.0, 0.0]),
@@ -52,10 +56,19 @@ def test_the_unit_of_a_row_changes_its_multiplier_only(solver: str, row_scale: f
 
 @pytest.mark.parametrize("solver", solvers())
 @pytest.mark.parametrize("equality_scale", [1e-12, 1e12])
-def test_the_unit_of_an_equation_does_not_make_it_disappear(solver: str, equality_scale: float) -> None:
+def test_the_unit_of_an_equation_does_not_make_it_disappear(
+    solver: str, equality_scale: float
+) -> None:
     """An equation in units of 1e-12 beside one in units of 1 must not count as one of rank 0."""
     small = corner(equality_scale=equality_scale)
-    qp = QP(small.H, small.g, np.vstack([small.A, [0.0, 1.0, 0.0]]), np.append(small.b, 0.75), small.G, small.h)
+    qp = QP(
+        small.H,
+        small.g,
+        np.vstack([small.A, [0.0, 1.0, 0.0]]),
+        np.append(small.b, 0.75),
+        small.G,
+        small.h,
+    )
     assert qp.equality_space.n_in == 1
     found = solve(qp, solver)
     assert np.allclose(found.x, [1.0, 0.75, 1.0], atol=1e-6)
@@ -75,8 +88,12 @@ def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> 
 
 
 def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding() -> None:
-    u = np.array([2.0, -1.0, 1.0])  # H, g and the row all look along the direction that the equality fixes
-    qp = QP(1e4 * np.outer(u, u), 3.0 * u, u[None], np.array([-3.0]), 7.0 * u[None], np.array([-21.0]))
+    u = np.array(
+        [2.0, -1.0, 1.0]
+    )  # H, g and the row all look along the direction that the equality fixes
+    qp = QP(
+        1e4 * np.outer(u, u), 3.0 * u, u[None], np.array([-3.0]), 7.0 * u[None], np.array([-21.0])
+    )
     assert not np.any(qp.reduced.H) and not np.any(qp.reduced.g)
     assert not np.any(qp.reduced.G) and not np.any(qp.reduced.h)
     for solver in solvers():
@@ -87,7 +104,9 @@ def judges_qp(name: str, seed: int) -> QP:
     robot = judges.load(name)
     limits = 0.4 * robot.torque_limits
     tasks = fb.standing_tasks(robot.standing())
-    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, backend="reference")
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, backend="reference"
+    )
     return controller.qp(robot.random_state(seed, 0.1))
 
 
@@ -98,11 +117,13 @@ def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
         reference = solve(qp, "active_set")
         for solver in solvers():
             found = solve(qp, solver)
-            assert np.allclose(found["tau"], reference["tau"], atol=1e-8 if solver == "daqp" else 1e-3), solver
+            assert np.allclose(
+                found["tau"], reference["tau"], atol=1e-8 if solver == "daqp" else 1e-3
+            ), solver
             assert found.residuals.inequality < 10 * FEASIBILITY_TOLERANCE or solver not in EXACT
 
 
-# what has no answer --------------------------------------------------------------------------------------------------
+# what has no answer -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("solver", solvers())
@@ -131,7 +152,9 @@ def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("gap", [1e-8, 1e-6, 1e-2, 1e4])
 def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, gap: float) -> None:
-    qp = QP(np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0])
+    qp = QP(
+        np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0]
+    )
     with pytest.raises(InfeasibleError) as caught:
         solve(qp, solver)
     assert caught.value.constraints == ("inequality 0", "inequality 1")
@@ -139,15 +162,25 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, ga
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
 def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str) -> None:
-    """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says, never anything else."""
+    """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says,
+    never anything else.
+    """
     robot, rng = judges.load(name), np.random.default_rng(5)
     verdicts = []
     for seed in range(8):
         limits = 10.0 ** rng.uniform(-2.0, -0.5) * robot.torque_limits
-        contacts, tasks = judges.stance(robot, rng.choice([0.2, 0.7])), fb.standing_tasks(robot.standing())
+        contacts, tasks = (
+            judges.stance(robot, rng.choice([0.2, 0.7])),
+            fb.standing_tasks(robot.standing()),
+        )
         press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
         controller = fb.WholeBodyController(
-            robot, contacts, tasks, torque_limits=limits, min_normal_force=press, backend="reference"
+            robot,
+            contacts,
+            tasks,
+            torque_limits=limits,
+            min_normal_force=press,
+            backend="reference",
         )
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
@@ -170,15 +203,30 @@ def test_rows_that_only_just_meet_leave_a_point(solver: str) -> None:
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6, 1e10])
 def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: float) -> None:
-    """One row is minus a sum of others that it meets at a point: feasible in real numbers, and but for rounding in these."""
+    """One row is minus a sum of others that it meets at a point: feasible in real numbers, and but
+    for rounding in these.
+    """
     for seed in range(20):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(2, 8))
-        point, meeting, G = scale * rng.normal(size=n), int(rng.integers(1, n)), rng.normal(size=(2 * n, n))
+        point, meeting, G = (
+            scale * rng.normal(size=n),
+            int(rng.integers(1, n)),
+            rng.normal(size=(2 * n, n)),
+        )
         h = G @ point + scale * np.where(np.arange(2 * n) < meeting, 0.0, rng.uniform(size=2 * n))
         G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
-        qp = QP(np.eye(n), scale * rng.normal(size=n), np.zeros((0, n)), [], G, np.append(h, G[-1] @ point))
-        assert solve(qp, solver).residuals.inequality <= 10.0 * (FEASIBILITY_TOLERANCE + 1e-12 * scale), seed
+        qp = QP(
+            np.eye(n),
+            scale * rng.normal(size=n),
+            np.zeros((0, n)),
+            [],
+            G,
+            np.append(h, G[-1] @ point),
+        )
+        assert solve(qp, solver).residuals.inequality <= 10.0 * (
+            FEASIBILITY_TOLERANCE + 1e-12 * scale
+        ), seed
 
 
 @pytest.mark.parametrize("solver", EXACT)
@@ -186,7 +234,9 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: f
 def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver: str, slope: float) -> None:
     """x ≤ -1 and slope y ≤ x: nearly parallel rows, which meet at y = -1 / slope."""
     try:
-        found = solve(QP(np.eye(2), np.zeros(2), *NONE, [[1.0, 0.0], [-1.0, slope]], [-1.0, 0.0]), solver)
+        found = solve(
+            QP(np.eye(2), np.zeros(2), *NONE, [[1.0, 0.0], [-1.0, slope]], [-1.0, 0.0]), solver
+        )
     except (InfeasibleError, SolverError):
         assert slope < 1e-4
     else:
@@ -217,16 +267,21 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> Non
 
 
 def residual_torque(solution: Solution) -> float:
-    """How far, N·m, one Newton step on the optimality conditions of the active rows would still move a torque.
+    """How far, N·m, one Newton step on the optimality conditions of the active rows would still
+    move a torque.
 
-    The residuals are summed in whole fractions, without rounding: what is small along a direction of little curvature would
-    not show in numbers of 16 digits. Then equations in these digits say what step they need.
+    The residuals are summed in whole fractions, without rounding: what is small along a direction
+    of little curvature would not show in numbers of 16 digits. Then equations in these digits say
+    what step they need.
     """
     qp = solution.qp
     active = np.flatnonzero(solution.inequality_multipliers > 0.0)
     rows = np.vstack([qp.A, qp.G[active]])
-    multipliers = np.concatenate([solution.equality_multipliers, solution.inequality_multipliers[active]])
-    # stationarity along all directions that the rows leave: ν and μ of rows that depend on others are not unique
+    multipliers = np.concatenate(
+        [solution.equality_multipliers, solution.inequality_multipliers[active]]
+    )
+    # stationarity along all directions that the rows leave: ν and μ of rows that depend on others
+    # are not unique
     slope = exact_sum(np.hstack([qp.H, rows.T]), np.concatenate([solution.x, multipliers]), qp.g)
     offset = exact_sum(rows, solution.x, -np.concatenate([qp.b, qp.h[active]]))
     K = np.block([[qp.H, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
@@ -237,12 +292,23 @@ def residual_torque(solution: Solution) -> float:
 def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     """A x + b, rounded once."""
     fractions = [Fraction(float(value)) for value in x]
-    rows = [[(Fraction(float(a)), v) for a, v in zip(row, fractions, strict=True) if a] for row in A]
-    return np.array([float(sum((a * v for a, v in row), Fraction(float(c)))) for row, c in zip(rows, b, strict=True)])
+    rows = [
+        [(Fraction(float(a)), v) for a, v in zip(row, fractions, strict=True) if a] for row in A
+    ]
+    return np.array(
+        [
+            float(sum((a * v for a, v in row), Fraction(float(c))))
+            for row, c in zip(rows, b, strict=True)
+        ]
+    )
 
 
-def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to_the_last_digits() -> None:
-    """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H run from 1e-11 to 20."""
+def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to_the_last_digits() -> (
+    None
+):
+    """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H
+    run from 1e-11 to 20.
+    """
     robot = judges.load("talos")
     at = robot.standing()
     tasks = [fb.CoMTask(at.com, weight=100.0), fb.OrientationTask("base", weight=100.0)]
@@ -253,18 +319,29 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to
         answered.add(found.solver)
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         assert residual_torque(found) < LAST_DIGITS
-    assert "active_set" in answered, "DAQP managed: these states no longer try what this test is about"
+    assert "active_set" in answered, (
+        "DAQP managed: these states no longer try what this test is about"
+    )
 
 
 def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -> None:
-    """DAQP calls these problems infeasible: weights from 1e-9 to 100, feet that must press. The truth is a linear program's."""
+    """DAQP calls these problems infeasible: weights from 1e-9 to 100, feet that must press. The
+    truth is a linear program's.
+    """
     robot = judges.load("solo12")
     at = robot.standing()
-    tasks = [fb.CoMTask(at.com, weight=100.0), fb.PostureTask(at.q), fb.ForceTask(weight=1e-9), fb.TorqueTask(weight=1e-9)]
+    tasks = [
+        fb.CoMTask(at.com, weight=100.0),
+        fb.PostureTask(at.q),
+        fb.ForceTask(weight=1e-9),
+        fb.TorqueTask(weight=1e-9),
+    ]
     answered = set()
     for share, seed in ((share, seed) for share in (0.4, 1.3) for seed in range(10)):
         press = share * robot.weight  # at every foot
-        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, min_normal_force=press, backend="reference")
+        controller = fb.WholeBodyController(
+            robot, judges.stance(robot), tasks, min_normal_force=press, backend="reference"
+        )
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             found = solve(qp)
@@ -275,6 +352,11 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         assert judges.is_feasible(qp, list(range(len(qp.G))))
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         slopes = (qp.H @ found.x, qp.g, qp.A.T @ found.equality_multipliers)
-        steepest, flattest = max(np.max(np.abs(slope)) for slope in slopes), np.linalg.eigvalsh(qp.reduced.H)[0]
+        steepest, flattest = (
+            max(np.max(np.abs(slope)) for slope in slopes),
+            np.linalg.eigvalsh(qp.reduced.H)[0],
+        )
         assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
-    assert "active_set" in answered, "DAQP managed: these states no longer try what this test is about"
+    assert "active_set" in answered, (
+        "DAQP managed: these states no longer try what this test is about"
+    )

@@ -1,4 +1,6 @@
-"""URDFs: user-defined models, joints held still, robots as example-robot-data has them, and what cannot be used."""
+"""URDFs: user-defined models, joints held still, robots as example-robot-data has them, and what
+cannot be used.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,11 @@ from floatbase.errors import InputError, RobotWarning
 from floatbase.robots import PLATE_SIZE, with_floating_base
 
 LOADERS = example_robot_data.robots_loader.ROBOTS
-CHANGED = [name for name, loader in LOADERS.items() if loader.__init__ is not example_robot_data.utils.RobotLoader.__init__]
+CHANGED = [
+    name
+    for name, loader in LOADERS.items()
+    if loader.__init__ is not example_robot_data.utils.RobotLoader.__init__
+]
 MODELS = sorted((Path(__file__).parents[2] / "assets" / "models").glob("*.urdf"))
 
 
@@ -36,7 +42,9 @@ def test_an_arm_may_be_bolted_down_or_float() -> None:
     assert (fb.load_urdf(urdf, floating=False).nv, fb.load_urdf(urdf).nv) == (6, 12)
 
 
-def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate() -> None:
+def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate() -> (
+    None
+):
     arm = fb.load("ur5", posture=[0.0, -1.7, 1.2, 0.5, 1.5, 0.0])
     loose, standing = with_floating_base(arm), with_floating_base(arm, plate=True)
     assert loose.joint_names == arm.joint_names and loose.mass == pytest.approx(arm.mass)
@@ -53,7 +61,9 @@ def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand
 
 @pytest.mark.parametrize("name", [*judges.ROBOTS, *CHANGED])
 def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name: str) -> None:
-    """CHANGED are those whose loaders change the model after reading it: they cut links, or turn the world under the base."""
+    """CHANGED are those whose loaders change the model after reading it: they cut links, or turn
+    the world under the base.
+    """
     theirs = example_robot_data.load(name).model
     try:
         ours = fb.load(name, feet=[])
@@ -79,31 +89,50 @@ def test_a_person_stands_upright() -> None:
     [
         ("talos", ["torso_1_joint", "arm_left_1_joint", "arm_left_4_joint", "leg_right_4_joint"]),
         ("kinova", ["j2s6s200_joint_1", "j2s6s200_joint_3"]),  # the first turns without limit
-        ("panda", ["panda_finger_joint1", "panda_finger_joint2"]),  # fingers that slide; the second mimics the first
+        (
+            "panda",
+            ["panda_finger_joint1", "panda_finger_joint2"],
+        ),  # fingers that slide; the second mimics the first
     ],
 )
-def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name: str, locked: list[str]) -> None:
-    """M and h are those of the whole robot for the joints that move, to MuJoCo too, which reads the changed URDF itself."""
+def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(
+    name: str, locked: list[str]
+) -> None:
+    """M and h are those of the whole robot for the joints that move, to MuJoCo too, which reads the
+    changed URDF itself.
+    """
     robot, theirs = fb.load(name, locked=locked), example_robot_data.load(name)
     state, whole = robot.random_state(0), theirs.model
     q, v, kept = np.array(theirs.q0), np.zeros(whole.nv), []
     for i, joint in list(enumerate(whole.names))[1:]:
         if joint not in locked:
             own = robot.model.getJointId(joint)
-            q[whole.idx_qs[i] :][: whole.nqs[i]] = state.q[robot.model.idx_qs[own] :][: whole.nqs[i]]
-            v[whole.idx_vs[i] :][: whole.nvs[i]] = state.v[robot.model.idx_vs[own] :][: whole.nvs[i]]
+            q[whole.idx_qs[i] :][: whole.nqs[i]] = state.q[robot.model.idx_qs[own] :][
+                : whole.nqs[i]
+            ]
+            v[whole.idx_vs[i] :][: whole.nvs[i]] = state.v[robot.model.idx_vs[own] :][
+                : whole.nvs[i]
+            ]
             kept += range(whole.idx_vs[i], whole.idx_vs[i] + whole.nvs[i])
     data, judge = whole.createData(), judges.Mujoco(robot).move_to(state)
     assert robot.nv == whole.nv - len(locked) == len(kept) and judge.model.neq == 0
-    for M, h in ((pin.crba(whole, data, q)[np.ix_(kept, kept)], pin.nle(whole, data, q, v)[kept]), (judge.M, judge.h)):
+    for M, h in (
+        (pin.crba(whole, data, q)[np.ix_(kept, kept)], pin.nle(whole, data, q, v)[kept]),
+        (judge.M, judge.h),
+    ):
         assert judges.relative(state.M, M) < 1e-9
         assert judges.relative(state.h, h) < 1e-9
 
 
 def test_a_joint_is_locked_only_where_it_can_be() -> None:
-    for kind, posture, *numbers in (("continuous", [2.0, 0.0], 2), ("revolute", [10.0], 10, 0.5, 2)):
+    for kind, posture, *numbers in (
+        ("continuous", [2.0, 0.0], 2),
+        ("revolute", [10.0], 10, 0.5, 2),
+    ):
         with raises(InputError, "posture", "elbow", *numbers):
-            fb.load_urdf(two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"])
+            fb.load_urdf(
+                two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"]
+            )
 
 
 def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice() -> None:
@@ -123,12 +152,24 @@ def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path: Path) -> None
 LIMIT = '<limit effort="5" velocity="9" lower="0.5" upper="2"/>'
 
 
-def two_links(mass: object = 1.0, iyy: object = 1.0, joint: str = "elbow", kind: str = "revolute", extra: str = LIMIT) -> str:
+def two_links(
+    mass: object = 1.0,
+    iyy: object = 1.0,
+    joint: str = "elbow",
+    kind: str = "revolute",
+    extra: str = LIMIT,
+) -> str:
     """A URDF: a base of 1 kg, and a link that a joint moves."""
-    link = '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="{}" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    link = (
+        '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="{}" izz="1" ixy="0" '
+        'ixz="0" iyz="0"/></inertial>'
+    )
     ends = '<parent link="base"/><child link="top"/><axis xyz="0 1 0"/>'
     links = f"{link.format('base', 1, 1)}</link>{link.format('top', mass, iyy)}</link>"
-    return f'<robot name="two">{links}<joint name="{joint}" type="{kind}">{ends}{extra}</joint></robot>'
+    return (
+        f'<robot name="two">{links}<joint name="{joint}" '
+        f'type="{kind}">{ends}{extra}</joint></robot>'
+    )
 
 
 HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -146,8 +187,14 @@ HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" i
         (two_links(iyy=-0.1), ("elbow", "inertia", -0.1)),
         (two_links().replace("0 1 0", "0 0 0"), ("elbow", "axis")),
         (two_links(extra=LIMIT.replace("0.5", "3")), ("elbow", "lower", 3, "upper", 2)),
-        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")), ("elbow", "lower", 0, "upper", -2)),
-        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'), ("joint", "base")),
+        (
+            two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")),
+            ("elbow", "lower", 0, "upper", -2),
+        ),
+        (
+            two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'),
+            ("joint", "base"),
+        ),
         (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), ("link", "base")),
         (two_links(joint="root_joint"), ("joint", "root_joint")),
         (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), ("elbow", "wrist", "mimic", "locked")),
@@ -162,23 +209,41 @@ HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" i
         ('<robot name="none"><link name="base"/></robot>', ("mass", 0, "inertial")),
     ],
 )
-def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf: str, named: tuple[str | float, ...]) -> None:
+def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(
+    urdf: str, named: tuple[str | float, ...]
+) -> None:
     refused(lambda: fb.load_urdf(urdf), InputError, *named)
 
 
-def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none() -> None:
-    bolted = two_links(joint="base", kind="fixed").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"')
+def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none() -> (
+    None
+):
+    bolted = (
+        two_links(joint="base", kind="fixed")
+        .replace('"base"', '"a"', 1)
+        .replace('k="base"', 'k="a"')
+    )
     robot = fb.load_urdf(bolted.replace("</robot>", "") + HUNG, floating=False)
     assert robot.base == "a" and robot.model.frames[robot.frame_id("base")].parentJoint == 0
     assert abs(robot.random_state(0, spread=3.0).q[0]) > 0.0
 
 
-def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> None:
+def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> (
+    None
+):
     heavy = two_links(mass=20).replace("<mass", '<origin xyz="0.1 0 0"/><mass')
     with warns(RobotWarning, "elbow", 17.2, 5):
         arm = fb.load_urdf(heavy, floating=False)
     assert arm.standing().q == pytest.approx([0.5])
-    refused(lambda: fb.load_urdf(heavy, floating=False, posture=[0.4]), InputError, "posture", "elbow", 0.4, 0.5, 2)
+    refused(
+        lambda: fb.load_urdf(heavy, floating=False, posture=[0.4]),
+        InputError,
+        "posture",
+        "elbow",
+        0.4,
+        0.5,
+        2,
+    )
     refused(lambda: fb.load_urdf(heavy, floating=False, locked=["elbow"]), InputError)
 
 

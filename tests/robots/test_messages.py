@@ -33,7 +33,14 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.load("talus"), UnknownNameError, "talus", "talos"),
         (lambda: fb.load("zzz"), UnknownNameError, "zzz", "a1"),
         (lambda: fb.load(3), UnknownNameError, 3),
-        (lambda: fb.load("my/robot.urdf"), UnknownNameError, "my/robot.urdf", "load_urdf", "go2", "solo12"),
+        (
+            lambda: fb.load("my/robot.urdf"),
+            UnknownNameError,
+            "my/robot.urdf",
+            "load_urdf",
+            "go2",
+            "solo12",
+        ),
         (lambda: fb.load(Path("x.urdf")), UnknownNameError, "x.urdf", "load_urdf"),
         (lambda: fb.load("anymal"), InputError, "anymal", "feet", "LF_FOOT", "RH_FOOT"),
         (lambda: fb.load("iris"), InputError, "iris", "feet"),
@@ -41,8 +48,18 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.load("go2", feet=["FL_foot", "FL_foot"]), InputError, "FL_foot", "go2"),
         (lambda: fb.load("go2", feet="FL_foot"), InputError, "feet", "FL_foot"),
         (lambda: fb.load("go2", feet=["FL_fot"]), UnknownNameError, "go2", "FL_fot", "FL_foot"),
-        (lambda: fb.load("go2", feet=["FL_foot"], foot_radius=-0.1), InputError, "foot_radius", -0.1),
-        (lambda: fb.load("go2", foot_radius=0.1), InputError, "foot_radius", "feet"),  # without feet it would be ignored
+        (
+            lambda: fb.load("go2", feet=["FL_foot"], foot_radius=-0.1),
+            InputError,
+            "foot_radius",
+            -0.1,
+        ),
+        (
+            lambda: fb.load("go2", foot_radius=0.1),
+            InputError,
+            "foot_radius",
+            "feet",
+        ),  # without feet it would be ignored
         (lambda: fb.load("go2", torque_limits=[1.0]), InputError, "torque_limits", 12, 1),
         (lambda: fb.load("go2", torque_limits=-1.0), InputError, "torque_limits", 12, -1),
         (lambda: fb.load("go2", torque_limits=np.nan), InputError, "torque_limits", np.nan),
@@ -65,7 +82,13 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: fb.State(GO2, Q, Q), InputError, "v", 19, 18),
         (lambda: fb.State(GO2, "q"), InputError, "q", 19),
         (lambda: fb.State(GO2, with_entry(Q, 9, np.nan)), InputError, "q", np.nan, 9),
-        (lambda: fb.State(GO2, Q, with_entry(np.zeros(18), 2, -np.inf)), InputError, "v", -np.inf, 2),
+        (
+            lambda: fb.State(GO2, Q, with_entry(np.zeros(18), 2, -np.inf)),
+            InputError,
+            "v",
+            -np.inf,
+            2,
+        ),
         (lambda: fb.State(GO2, 1.1 * Q), InputError, "q", 1.1),
     ],
 )
@@ -87,8 +110,16 @@ def test_all_errors_of_the_package_can_be_caught_by_one_name() -> None:
 def test_unknown_names_list_the_near_ones_or_all_of_a_few() -> None:
     near = str(unknown_name("frame", "FL_fot", ["FL_foot", "base", "x", "y", "z", "w", "v"]))
     assert not missing(near, "FL_fot", "FL_foot") and missing(near, "base") == ["base"]
-    assert not missing(str(unknown_name("frame", "left", ["foot_left", "base"])), "left", "foot_left")
-    assert not missing(str(unknown_name("solver", "osqp", ["daqp", "cvxpy"])), "osqp", "daqp", "cvxpy")
-    many = str(unknown_name("frame", "??", [f"frame {i}" for i in range(50)], "robot.frames lists them all."))
+    assert not missing(
+        str(unknown_name("frame", "left", ["foot_left", "base"])), "left", "foot_left"
+    )
+    assert not missing(
+        str(unknown_name("solver", "osqp", ["daqp", "cvxpy"])), "osqp", "daqp", "cvxpy"
+    )
+    many = str(
+        unknown_name(
+            "frame", "??", [f"frame {i}" for i in range(50)], "robot.frames lists them all."
+        )
+    )
     assert not missing(many, "frame 0") and missing(many, "frame 49")
     assert many.endswith(" robot.frames lists them all.")

@@ -42,7 +42,11 @@ def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None
 
 def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
     root = ElementTree.fromstring(robot.urdf)
-    masses = [float(mass.get("value")) for link in root.findall("link") for mass in link.findall("inertial/mass")]
+    masses = [
+        float(mass.get("value"))
+        for link in root.findall("link")
+        for mass in link.findall("inertial/mass")
+    ]
     assert robot.mass == pytest.approx(sum(masses), rel=1e-9)
     assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
 
@@ -56,12 +60,17 @@ def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
         tau[i] = 0.0
 
 
-def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(robot) -> None:
+def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(
+    robot,
+) -> None:
     assert np.all(robot.torque_limits > 0)
     assert robot.torque_limits.shape == (robot.d,)
     joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
     urdf = [float(joints[name].find("limit").get("effort")) for name in robot.joint_names]
-    if robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"] == "URDF":
+    if (
+        robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"]
+        == "URDF"
+    ):
         assert np.allclose(robot.torque_limits, urdf)
     else:
         assert np.all(robot.torque_limits < urdf)
@@ -97,23 +106,33 @@ def test_a_robot_stands_at_the_requested_height(floating) -> None:
 
 
 def test_a_robot_that_stands_low_keeps_its_joint_limits_or_says_which_are_in_the_way() -> None:
-    """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by 1.5 rad too much."""
+    """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by
+    1.5 rad too much.
+    """
     go2, talos = judges.load("go2"), judges.load("talos")
     low = go2.standing(height=0.0)
     assert np.allclose(judges.stance(go2).positions(low)[:, 2], 0.0, atol=1e-9)
-    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:]) and np.all(low.q[7:] <= go2.model.upperPositionLimit[7:])
+    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:]) and np.all(
+        low.q[7:] <= go2.model.upperPositionLimit[7:]
+    )
     with raises(InputError, 0.3, "leg_left_4_joint", 2.62):
         talos.standing(height=0.3)
 
 
-def test_a_reference_posture_beyond_a_limit_is_the_same_pose_by_a_whole_turn_where_that_will_do() -> None:
+def test_a_reference_posture_beyond_a_limit_is_the_same_pose_by_a_whole_turn_where_that_will_do() -> (
+    None
+):
     theirs, robot = example_robot_data.load("kinova"), fb.load("kinova")
     data = theirs.model.createData()
     pin.framesForwardKinematics(theirs.model, data, theirs.q0)
     elbow = robot.model.idx_qs[robot.model.getJointId("j2s6s200_joint_3")]
     assert theirs.q0[elbow] < robot.model.lowerPositionLimit[elbow] <= robot.posture[elbow]
     for frame in robot.frames:
-        assert robot.standing().frame_pose(frame).isApprox(data.oMf[theirs.model.getFrameId(frame)], 1e-9)
+        assert (
+            robot.standing()
+            .frame_pose(frame)
+            .isApprox(data.oMf[theirs.model.getFrameId(frame)], 1e-9)
+        )
 
 
 def test_a_robot_without_joints_falls_under_every_controller() -> None:
@@ -141,7 +160,11 @@ def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:
         for joint in range(1, model.njoints):
             if model.nqs[joint] == 1:
                 at = model.idx_qs[joint]
-                assert model.lowerPositionLimit[at] - 1e-9 <= state.q[at] <= model.upperPositionLimit[at] + 1e-9
+                assert (
+                    model.lowerPositionLimit[at] - 1e-9
+                    <= state.q[at]
+                    <= model.upperPositionLimit[at] + 1e-9
+                )
 
 
 def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robot) -> None:

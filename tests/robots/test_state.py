@@ -42,7 +42,9 @@ def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name: str)
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
             linear, angular = judge.jacobian(frame, state.point(frame))
             assert np.allclose(state.frame_jacobian(frame), np.vstack([linear, angular]), atol=1e-9)
-            assert np.allclose(state.frame_velocity(frame), np.concatenate([linear, angular]) @ state.v, atol=1e-9)
+            assert np.allclose(
+                state.frame_velocity(frame), np.concatenate([linear, angular]) @ state.v, atol=1e-9
+            )
 
 
 def test_frame_drift_is_the_change_of_j_v_along_v(name: str) -> None:
@@ -53,15 +55,25 @@ def test_frame_drift_is_the_change_of_j_v_along_v(name: str) -> None:
             assert np.allclose(state.frame_drift(frame), expected, atol=1e-7), frame
 
 
-def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(name: str) -> None:
+def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(
+    name: str,
+) -> None:
     judge = judges.mujoco_of(name)
     for state in judges.states(name, N):
         judge.move_to(state)
-        if judge.robot.is_floating:  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
+        if (
+            judge.robot.is_floating
+        ):  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
-        assert np.allclose(state.com_jacobian, judges.jacobian_of(lambda s: s.com, state), atol=1e-7)
-        assert np.allclose(state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7)
-        assert np.allclose(state.com_drift, judges.drift_of(lambda s: s.com_jacobian, state), atol=1e-7)
+        assert np.allclose(
+            state.com_jacobian, judges.jacobian_of(lambda s: s.com, state), atol=1e-7
+        )
+        assert np.allclose(
+            state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7
+        )
+        assert np.allclose(
+            state.com_drift, judges.drift_of(lambda s: s.com_jacobian, state), atol=1e-7
+        )
 
 
 def test_base_velocity_is_given_in_the_base_frame() -> None:
@@ -111,7 +123,10 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name: str) -> None:
     parts = ("M", "h", "com", "com_velocity", "com_drift", "com_jacobian", "joint_transforms")
     questions: list[Callable[[fb.State], Any]] = [attrgetter(part) for part in parts]
     for frame in ("base", robot.frames[-1]):
-        of_frame = (methodcaller(ask, frame) for ask in ("point", "frame_jacobian", "frame_velocity", "frame_drift"))
+        of_frame = (
+            methodcaller(ask, frame)
+            for ask in ("point", "frame_jacobian", "frame_velocity", "frame_drift")
+        )
         questions += [*of_frame, lambda s, frame=frame: s.frame_pose(frame).homogeneous]
     alone = [ask(robot.random_state(5)) for ask in questions]
     rng = np.random.default_rng(0)

@@ -1,4 +1,6 @@
-"""Rollouts through actuators: what is kept, what memory they have, and when a slow force loop lets go2 fall (App. B)."""
+"""Rollouts through actuators: what is kept, what memory they have, and when a slow force loop lets
+go2 fall (App. B).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
-PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)  # N: a fifth of go2's weight for 0.2 s
+PUSH = (
+    fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),
+)  # N: a fifth of go2's weight for 0.2 s
 
 
 @cache
@@ -28,7 +32,9 @@ class Lag:
     part: float = 0.5
     calls: list[tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=list)
 
-    def step(self, tau_desired: np.ndarray, q_joints: np.ndarray, v_joints: np.ndarray, dt: float) -> np.ndarray:
+    def step(
+        self, tau_desired: np.ndarray, q_joints: np.ndarray, v_joints: np.ndarray, dt: float
+    ) -> np.ndarray:
         self.calls.append((tau_desired, q_joints, v_joints, dt))
         return self.part * len(self.calls) * tau_desired
 
@@ -38,7 +44,9 @@ def sim() -> fb.Simulation:
     return fb.Simulation(judges.load("go2"))
 
 
-def stand(sim: fb.Simulation, bandwidth: float, pushes: tuple[fb.Push, ...] = (), duration: float = 3.0) -> fb.Rollout:
+def stand(
+    sim: fb.Simulation, bandwidth: float, pushes: tuple[fb.Push, ...] = (), duration: float = 3.0
+) -> fb.Rollout:
     """go2 through force loops of a bandwidth, Hz, set out with the torques it stands with."""
     sim.reset()
     q, v = sim.q, sim.v
@@ -62,7 +70,9 @@ def test_without_actuators_applied_torques_are_desired_ones(sim: fb.Simulation) 
     assert np.array_equal(rollout.tau, rollout.tau_desired)
 
 
-def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(sim: fb.Simulation) -> None:
+def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(
+    sim: fb.Simulation,
+) -> None:
     sim.reset()
     lag = Lag(0.1)
     rollout = fb.rollout(sim, controller(), 0.012, control_period=4e-3, actuators=lag)
@@ -70,7 +80,9 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
     for tick in range(3):
         calls = lag.calls[4 * tick : 4 * tick + 4]
         assert all(np.array_equal(tau, rollout.tau_desired[tick]) for tau, *_ in calls)
-        assert np.array_equal(calls[0][1], rollout.q[tick][7:]) and np.array_equal(calls[0][2], rollout.v[tick][6:])
+        assert np.array_equal(calls[0][1], rollout.q[tick][7:]) and np.array_equal(
+            calls[0][2], rollout.v[tick][6:]
+        )
         mean = 0.1 * (4 * tick + 2.5) * rollout.tau_desired[tick]
         assert np.allclose(rollout.tau[tick], mean, rtol=1e-12)
 
@@ -108,15 +120,19 @@ def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None
     for parts in ((0.1,), (0.05, 0.05)):
         sim.reset()
         actuators = HydraulicActuators(sim.robot)
-        rows = [fb.rollout(sim, controller(), duration, actuators=actuators).tau for duration in parts]
+        rows = [
+            fb.rollout(sim, controller(), duration, actuators=actuators).tau for duration in parts
+        ]
         records.append(np.vstack(rows))
     assert np.array_equal(records[0], records[1])
 
 
-# the URDF of g1 has no rotors: oil on an ankle of 3e-4 kg m² is a spring of 3400 rad/s, which no step of 1 ms resolves
+# the URDF of g1 has no rotors: oil on an ankle of 3e-4 kg m² is a spring of 3400 rad/s, which no
+# step of 1 ms resolves
 @pytest.mark.parametrize("name", [name for name in judges.ROBOTS if name != "g1"])
 def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
-    """0.5 s: from 10 ms on every joint is within 5 % of its torque limit of the desired torque, and within 0.1 % at the end.
+    """0.5 s: from 10 ms on every joint is within 5 % of its torque limit of the desired torque, and
+    within 0.1 % at the end.
 
     (In the first millisecond the ground gives way, and anymal_kinova's arm is told to swing: 15 %.)
 
@@ -141,8 +157,12 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
 # go2 on slower and slower force loops
 
 
-def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(sim: fb.Simulation) -> None:
-    """50 Hz, 0.5 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of the desired ones."""
+def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
+    sim: fb.Simulation,
+) -> None:
+    """50 Hz, 0.5 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of the
+    desired ones.
+    """
     rollout = stand(sim, 50.0, duration=0.5)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 3e-4
@@ -152,7 +172,9 @@ def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(sim:
     assert np.max(error[-100:]) < 5e-3
 
 
-def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(sim: fb.Simulation) -> None:
+def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(
+    sim: fb.Simulation,
+) -> None:
     """12 mm both, the same to 0.1 mm, when 30 N push for 0.2 s."""
     sim.reset()
     ideal = fb.rollout(sim, controller(), 0.6, PUSH)
@@ -162,7 +184,9 @@ def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torque
     assert sway(hydraulic) == pytest.approx(sway(ideal), abs=1e-4)
 
 
-def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(sim: fb.Simulation) -> None:
+def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
+    sim: fb.Simulation,
+) -> None:
     """Above the 0.84 Hz below which a task, all else ideal, grows because its torque lags."""
     assert growth(0.85) < 0.0 < growth(0.83)
     assert stand(sim, 1.0, PUSH).outcome == "fell"
@@ -170,15 +194,21 @@ def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(si
 
 
 def growth(bandwidth: float) -> float:
-    """Largest growth rate, 1/s, of a task ẍ = -H (20 ẋ + 100 x) behind the loop's H(s) = ω (s + ω_i) / (s² + ω s + ω ω_i)."""
+    """Largest growth rate, 1/s, of a task ẍ = -H (20 ẋ + 100 x) behind the loop's H(s) = ω (s +
+    ω_i) / (s² + ω s + ω ω_i).
+    """
     w = 2.0 * np.pi * bandwidth
     task, lag = np.array([20.0, 100.0]), w * np.array([1.0, 0.05 * w])
     characteristic = np.polyadd(np.polymul([1.0, 0.0, 0.0], [1.0, *lag]), np.polymul(lag, task))
     return float(np.max(np.roots(characteristic).real))
 
 
-def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(sim: fb.Simulation) -> None:
-    """A spool of 1 Hz hardly moves: the torques lag, but each joint stands on a stiff spring of oil."""
+def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(
+    sim: fb.Simulation,
+) -> None:
+    """A spool of 1 Hz hardly moves: the torques lag, but each joint stands on a stiff spring of
+    oil.
+    """
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))
     actuators.reset(controller()(sim.q, sim.v).tau, sim.q[7:])

@@ -29,7 +29,9 @@ def test_a_state_survives_the_way_to_mujoco_and_back(seed: int, name: str) -> No
 
 
 @given(seed=seeds, name=st.sampled_from(judges.FLOATING))
-def test_mujoco_gets_the_scalar_of_the_quaternion_first_and_the_linear_velocity_in_the_world(seed: int, name: str) -> None:
+def test_mujoco_gets_the_scalar_of_the_quaternion_first_and_the_linear_velocity_in_the_world(
+    seed: int, name: str
+) -> None:
     state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
     qpos, qvel = convert.to_mujoco(state.q, state.v)
     assert np.array_equal(qpos[3:7], state.q[[6, 3, 4, 5]])
@@ -61,7 +63,9 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
             q[at : at + 2] = np.cos(angle + 0.1 * k), np.sin(angle + 0.1 * k)
         qpos, qvel = judge.convert.to_mujoco(fb.State(robot, q).q, v)
         for k, joint in enumerate(turning):
-            assert np.isclose(qpos[judge.model.joint(robot.model.names[joint]).qposadr[0]], angle + 0.1 * k)
+            assert np.isclose(
+                qpos[judge.model.joint(robot.model.names[joint]).qposadr[0]], angle + 0.1 * k
+            )
         assert np.allclose(judge.convert.q(qpos), q, atol=1e-12)
         assert np.allclose(judge.convert.v(qpos, qvel), v, atol=1e-12)
         state = fb.State(robot, q, v)
@@ -69,7 +73,9 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
         assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and_flies_as_it_must() -> None:
+def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and_flies_as_it_must() -> (
+    None
+):
     """MuJoCo calls the ground "world" and would weld that link to it: ur5's own URDF, unbolted."""
     arm = judges.load("ur5")
     loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)
@@ -88,7 +94,10 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
 @pytest.mark.parametrize(
     ("name", "feet"),
     [
-        ("hyq", ["lf_foot", "lh_foot", "rf_foot", "rh_foot"]),  # feet with mass and no inertia, the last links of their legs
+        (
+            "hyq",
+            ["lf_foot", "lh_foot", "rf_foot", "rh_foot"],
+        ),  # feet with mass and no inertia, the last links of their legs
         ("anymal_c", ["LF_FOOT"]),  # cameras whose inertia no body has
         ("bolt", ["FL_FOOT"]),  # feet with inertia and no mass
     ],
@@ -96,13 +105,17 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and
 def test_welded_links_move_as_one_body_whatever_each_of_them_is(name: str, feet: list[str]) -> None:
     state = fb.load(name, feet=feet, foot_radius=0.02).random_state(0)
     judge = judges.Mujoco(state.robot).move_to(state)
-    size = np.sqrt(state.M.diagonal())  # each entry beside its own joints', or a shank's would not show beside the trunk's
+    size = np.sqrt(
+        state.M.diagonal()
+    )  # each entry beside its own joints', or a shank's would not show beside the trunk's
     assert np.max(np.abs(state.M - judge.M) / np.outer(size, size)) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 
 
 def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_path: Path) -> None:
-    """<inertial> may have an rpy of its own, on the link that hands its inertia on and on the one that takes it."""
+    """<inertial> may have an rpy of its own, on the link that hands its inertia on and on the one
+    that takes it.
+    """
 
     def link(name: str, inertia: str, rpy: str) -> str:
         return (
@@ -111,10 +124,16 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
         )
 
     good, bad = 'ixx="0.1" iyy="0.12" izz="0.15"', 'ixx="0.05" iyy="0.02" izz="-0.001"'
-    links = link("trunk", good, "0 0 0") + link("leg", good, "0.3 -0.2 0.5") + link("toe", bad, "-0.4 0.1 0.8")
+    links = (
+        link("trunk", good, "0 0 0")
+        + link("leg", good, "0.3 -0.2 0.5")
+        + link("toe", bad, "-0.4 0.1 0.8")
+    )
     joints = "".join(
-        f'<joint name="{kind}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="0.1 0 -0.2"'
-        ' rpy="0.4 0.2 -0.3"/><axis xyz="0 1 0"/><limit effort="50" velocity="9" lower="-3" upper="3"/></joint>'
+        f'<joint name="{kind}" type="{kind}"><parent link="{parent}"/><child '
+        f'link="{child}"/><origin xyz="0.1 0 -0.2"'
+        ' rpy="0.4 0.2 -0.3"/><axis xyz="0 1 0"/><limit effort="50" velocity="9" lower="-3" '
+        'upper="3"/></joint>'
         for kind, parent, child in (("revolute", "trunk", "leg"), ("fixed", "leg", "toe"))
     )
     urdf = tmp_path / "turned.urdf"
@@ -131,4 +150,6 @@ def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_ho
         fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"]))
     found = re.search(r"locked=(\[.*?\])", str(caught.value))
     assert found
-    fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"], locked=ast.literal_eval(found[1])))
+    fb.Simulation(
+        fb.load("icub_reduced", feet=["l_sole", "r_sole"], locked=ast.literal_eval(found[1]))
+    )

@@ -1,4 +1,6 @@
-"""A fall ends on the ground: no part of the body in it, nothing changed before it, and a live picture draws it to the end."""
+"""A fall ends on the ground: no part of the body in it, nothing changed before it, and a live
+picture draws it to the end.
+"""
 
 from __future__ import annotations
 
@@ -16,38 +18,59 @@ from waiting import until
 import floatbase as fb
 from floatbase.simulation import LiveSimulation, Perturbation, PerturbedSimulation
 
-DEPTH = 5e-3  # m below the ground, at most: a contact that carries a robot gives by less than a millimetre
+# m below the ground, at most: a contact that carries a robot gives by less than a millimetre
+DEPTH = 5e-3
 PERIOD = 2e-3
 SETTLING_TIME = 2.0  # s
 SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against its brakes
 ROW_NAMES = ("time", "q", "v", "tau", "tau_desired", "planned", "measured", "foot_positions")
 
 
-def pushed(name: str, force: float, towards: float, settling_time: float = SETTLING_TIME, sim: fb.Simulation | None = None) -> fb.Rollout:
-    """A standing robot pushed with a force, N, for 0.1 s; towards: degrees, from forwards to the left."""
+def pushed(
+    name: str,
+    force: float,
+    towards: float,
+    settling_time: float = SETTLING_TIME,
+    sim: fb.Simulation | None = None,
+) -> fb.Rollout:
+    """A standing robot pushed with a force, N, for 0.1 s; towards: degrees, from forwards to the
+    left.
+    """
     robot, angle = judges.load(name), np.deg2rad(towards)
     push = fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0], start=0.05)
     sim = fb.Simulation(robot) if sim is None else sim
-    return fb.rollout(sim, judges.controller_of(name), 2.0, [push], PERIOD, settling_time=settling_time)
+    return fb.rollout(
+        sim, judges.controller_of(name), 2.0, [push], PERIOD, settling_time=settling_time
+    )
 
 
 def lowest(state: fb.State) -> dict[str, float]:
-    """Lowest point of the corners of all shapes of the URDF's collisions, by joint, m over level ground; by Pinocchio alone."""
+    """Lowest point of the corners of all shapes of the URDF's collisions, by joint, m over level
+    ground; by Pinocchio alone.
+    """
     robot = state.robot
     folders = [str(folder) for folder in robot.package_dirs]
-    shapes = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.COLLISION, package_dirs=folders)
+    shapes = pin.buildGeomFromUrdfString(
+        robot.model, robot.urdf, pin.COLLISION, package_dirs=folders
+    )
     data, placed, low = robot.model.createData(), shapes.createData(), dict[str, float]()
     pin.updateGeometryPlacements(robot.model, data, shapes, placed, state.q)
     for item, at in zip(shapes.geometryObjects, placed.oMg, strict=True):
         shape = item.geometry
         if hasattr(shape, "halfSide"):
-            corners = np.array(shape.halfSide).ravel() * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
+            corners = np.array(shape.halfSide).ravel() * (
+                2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0
+            )
         elif hasattr(shape, "vertices"):
             corners = np.array(shape.vertices())
         else:  # its axis
-            corners = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]) * getattr(shape, "halfLength", 0.0)
+            corners = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]) * getattr(
+                shape, "halfLength", 0.0
+            )
         joint = str(robot.model.names[item.parentJoint])
-        low[joint] = min(low.get(joint, np.inf), float((corners @ at.rotation.T + at.translation)[:, 2].min()))
+        low[joint] = min(
+            low.get(joint, np.inf), float((corners @ at.rotation.T + at.translation)[:, 2].min())
+        )
     return low
 
 
@@ -102,7 +125,9 @@ def test_motors_brake_within_their_limits() -> None:
 
 
 def test_a_run_that_ends_well_has_no_fall() -> None:
-    record = fb.rollout(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settling_time=0.1)
+    record = fb.rollout(
+        fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settling_time=0.1
+    )
     assert (record.outcome, record.controller_off_time, len(record)) == ("completed", None, 20)
 
 
@@ -111,7 +136,11 @@ def test_a_controller_that_fails_at_once_lets_the_robot_lie_down() -> None:
         raise fb.InfeasibleError("no answer")
 
     record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settling_time=1.5)
-    assert (record.outcome, record.controller_off_time, len(record)) == ("controller failed", 0.0, 1500)
+    assert (record.outcome, record.controller_off_time, len(record)) == (
+        "controller failed",
+        0.0,
+        1500,
+    )
     assert record.final.q[2] < 0.5 * record.q[0, 2] and min(lowest(record.final).values()) > -DEPTH
 
 
@@ -122,16 +151,30 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
         def __init__(self) -> None:
             self.steps = 0
 
-        def step(self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+        def step(
+            self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float
+        ) -> np.ndarray:
             self.steps += 1
             return tau_desired if self.steps < 14 else np.full(12, np.nan)
 
     robot = judges.load("go2")
-    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, (), 5e-3, Breaks(), settling_time=0.1)
+    record = fb.rollout(
+        fb.Simulation(robot),
+        judges.controller_of("go2"),
+        0.1,
+        (),
+        5e-3,
+        Breaks(),
+        settling_time=0.1,
+    )
     assert record.outcome == "controller failed" and len(record) == 2 + 20
     assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)
-    assert np.allclose(record.tau[2], np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits), atol=1e-9)
+    assert np.allclose(
+        record.tau[2],
+        np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits),
+        atol=1e-9,
+    )
     assert np.abs(record.tau_desired[2]).max() > 1e-3
 
 
@@ -150,14 +193,19 @@ def test_links_touch_from_a_fall_to_the_next_reset() -> None:
 
 
 def test_forces_are_those_at_the_feet_whatever_else_touches() -> None:
-    """A robot that lies carries part of its weight with other links, so less with its feet; none pulls."""
+    """A robot that lies carries part of its weight with other links, so less with its feet; none
+    pulls.
+    """
     record = pushed("go2", 400.0, 180.0)
     pressing = record.measured.reshape(len(record), -1, 3)[-1, :, 2]
     assert pressing.min() >= 0.0 and pressing.sum() < 0.9 * record.robot.weight
 
 
 def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_feet_only() -> None:
-    sim = PerturbedSimulation(judges.load("go2"), perturbation=Perturbation(disabled_contacts=["FL_foot"], adhesion_force=10.0))
+    sim = PerturbedSimulation(
+        judges.load("go2"),
+        perturbation=Perturbation(disabled_contacts=["FL_foot"], adhesion_force=10.0),
+    )
     sim.link_collisions = True
     sim.step(np.zeros(12))
     sim.link_collisions = False
@@ -181,11 +229,16 @@ def test_links_are_read_at_the_first_fall() -> None:
 
 
 def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
-    """State, clock, forces and places of the feet are the same with links that touch, and without them again."""
+    """State, clock, forces and places of the feet are the same with links that touch, and without
+    them again.
+    """
     sim = fb.Simulation(judges.load("go2"))
     for _ in range(50):
         sim.step(np.full(12, 0.5))
-    state, before = sim.state, (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces())
+    state, before = (
+        sim.state,
+        (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()),
+    )
     for touch in (True, False):
         sim.link_collisions = touch
         assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)
@@ -214,7 +267,9 @@ def test_what_is_changed_in_the_model_holds_in_a_fall_and_after_it() -> None:
 def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None:
     sim = PerturbedSimulation(judges.load("go2"))
     sim.link_collisions = True
-    sim.perturbation = Perturbation(mass=1.5, disabled_contacts=["FL_foot"], velocity_forces=False, adhesion_force=5.0)
+    sim.perturbation = Perturbation(
+        mass=1.5, disabled_contacts=["FL_foot"], velocity_forces=False, adhesion_force=5.0
+    )
     sim.step(np.zeros(12))
     assert not np.any(sim.contact_forces()[0]) and np.any(sim.contact_forces()[1])
     sim.reset()
@@ -224,7 +279,9 @@ def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda sim: pickle.loads(pickle.dumps(sim))])
-def test_a_copy_of_a_robot_that_lies_moves_alone(copied: Callable[[fb.Simulation], fb.Simulation]) -> None:
+def test_a_copy_of_a_robot_that_lies_moves_alone(
+    copied: Callable[[fb.Simulation], fb.Simulation],
+) -> None:
     sim = fb.Simulation(judges.load("go2"))
     sim.link_collisions = True
     other = copied(sim)
@@ -235,7 +292,9 @@ def test_a_copy_of_a_robot_that_lies_moves_alone(copied: Callable[[fb.Simulation
     other.step(np.zeros(12))
     fresh = fb.Simulation(judges.load("go2"))
     fresh.step(np.zeros(12))
-    assert np.array_equal(other.q, fresh.q) and np.array_equal(other.contact_forces(), fresh.contact_forces())
+    assert np.array_equal(other.q, fresh.q) and np.array_equal(
+        other.contact_forces(), fresh.contact_forces()
+    )
     sim.step(np.zeros(12))
     assert sim.link_collisions and sim.time == pytest.approx(sim.timestep)
 
@@ -256,7 +315,7 @@ def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls() -> None:
     assert sim.model.ngeom == 1
 
 
-# live -------------------------------------------------------------------------------------------------------------------
+# live ---------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -266,7 +325,9 @@ def slices() -> list[fb.Rollout]:
 
 @pytest.fixture
 def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
-    live = LiveSimulation(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), slices.append)
+    live = LiveSimulation(
+        fb.Simulation(judges.load("go2")), judges.controller_of("go2"), slices.append
+    )
     yield live
     live.close()
 
@@ -274,7 +335,9 @@ def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
 FALL = [400.0 * np.cos(0.35), 400.0 * np.sin(0.35), 0.0]
 
 
-def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     told: list[tuple[str, int]] = []
     run.on_status(lambda status: told.append((status, len(slices))))
     run.push(FALL)
@@ -301,7 +364,9 @@ def fall_and_wait(run: LiveSimulation, slices: list[fb.Rollout]) -> int:
     return len(slices)
 
 
-def test_a_push_or_a_reset_in_mid_fall_begins_anew(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_push_or_a_reset_in_mid_fall_begins_anew(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     for again in (run.reset, lambda: run.push([0.0, 20.0, 0.0])):
         count = fall_and_wait(run, slices)
         again()
@@ -311,7 +376,9 @@ def test_a_push_or_a_reset_in_mid_fall_begins_anew(run: LiveSimulation, slices: 
         assert slices[-1].outcome == "completed"
 
 
-def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     fall_and_wait(run, slices)
     run.close()
     count = len(slices)
@@ -322,7 +389,9 @@ def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run: Live
     assert slices[count].time[0] == 0.0
 
 
-def test_another_simulation_in_mid_fall_does_not_fall(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_another_simulation_in_mid_fall_does_not_fall(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     fall_and_wait(run, slices)
     other = fb.Simulation(judges.load("go2"))
     run.set_controller(judges.controller_of("go2"), sim=other)

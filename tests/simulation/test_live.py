@@ -21,7 +21,9 @@ ROBOT = judges.load("go2")
 
 @cache
 def controller() -> fb.WholeBodyController:
-    return fb.WholeBodyController(ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing()))
+    return fb.WholeBodyController(
+        ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing())
+    )
 
 
 @pytest.fixture
@@ -36,7 +38,9 @@ def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
     live.close()
 
 
-def test_it_runs_pauses_and_goes_on_where_it_was(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_it_runs_pauses_and_goes_on_where_it_was(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     run.start()
     until(lambda: len(slices) > 3)
     run.close()  # pauses, and waits for the last slice
@@ -47,7 +51,9 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run: LiveSimulation, slices: li
     assert slices[count].time[0] == pytest.approx(slices[count - 1].time[-1] + 0.002)
 
 
-@pytest.mark.parametrize("error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")])
+@pytest.mark.parametrize(
+    "error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")]
+)
 def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
     run: LiveSimulation, slices: list[fb.Rollout], error: Exception
 ) -> None:
@@ -70,7 +76,10 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
     [
         ("paused", "paused"),
         ("fell", "fell"),
-        ("controller failed: no point satisfies all constraints. In conflict:\n  6 × friction.", "rows"),
+        (
+            "controller failed: no point satisfies all constraints. In conflict:\n  6 × friction.",
+            "rows",
+        ),
         ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
 )
@@ -82,7 +91,9 @@ def test_what_stopped_a_run_is_told_in_one_sentence(status: str, line: str) -> N
 
 
 class Held:
-    """Takes slices as `show`, and keeps the run in the middle of one after `hold`, so that nothing is left to chance."""
+    """Takes slices as `show`, and keeps the run in the middle of one after `hold`, so that nothing
+    is left to chance.
+    """
 
     def __init__(self) -> None:
         self.slices: list[fb.Rollout] = []
@@ -130,7 +141,9 @@ def test_pushes_before_a_reset_are_forgotten(held_run: LiveSimulation, held: Hel
     assert all(not s.pushes for s in held.slices[count:])
 
 
-def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: LiveSimulation, held: Held) -> None:
+def test_a_push_after_a_reset_that_is_still_to_come_acts(
+    held_run: LiveSimulation, held: Held
+) -> None:
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
@@ -145,7 +158,9 @@ def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run: LiveSimulatio
 HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: down, a push that no controller stands
 
 
-def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_the_same_push_after_a_fall_has_the_same_result_every_time(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     falls = []
     for _ in range(5):
         count = len(slices)
@@ -162,7 +177,9 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(run: LiveSimu
         np.testing.assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
 
 
-def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     """The next thread waits for the last one, which is kept here while it tells of the fall."""
     go_on = threading.Event()
     run.on_status(lambda status: status == "fell" and go_on.wait(15.0))
@@ -176,7 +193,9 @@ def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run: Live
     assert [p.force[1] for p in slices[count].pushes] == [30.0]
 
 
-def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(held_run: LiveSimulation, held: Held) -> None:
+def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(
+    held_run: LiveSimulation, held: Held
+) -> None:
     def fall() -> None:
         held.hold("fell")
         held_run.push(*HARD)
@@ -208,7 +227,9 @@ def threads() -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == "floatbase-live"]
 
 
-def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_pause_ends_the_thread_and_a_close_has_ended_it(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     before = len(threads())
     run.start()
     until(lambda: len(slices) > 0)
@@ -219,7 +240,9 @@ def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run: LiveSimulation, s
     assert len(threads()) == before
 
 
-def test_it_runs_after_a_start_that_crosses_a_close(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_it_runs_after_a_start_that_crosses_a_close(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     for _ in range(10):
         run.start()
         closing = threading.Thread(target=run.close)
@@ -231,7 +254,9 @@ def test_it_runs_after_a_start_that_crosses_a_close(run: LiveSimulation, slices:
             until(lambda count=count: len(slices) > count)  # type: ignore[misc]
         run.close()
         assert run.status == "paused"
-    assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))  # one thread at a time
+    assert all(
+        late.time[0] > early.time[-1] for early, late in pairwise(slices)
+    )  # one thread at a time
 
 
 def test_a_status_is_told_as_it_comes(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
@@ -258,7 +283,9 @@ def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
     run.close()
 
 
-def test_a_push_is_on_record_until_it_has_been_seen(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_a_push_is_on_record_until_it_has_been_seen(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     run.push([0.0, 20.0, 0.0], duration=0.1)
     run.start()
     until(lambda: bool(slices) and slices[-1].time[-1] > 1.0)
@@ -280,13 +307,17 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
             self.last = controller()(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
             self.steps, self.resets = 0, getattr(self, "resets", -1) + 1
 
-        def step(self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+        def step(
+            self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float
+        ) -> np.ndarray:
             self.last, now = tau_desired, self.last
             self.steps += 1
             return now
 
     delay = Delay()
-    run = LiveSimulation(fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset)
+    run = LiveSimulation(
+        fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset
+    )
     run.start()
     until(lambda: len(slices) > 3)
     run.pause()
@@ -299,7 +330,9 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.close()
 
 
-def test_another_world_controller_and_period_are_taken_between_slices(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_another_world_controller_and_period_are_taken_between_slices(
+    run: LiveSimulation, slices: list[fb.Rollout]
+) -> None:
     run.start()
     until(lambda: len(slices) > 2)
     ice, seen = fb.Simulation(ROBOT, 0.3), list[threading.Thread]()

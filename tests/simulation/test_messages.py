@@ -32,7 +32,11 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
     "case",
     [
         (lambda: fb.Simulation("go2"), InputError, "robot", "Robot", "go2"),
-        (lambda: fb.Simulation(fb.load("go2", feet=["FL_foot_joint"])), SimulationError, "FL_foot_joint"),
+        (
+            lambda: fb.Simulation(fb.load("go2", feet=["FL_foot_joint"])),
+            SimulationError,
+            "FL_foot_joint",
+        ),
         (lambda: fb.Simulation(GO2, ground=0.0), InputError, "mu", 0),
         (lambda: fb.Simulation(GO2, ground="ice"), InputError, "mu", "ice"),
         (lambda: fb.Simulation(GO2, timestep=0.0), InputError, "timestep", 0),
@@ -45,28 +49,94 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
         (lambda: SIM.step(np.zeros(3)), InputError, "torques", 3, 12),
         (lambda: SIM.step("full"), InputError, "torques", "full"),
         (lambda: SIM.step(np.full(12, np.nan)), InputError, "torques", np.nan),
-        (lambda: SIM.step(np.zeros(12), (fb.Push(UP, frame="bse"),)), UnknownNameError, "bse", "base"),
+        (
+            lambda: SIM.step(np.zeros(12), (fb.Push(UP, frame="bse"),)),
+            UnknownNameError,
+            "bse",
+            "base",
+        ),
         (lambda: fb.Push([1.0, 0.0]), InputError, "force", 2, 3),
         (lambda: fb.Push(UP, start=-1.0), InputError, "start", -1),
         (lambda: fb.Push(UP, duration=0.0), InputError, "duration", 0),
         (lambda: fb.rollout(3, limp, 1.0), InputError, "sim", "Simulation", 3),
         (lambda: fb.rollout(SIM, limp, -1.0), InputError, "duration", -1),
-        (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0015), InputError, "control_period", 0.0015, "timestep", 0.001),
-        (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0001), InputError, "control_period", 0.0001, "timestep", 0.001),
+        (
+            lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0015),
+            InputError,
+            "control_period",
+            0.0015,
+            "timestep",
+            0.001,
+        ),
+        (
+            lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0001),
+            InputError,
+            "control_period",
+            0.0001,
+            "timestep",
+            0.001,
+        ),
         (lambda: fb.rollout(SIM, limp, 0.0105), InputError, "duration", 0.0105, 0.001, 0.01),
-        (lambda: fb.rollout(SIM, limp, 0.001, control_period=0.002), InputError, "duration", 0.001, 0.002),
-        (lambda: fb.rollout(ARM, limp, 1.0, [fb.Push(UP, start=0.9)]), InputError, "base", "ur5", "shoulder_link"),
+        (
+            lambda: fb.rollout(SIM, limp, 0.001, control_period=0.002),
+            InputError,
+            "duration",
+            0.001,
+            0.002,
+        ),
+        (
+            lambda: fb.rollout(ARM, limp, 1.0, [fb.Push(UP, start=0.9)]),
+            InputError,
+            "base",
+            "ur5",
+            "shoulder_link",
+        ),
         (lambda: fb.rollout(SIM, limp, 1.0, [3]), InputError, "pushes", "Push", 3),
         (lambda: fb.rollout(SIM, limp, 1.0, fb.Push(UP)), InputError, "pushes", "Push"),
-        (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), UnknownNameError, "bse", "base"),
+        (
+            lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]),
+            UnknownNameError,
+            "bse",
+            "base",
+        ),
         (lambda: fb.rollout(SIM, 3, 1.0), InputError, "controller", 3),
-        (lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0), InputError, "controller", "tau", 12, "None"),
-        (lambda: fb.rollout(SIM, answering(tau=np.full(3, np.nan)), 0.1), InputError, "controller", 3, 12),
-        (lambda: fb.rollout(SIM, answering(tau=np.zeros(12), forces=np.zeros(9)), 0.01), InputError, "forces", 9, 12),
+        (
+            lambda: fb.rollout(SIM, lambda q, v, t: None, 1.0),
+            InputError,
+            "controller",
+            "tau",
+            12,
+            "None",
+        ),
+        (
+            lambda: fb.rollout(SIM, answering(tau=np.full(3, np.nan)), 0.1),
+            InputError,
+            "controller",
+            3,
+            12,
+        ),
+        (
+            lambda: fb.rollout(SIM, answering(tau=np.zeros(12), forces=np.zeros(9)), 0.01),
+            InputError,
+            "forces",
+            9,
+            12,
+        ),
         (lambda: fb.rollout(SIM, lambda q, v: None, 1.0), InputError, "controller", "q", "v", "t"),
-        (lambda: fb.rollout(SIM, lambda q, v, t, gain: None, 1.0), InputError, "controller", "gain"),
+        (
+            lambda: fb.rollout(SIM, lambda q, v, t, gain: None, 1.0),
+            InputError,
+            "controller",
+            "gain",
+        ),
         # go2 and solo12 have equally many joints: nothing but the robot itself tells them apart
-        (lambda: fb.rollout(fb.Simulation(SOLO), judges.controller_of("go2"), 0.01), InputError, "controller", "go2", "solo12"),
+        (
+            lambda: fb.rollout(fb.Simulation(SOLO), judges.controller_of("go2"), 0.01),
+            InputError,
+            "controller",
+            "go2",
+            "solo12",
+        ),
     ],
 )
 def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
@@ -83,7 +153,9 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
         ("anything", 1, "Simulation"),
     ],
 )
-def test_what_a_simulation_was_made_with_is_not_set_afterwards(name: str, value: object, named: str) -> None:
+def test_what_a_simulation_was_made_with_is_not_set_afterwards(
+    name: str, value: object, named: str
+) -> None:
     for sim in (SIM, copy.deepcopy(SIM), pickle.loads(pickle.dumps(SIM))):
         with raises(InputError, name, named):
             setattr(sim, name, value)
@@ -95,12 +167,18 @@ def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
     refused(lambda: fb.rollout(sim, limp, 0.01), InputError, "timestep", 0.002, 0.001)
 
 
-@pytest.mark.parametrize(("start", "numbers"), [(0.0, (0, 0.01, 0.02, 0.03)), (0.03, (0.01, 0.02, 0.03, 0.04))])
-def test_a_push_that_does_not_act_in_a_rollout_is_said(start: float, numbers: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    ("start", "numbers"), [(0.0, (0, 0.01, 0.02, 0.03)), (0.03, (0.01, 0.02, 0.03, 0.04))]
+)
+def test_a_push_that_does_not_act_in_a_rollout_is_said(
+    start: float, numbers: tuple[float, ...]
+) -> None:
     sim = fb.Simulation(GO2)
     idle, near = (fb.Push(UP, start=start, duration=0.01), fb.Push(UP, start=0.02, duration=0.01))
     with warnings.catch_warnings(action="error"):
         fb.rollout(sim, limp, 0.02)
-        fb.rollout(copy.copy(sim), limp, 0.01, [idle, near])  # of a copy: sim itself stays where it is
+        fb.rollout(
+            copy.copy(sim), limp, 0.01, [idle, near]
+        )  # of a copy: sim itself stays where it is
     with warns(SimulationWarning, *numbers):
         fb.rollout(sim, limp, 0.01, [idle])

@@ -1,4 +1,6 @@
-"""Terms of (7) switched off in the world: judged by Newton's law of the whole robot and by closed forms."""
+"""Terms of (7) switched off in the world: judged by Newton's law of the whole robot and by closed
+forms.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ G = 9.81  # m/s²
 
 def standing(sim: PerturbedSimulation, mismatch: object = None, seconds: float = 0.6) -> fb.Rollout:
     options = {} if mismatch is None else {"mismatch": mismatch}
-    controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options)
+    controller = fb.WholeBodyController(
+        GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options
+    )
     return fb.rollout(sim, controller, seconds, control_period=2e-3)
 
 
@@ -36,7 +40,9 @@ def test_as_it_is_made_it_is_the_simulation() -> None:
     plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
-    a, b = (fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, perturbed))
+    a, b = (
+        fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, perturbed)
+    )
     assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
 
 
@@ -53,7 +59,9 @@ def test_the_ground_carries_the_mass_that_the_world_has() -> None:
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(mass=1.2))
     record = standing(sim)
     assert record.outcome == "completed"
-    assert record.measured[-50:].reshape(50, -1, 3)[:, :, 2].sum(axis=1).mean() == pytest.approx(1.2 * GO2.weight, rel=0.02)
+    assert record.measured[-50:].reshape(50, -1, 3)[:, :, 2].sum(axis=1).mean() == pytest.approx(
+        1.2 * GO2.weight, rel=0.02
+    )
     sim.perturbation = Perturbation()
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
 
@@ -66,10 +74,14 @@ def test_a_foot_that_the_ground_does_not_touch_carries_nothing() -> None:
 
 
 def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
-    """M q̈ = 0 with M q̈ + h: without gravity and torques all velocities stay what they are, and else they do not."""
+    """M q̈ = 0 with M q̈ + h: without gravity and torques all velocities stay what they are, and
+    else they do not.
+    """
     change = {}
     for kept in (True, False):
-        sim = PerturbedSimulation(GO2, timestep=5e-4, perturbation=Perturbation(gravity=False, velocity_forces=kept))
+        sim = PerturbedSimulation(
+            GO2, timestep=5e-4, perturbation=Perturbation(gravity=False, velocity_forces=kept)
+        )
         in_the_air(sim, omega=5.0)
         before = sim.data.qvel.copy()
         for _ in range(20):
@@ -80,8 +92,12 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
 
 
 def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes() -> None:
-    """(7) is written in them: with M q̈ = 0 a base that turns flies around a bend, and does not go straight on."""
-    sim = PerturbedSimulation(GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False))
+    """(7) is written in them: with M q̈ = 0 a base that turns flies around a bend, and does not go
+    straight on.
+    """
+    sim = PerturbedSimulation(
+        GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False)
+    )
     in_the_air(sim)
     v = np.random.default_rng(1).normal(size=GO2.nv)
     sim.reset(sim.state.replace(v=v))
@@ -93,15 +109,21 @@ def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes(
 
 
 def test_adhesion_lets_the_ground_pull() -> None:
-    """Pulled up with 1.5 weights by a controller whose feet may pull, feet with adhesion stay; without them they do not."""
+    """Pulled up with 1.5 weights by a controller whose feet may pull, feet with adhesion stay;
+    without them they do not.
+    """
     up = 1.5 * GO2.weight
     nets = {}
     for adhesion_force in (0.0, GO2.weight):
         sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=adhesion_force))
         tasks, mismatch = fb.standing_tasks(GO2.standing()), ModelMismatch(cones=False)
         controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, mismatch=mismatch)
-        record = fb.rollout(sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3)
-        nets[adhesion_force] = float(record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean())
+        record = fb.rollout(
+            sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3
+        )
+        nets[adhesion_force] = float(
+            record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean()
+        )
         stuck = sim.contact_positions()[:, 2].max() < 5e-3
         assert stuck == bool(adhesion_force)
     assert nets[0.0] == 0.0
@@ -109,7 +131,9 @@ def test_adhesion_lets_the_ground_pull() -> None:
 
 
 def test_magnets_pull_from_the_first_touch_on() -> None:
-    """Newton's law of the whole robot at every timestep of a landing: nothing pulls that the measured forces do not have."""
+    """Newton's law of the whole robot at every timestep of a landing: nothing pulls that the
+    measured forces do not have.
+    """
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=GO2.weight))
     state = GO2.standing()
     q, v = np.array(state.q), np.zeros(GO2.nv)
@@ -119,7 +143,9 @@ def test_magnets_pull_from_the_first_touch_on() -> None:
     momentum = GO2.mass * np.array([record.state(i).com_velocity[2] for i in range(len(record))])
     force = record.measured.reshape(len(record), -1, 3)[:, :, 2].sum(axis=1) - GO2.weight
     assert np.any(record.measured[0] == 0.0) and np.any(record.measured[-1] != 0.0)
-    assert np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight  # one magnet is a whole weight
+    assert (
+        np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight
+    )  # one magnet is a whole weight
 
 
 def test_motors_of_the_base_carry_it() -> None:
@@ -138,7 +164,13 @@ def test_friction_changes_while_it_runs() -> None:
     sim = PerturbedSimulation(GO2, 0.8)
     assert standing(sim, seconds=0.2).outcome == "completed"
     sim.perturbation = Perturbation(friction=0.05)
-    record = fb.rollout(sim, judges.controller_of("go2"), 0.3, [fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)], control_period=2e-3)
+    record = fb.rollout(
+        sim,
+        judges.controller_of("go2"),
+        0.3,
+        [fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)],
+        control_period=2e-3,
+    )
     forces = record.measured.reshape(len(record), -1, 3)
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 

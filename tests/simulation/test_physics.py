@@ -19,7 +19,9 @@ G = np.array([0.0, 0.0, -9.81])
 
 
 def flying(name: str, seed: int | None = None, height: float = 5.0, speed: float = 0.3) -> State:
-    """A robot well above the ground, at rest or tumbling, its joints away from their limits (which take energy)."""
+    """A robot well above the ground, at rest or tumbling, its joints away from their limits (which
+    take energy).
+    """
     robot = judges.load(name)
     state = robot.standing() if seed is None else robot.random_state(seed, speed)
     q = state.q.copy()
@@ -40,7 +42,9 @@ def energy(state: State) -> float:
 def angular_momentum(state: State) -> np.ndarray:
     """About the centre of mass, N·m·s, world."""
     model = state.robot.model
-    return np.array(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).angular)
+    return np.array(
+        pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).angular
+    )
 
 
 name = judges.every_floating_robot
@@ -54,7 +58,9 @@ def test_a_robot_in_the_air_falls_with_g(name: str) -> None:
         sim.step(np.zeros(sim.robot.d))
     assert sim.time == pytest.approx(0.1)
     assert np.allclose(sim.state.com_velocity, 0.1 * G, atol=1e-6)
-    assert np.allclose(sim.state.com - start.com, 0.005 * G, atol=6e-4)  # half a step of semi-implicit Euler
+    assert np.allclose(
+        sim.state.com - start.com, 0.005 * G, atol=6e-4
+    )  # half a step of semi-implicit Euler
     assert not np.any(sim.contact_forces())
 
 
@@ -70,7 +76,9 @@ def test_motors_change_neither_momentum_of_a_robot_in_the_air(name: str) -> None
 
 
 def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str) -> None:
-    """Halving the timestep halves what is lost: nothing else (damping, friction, armature) takes energy."""
+    """Halving the timestep halves what is lost: nothing else (damping, friction, armature) takes
+    energy.
+    """
     start, lost = flying(name, seed=1, speed=0.2), []
     for timestep in (4e-4, 2e-4):
         sim = fb.Simulation(start.robot, timestep=timestep)
@@ -79,15 +87,20 @@ def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str)
             sim.step(np.zeros(sim.robot.d))
         lost.append(energy(sim.state) - energy(start))
     assert abs(lost[1]) < 0.005 * energy(start.replace(q=start.robot.standing().q))
-    # m g² t dt / 2 of free fall alone is of first order; Richardson's extrapolation leaves the second
+    # m g² t dt / 2 of free fall alone is of first order; Richardson's extrapolation leaves the
+    # second
     assert abs(2.0 * lost[1] - lost[0]) < 0.05 * abs(lost[0]) + 1e-6
 
 
 def test_the_work_of_the_motors_is_what_the_energy_gains(name: str) -> None:
     start, rng = flying(name, seed=2, speed=0.1), np.random.default_rng(0)
     robot = start.robot
-    gentle = 500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]  # N·m for 500 rad/s²: no joint comes to its limits
-    tau = rng.uniform(-0.3, 0.3, robot.d) * np.minimum(np.minimum(robot.torque_limits, 0.01 * robot.weight), gentle)
+    gentle = (
+        500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
+    )  # N·m for 500 rad/s²: no joint comes to its limits
+    tau = rng.uniform(-0.3, 0.3, robot.d) * np.minimum(
+        np.minimum(robot.torque_limits, 0.01 * robot.weight), gentle
+    )
     misses, work = [], 0.0
     for timestep in (2e-4, 1e-4):
         sim = fb.Simulation(start.robot, timestep=timestep)
@@ -125,11 +138,18 @@ def test_a_push_acts_in_its_own_steps_and_no_others() -> None:
 
 
 def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_between_steps() -> None:
-    """A free ball, whose momentum MuJoCo's steps keep to rounding: shorter than a step, over many, and both at once."""
+    """A free ball, whose momentum MuJoCo's steps keep to rounding: shorter than a step, over many,
+    and both at once.
+    """
     inertia = '<mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    ball = fb.load_urdf(f'<robot name="ball"><link name="ball"><inertial>{inertia}</inertial></link></robot>')
+    ball = fb.load_urdf(
+        f'<robot name="ball"><link name="ball"><inertial>{inertia}</inertial></link></robot>'
+    )
     sim, rng = fb.Simulation(ball), np.random.default_rng(0)
-    starts, durations = rng.uniform(0.0, 0.02, 40), rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40)
+    starts, durations = (
+        rng.uniform(0.0, 0.02, 40),
+        rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40),
+    )
     pushes = [fb.Push(rng.normal(size=3), *times) for times in zip(starts, durations, strict=True)]
     for some in ([pushes[0]], pushes):
         sim.reset(ball.neutral().replace(q=[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0]))
@@ -140,7 +160,9 @@ def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_betw
 
 
 def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -> None:
-    """Angular momentum about the CoM grows by (p - com) × F dt, wherever on the robot the frame lies."""
+    """Angular momentum about the CoM grows by (p - com) × F dt, wherever on the robot the frame
+    lies.
+    """
     robot = judges.load(name)
     start = flying(name, seed=3, speed=0.2).replace(v=np.zeros(robot.nv))
     force = np.array([20.0, -10.0, 15.0])
@@ -177,8 +199,12 @@ def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name: str) -> None:
     assert not np.allclose(sims[0].v, sims[2].v)
 
 
-def test_absurd_torques_are_cut_at_the_limit_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a motor has no limit MuJoCo drops all controls when one is beyond 1e10: limits must come first."""
+def test_absurd_torques_are_cut_at_the_limit_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a motor has no limit MuJoCo drops all controls when one is beyond 1e10: limits must
+    come first.
+    """
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it stands
     robot = judges.load("go2")
     speeds = []
@@ -201,21 +227,32 @@ def test_each_motor_turns_its_own_joint(name: str) -> None:
         sim.step(tau)
         eom = fb.equations_of_motion(start, fb.Contacts.none())
         expected = judges.aba(eom, tau, np.zeros(0))
-        assert np.allclose(sim.v / 1e-5, expected, rtol=1e-3, atol=1e-3 * np.max(np.abs(expected))), robot.joint_names[i]
+        assert np.allclose(
+            sim.v / 1e-5, expected, rtol=1e-3, atol=1e-3 * np.max(np.abs(expected))
+        ), robot.joint_names[i]
 
 
 def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:
-    """Newton over a push and a recovery: Σ (forces + weight + push) dt = m Δv_com, each in the world frame."""
+    """Newton over a push and a recovery: Σ (forces + weight + push) dt = m Δv_com, each in the
+    world frame.
+    """
     robot = judges.load(name)
     start = robot.standing()
     sim = fb.Simulation(robot)
     controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(start))
     push = fb.Push([0.1 * robot.weight, 0.15 * robot.weight, 0.0], start=0.02, duration=0.05)
     record = fb.rollout(sim, controller, 0.12, [push])
-    impulse = 1e-3 * record.measured.reshape(len(record), -1, 3).sum(axis=(0, 1)) + 0.12 * robot.mass * G + 0.05 * push.force
+    impulse = (
+        1e-3 * record.measured.reshape(len(record), -1, 3).sum(axis=(0, 1))
+        + 0.12 * robot.mass * G
+        + 0.05 * push.force
+    )
     change = robot.mass * (sim.state.com_velocity - start.com_velocity)
     assert np.allclose(impulse, change, atol=0.02 * np.linalg.norm(0.05 * push.force))
-    assert np.linalg.norm(record.measured.reshape(len(record), -1, 3)[..., :2], axis=2).max() > 0.005 * robot.weight
+    assert (
+        np.linalg.norm(record.measured.reshape(len(record), -1, 3)[..., :2], axis=2).max()
+        > 0.005 * robot.weight
+    )
 
 
 def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
@@ -233,8 +270,12 @@ def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
         assert np.all(np.abs(np.delete(extra, i)) < 8.0)
 
 
-def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it() -> None:
-    """A robot whose joints are held slides on a slope of tan θ > μ and stays on one of tan θ < μ: Coulomb's law."""
+def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it() -> (
+    None
+):
+    """A robot whose joints are held slides on a slope of tan θ > μ and stays on one of tan θ < μ:
+    Coulomb's law.
+    """
     robot = judges.load("go2")
     slid = {}
     for mu in (0.15, 0.5):
@@ -291,7 +332,9 @@ def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say() -> None:
     sim.reset(state)
     sim.step(tau)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    assert np.allclose((sim.v - state.v) / 1e-5, judges.aba(eom, tau, np.zeros(0)), rtol=1e-3, atol=1e-2)
+    assert np.allclose(
+        (sim.v - state.v) / 1e-5, judges.aba(eom, tau, np.zeros(0)), rtol=1e-3, atol=1e-2
+    )
 
 
 def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -> None:
@@ -305,7 +348,9 @@ def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -
 
 
 def test_feet_near_the_ground_get_no_force() -> None:
-    """MuJoCo lists a contact without a force for each ball that is nearer to the ground than its gap."""
+    """MuJoCo lists a contact without a force for each ball that is nearer to the ground than its
+    gap.
+    """
     sim = fb.Simulation(judges.load("go2"))
     sim.model.geom_gap[:] = 0.05
     state = sim.robot.standing()
@@ -333,7 +378,9 @@ def test_a_copy_of_a_simulation_falls_as_the_simulation_does() -> None:
 def test_resetting_gives_the_same_run_again() -> None:
     robot = judges.load("go2")
     sim = fb.Simulation(robot)
-    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+    )
     runs = []
     for _ in range(2):
         sim.reset()

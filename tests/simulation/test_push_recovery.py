@@ -1,4 +1,6 @@
-"""The push recovery: what bisection finds on the physics, its mirror, and theory's curves by other means."""
+"""The push recovery: what bisection finds on the physics, its mirror, and theory's curves by other
+means.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ QUICK = {"resolution": STEP, "observation_time": WATCH, "start": 0.1, "progress"
 @pytest.fixture(scope="module")
 def standing() -> fb.WholeBodyController:
     robot = judges.load("go2")
-    return fb.WholeBodyController(robot, fb.Contacts.points(robot, 0.7), fb.standing_tasks(robot.standing()))
+    return fb.WholeBodyController(
+        robot, fb.Contacts.points(robot, 0.7), fb.standing_tasks(robot.standing())
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +55,9 @@ def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
     assert "6 directions" in repr(recovery)
 
 
-def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(recovery: PushRecovery) -> None:
+def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
+    recovery: PushRecovery,
+) -> None:
     state, robot = recovery.state, recovery.state.robot
     feet, com = recovery.contacts.positions(state), state.com
     height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
@@ -60,27 +66,38 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
     for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
         moved = (
             com[:2]
-            + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None] * recovery.unit_vectors[:, :2]
+            + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None]
+            * recovery.unit_vectors[:, :2]
         )
         beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
         assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
-    # between them: the pendulum on the border, s away, pushed for a while, has its capture point there at the end
+    # between them: the pendulum on the border, s away, pushed for a while, has its capture point
+    # there at the end
     border = replace(recovery, duration=1e2).capture_point_bound * height / robot.weight
-    transition = expm(recovery.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    transition = expm(
+        recovery.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    )
     x = transition[:, 2:] * (recovery.capture_point_bound / robot.mass - omega**2 * border)
     assert np.allclose(x[0] + x[1] / omega, border, rtol=1e-9)
-    # one foot carries nothing, two at the front only while a push of the right size holds the rest up
+    # one foot carries nothing, two at the front only while a push of the right size holds the rest
+    # up
     for few in (recovery.contacts.only("FL_foot"), recovery.contacts.only("FL_foot", "FR_foot")):
         falling = replace(recovery, contacts=few)
         assert not falling.capture_point_bound.any() and not falling.static_bound.any()
 
-    # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m g l, if it does not slide
+    # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m
+    # g l, if it does not slide
     slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])
     base = state.frame_pose("base").translation
     lever = (base[2] - feet[:, 2].mean()) * recovery.unit_vectors[:, :2] @ hull.equations[:, :2].T
-    tips = np.min(np.where(lever > 0.0, robot.weight * slack / np.where(lever > 0.0, lever, 1.0), np.inf), axis=1)
+    tips = np.min(
+        np.where(lever > 0.0, robot.weight * slack / np.where(lever > 0.0, lever, 1.0), np.inf),
+        axis=1,
+    )
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
-    assert np.allclose(recovery.static_bound, tips, rtol=1e-3)  # the feet are level to a part of a millimetre
+    assert np.allclose(
+        recovery.static_bound, tips, rtol=1e-3
+    )  # the feet are level to a part of a millimetre
     assert np.all(recovery.static_bound < recovery.pushes)  # a push that ends can be larger
 
 
@@ -92,25 +109,46 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
         "largest push survived", "theory: capture point", "theory: steady push",
     ]  # fmt: skip
     plt.close(axis.figure)
-    refused(lambda: push_recovery_plots.plot(recovery, plt.figure().add_subplot()), InputError, "polar")
+    refused(
+        lambda: push_recovery_plots.plot(recovery, plt.figure().add_subplot()), InputError, "polar"
+    )
     plt.close("all")
     near, far = (push_recovery_plots.picture(recovery, scale) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {"push_recovery", "capture_point_bound", "static_bound"}
-    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {"push_recovery"}
+    assert {path.split("/")[0] for path in near} == {
+        "push_recovery",
+        "capture_point_bound",
+        "static_bound",
+    }
+    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {
+        "push_recovery"
+    }
     assert near.keys() == far.keys() and "push_recovery/ring 100 N" in near
-    assert all(np.allclose(near[path].matrix[:2, 3], recovery.state.q[:2]) for path in near if "label" not in path)
+    assert all(
+        np.allclose(near[path].matrix[:2, 3], recovery.state.q[:2])
+        for path in near
+        if "label" not in path
+    )
     before = replace(recovery, pushes=recovery.pushes / 2)
     axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
     grey = axis.get_lines()[1]
-    assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2) and grey.get_label() == "largest push survived before"
+    assert (
+        np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
+        and grey.get_label() == "largest push survived before"
+    )
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False, previous=before)} == {
+    assert {
+        path.split("/")[0]
+        for path in push_recovery_plots.picture(recovery, theory=False, previous=before)
+    } == {
         "push_recovery",
         "previous",
     }
     other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
     refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
-    ends = [picture["push_recovery/label 100 N"].matrix[:2, 3] - recovery.state.q[:2] for picture in (near, far)]
+    ends = [
+        picture["push_recovery/label 100 N"].matrix[:2, 3] - recovery.state.q[:2]
+        for picture in (near, far)
+    ]
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 
 

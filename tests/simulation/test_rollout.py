@@ -27,7 +27,9 @@ def test_a_limp_robot_falls_and_the_record_says_so(sim: fb.Simulation) -> None:
     assert record.final.q[2] < 0.2 and record.error is None
 
 
-def test_forces_that_a_controller_does_not_give_are_nan_and_are_measured_all_the_same(sim: fb.Simulation) -> None:
+def test_forces_that_a_controller_does_not_give_are_nan_and_are_measured_all_the_same(
+    sim: fb.Simulation,
+) -> None:
     record = fb.rollout(sim, limp, 0.05)
     assert np.all(np.isnan(record.planned))
     assert record.contacts.point_names == sim.point_names
@@ -61,7 +63,9 @@ def test_a_robot_that_stands_on_its_back_has_fallen(sim: fb.Simulation) -> None:
     assert sim.fallen
 
 
-def test_a_physics_that_explodes_has_diverged(sim: fb.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_physics_that_explodes_has_diverged(
+    sim: fb.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it stands
     sim.reset(sim.robot.standing().replace(v=np.full(18, 1e7)))
     record = fb.rollout(sim, limp, 1.0)
@@ -73,7 +77,9 @@ def test_a_physics_that_explodes_has_diverged(sim: fb.Simulation, tmp_path: Path
     assert fb.rollout(sim, judges.controller_of("go2"), 0.05).outcome == "completed"
 
 
-def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(sim: fb.Simulation) -> None:
+def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(
+    sim: fb.Simulation,
+) -> None:
     inner = judges.controller_of("go2")
 
     def gives_up(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
@@ -91,20 +97,32 @@ def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(si
 def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim: fb.Simulation) -> None:
     robot = sim.robot
     contacts = fb.Contacts.points(robot)
-    greedy = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=5000.0)
+    greedy = fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=5000.0
+    )
     record = fb.rollout(sim, greedy, 0.1)
     assert (record.outcome, len(record)) == ("controller failed", 0)
-    assert (record.q.shape, record.measured.shape, record.com.shape) == ((0, robot.nq), (0, 12), (0, 3))
+    assert (record.q.shape, record.measured.shape, record.com.shape) == (
+        (0, robot.nq),
+        (0, 12),
+        (0, 3),
+    )
     assert "controller failed" in repr(record)
     for look in (record.slip, lambda: record.final):
         refused(look, InputError, "controller failed")
     fb.rollout(sim, judges.controller_of("go2"), 0.01)  # feet have touched the ground
     record = fb.rollout(sim, greedy, 0.1)
-    assert (record.outcome, record.measured.shape, record.foot_positions.shape) == ("controller failed", (0, 12), (0, 4, 3))
+    assert (record.outcome, record.measured.shape, record.foot_positions.shape) == (
+        "controller failed",
+        (0, 12),
+        (0, 4, 3),
+    )
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, None, "much"])
-def test_torques_that_are_no_finite_numbers_end_the_record_and_rows_before_are_kept(sim: fb.Simulation, number: object) -> None:
+def test_torques_that_are_no_finite_numbers_end_the_record_and_rows_before_are_kept(
+    sim: fb.Simulation, number: object
+) -> None:
     inner = judges.controller_of("go2")
 
     def goes_wild(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
@@ -112,7 +130,9 @@ def test_torques_that_are_no_finite_numbers_end_the_record_and_rows_before_are_k
         if t < 0.0095:
             return Torques(tau)
         tau[3] = number
-        return Torques(tau, np.full(5, np.nan))  # the torques are reported before forces of another length
+        return Torques(
+            tau, np.full(5, np.nan)
+        )  # the torques are reported before forces of another length
 
     record = fb.rollout(sim, goes_wild, 0.1)
     assert (record.outcome, len(record)) == ("controller failed", 10)
@@ -150,7 +170,9 @@ def test_mistakes_in_a_controller_are_not_swallowed(sim: fb.Simulation) -> None:
         fb.rollout(sim, broken, 0.1)
 
 
-def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(sim: fb.Simulation) -> None:
+def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(
+    sim: fb.Simulation,
+) -> None:
     start, seen = sim.robot.standing(), []
     inner = judges.controller_of("go2")
 
@@ -250,12 +272,20 @@ def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners() -> None:
 
     corners = fb.rollout(fb.Simulation(robot), flat, 0.03)
     points = fb.rollout(fb.Simulation(robot), Points(), 0.03)
-    assert np.allclose(points.measured.reshape(30, 2, 3), corners.measured.reshape(30, 2, 4, 3).sum(axis=2), atol=1e-6)
-    assert np.allclose(points.foot_positions, corners.foot_positions.reshape(30, 2, 4, 3).mean(axis=2), atol=1e-9)
+    assert np.allclose(
+        points.measured.reshape(30, 2, 3),
+        corners.measured.reshape(30, 2, 4, 3).sum(axis=2),
+        atol=1e-6,
+    )
+    assert np.allclose(
+        points.foot_positions, corners.foot_positions.reshape(30, 2, 4, 3).mean(axis=2), atol=1e-9
+    )
 
 
 def test_an_arm_bolted_to_the_ground_never_falls() -> None:
-    record = fb.rollout(fb.Simulation(judges.load("ur5")), lambda q, v, t: Torques(np.zeros(6)), 0.3)
+    record = fb.rollout(
+        fb.Simulation(judges.load("ur5")), lambda q, v, t: Torques(np.zeros(6)), 0.3
+    )
     assert record.outcome == "completed"
     assert np.linalg.norm(record.final.q - record.q[0]) > 0.1, "it did not move"
 
@@ -264,14 +294,18 @@ def test_an_arm_under_the_controller_reaches_its_posture() -> None:
     robot = judges.load("ur5")
     sim = fb.Simulation(robot)
     target = robot.standing().q + 0.2
-    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [fb.PostureTask(target, weight=1e3)])
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.none(), [fb.PostureTask(target, weight=1e3)]
+    )
     record = fb.rollout(sim, controller, 1.0)
     assert record.outcome == "completed"
     assert record.planned.shape == record.measured.shape == (1000, 0)
     assert np.allclose(record.final.q, target, atol=5e-3)
 
 
-def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics_nor_the_record(sim: fb.Simulation) -> None:
+def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics_nor_the_record(
+    sim: fb.Simulation,
+) -> None:
     def careless(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
         q[:], v[:] = 0.0, 1.0
         return Torques(np.zeros(12))
@@ -297,7 +331,9 @@ def test_a_record_says_which_torques_the_motors_gave_and_which_were_desired() ->
 
 def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zero() -> None:
     robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot", "FL_calf"]) + fb.Contacts([fixed_frame("base")])
+    contacts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot", "FL_calf"]) + fb.Contacts(
+        [fixed_frame("base")]
+    )
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
     record = fb.rollout(fb.Simulation(robot), controller, 0.005)
     assert np.all(np.isnan(record.measured[:, 6:]))
@@ -314,7 +350,7 @@ def test_a_robot_starts_with_every_foot_on_a_slope(normal: tuple[float, float, f
     assert np.max(np.abs(heights)) < 1e-9
 
 
-# a stance that changes ---------------------------------------------------------------------------------------------------
+# a stance that changes ----------------------------------------------------------------------------
 
 
 class Switching:
@@ -342,7 +378,9 @@ class Switching:
 
 
 def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
-    """Planned forces are 0 where the stance has no contact, measured ones are what the physics has there."""
+    """Planned forces are 0 where the stance has no contact, measured ones are what the physics has
+    there.
+    """
     record = fb.rollout(sim, Switching(), 0.3, control_period=0.002)
     assert record.outcome == "completed"
     assert record.contacts.names == ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
@@ -356,7 +394,9 @@ def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
     assert record.foot_positions[95, 0, 2] > 0.002
     for i in (20, 70):  # each row's plan is the plan of its own stance
         command = Switching()(record.q[i], record.v[i], float(record.time[i]))
-        present = slice(3 * (4 - len(record.contacts_at(i))), None)  # FL, the first one, comes and goes
+        present = slice(
+            3 * (4 - len(record.contacts_at(i))), None
+        )  # FL, the first one, comes and goes
         assert np.allclose(record.planned[i][present], command.forces, atol=1e-9)
 
 
@@ -381,7 +421,10 @@ def test_a_foot_that_joins_the_stance_later_joins_the_record(sim: fb.Simulation)
 
 def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused() -> None:
     robot = judges.load("talos")
-    flat, point = (make(robot, frames=["left_sole_link"]) for make in (fb.Contacts.flat_feet, fb.Contacts.points))
+    flat, point = (
+        make(robot, frames=["left_sole_link"])
+        for make in (fb.Contacts.flat_feet, fb.Contacts.points)
+    )
 
     class Shifty:
         contacts = flat
@@ -404,7 +447,13 @@ def test_the_force_of_a_foot_is_found_by_its_name_and_of_a_flat_foot_is_the_resu
         assert np.allclose(left, forces.reshape(20, 8, 3)[:, :4].sum(axis=1))
         assert np.allclose(left + right, forces.reshape(20, 8, 3).sum(axis=1))
     refused(lambda: record.force("left_sole"), UnknownNameError, "left_sole", "left_sole_link")
-    refused(lambda: record.force("left_sole_link", "wished"), UnknownNameError, "wished", "measured", "planned")
+    refused(
+        lambda: record.force("left_sole_link", "wished"),
+        UnknownNameError,
+        "wished",
+        "measured",
+        "planned",
+    )
 
 
 def test_a_bar_shows_how_far_it_is(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,9 @@ from floatbase.dynamics import contact_space
 
 @cache
 def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
-    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is requested."""
+    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is
+    requested.
+    """
     robot, controller = judges.load(name), judges.controller_of(name)
     pushes = [fb.Push([15.0, 26.0, 0.0], start=0.5, duration=0.1)] if push else []
     return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
@@ -36,11 +38,16 @@ def test_it_stands_to_the_end_with_its_centre_of_mass_where_it_was(record: fb.Ro
 
 
 def test_no_foot_slips_more_than_two_millimetres(record: fb.Rollout) -> None:
-    assert record.slip().shape == (record.contacts.n_points,) and record.slip(include_rolling=False).max() < 2e-3
+    assert (
+        record.slip().shape == (record.contacts.n_points,)
+        and record.slip(include_rolling=False).max() < 2e-3
+    )
 
 
 def test_planned_and_measured_vertical_forces_agree_at_rest(record: fb.Rollout) -> None:
-    planned, measured = (rows[-1].reshape(-1, 3)[:, 2] for rows in (record.planned, record.measured))
+    planned, measured = (
+        rows[-1].reshape(-1, 3)[:, 2] for rows in (record.planned, record.measured)
+    )
     assert np.all(planned > 0)
     assert np.allclose(measured, planned, rtol=0.05)
 
@@ -64,18 +71,25 @@ def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
 def test_under_the_push_the_ground_pushes_back() -> None:
     record = stood("go2", 2.0, push=True)
     sideways = record.measured.reshape(len(record), 4, 3).sum(axis=1)[:, :2]
-    before, during = (record.time > 0.2) & (record.time < 0.49), (record.time > 0.53) & (record.time < 0.59)
+    before, during = (
+        (record.time > 0.2) & (record.time < 0.49),
+        (record.time > 0.53) & (record.time < 0.59),
+    )
     assert np.abs(sideways[before]).max() < 1.0
     assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
 
 
 @pytest.mark.parametrize(("backend", "period"), [("compiled", 0.001), ("reference", 0.005)])
 def test_solo8_pushed_out_of_its_singular_stance_stands_on(backend: str, period: float) -> None:
-    """Beside the symmetric stance J has singular values that are small and of no use, and rows that are inconsistent by the
-    noise of q and v. It does not come back: once it leans, its contacts hold the lean (J has one rank more)."""
+    """Beside the symmetric stance J has singular values that are small and of no use, and rows that
+    are inconsistent by the noise of q and v. It does not come back: once it leans, its contacts
+    hold the lean (J has one rank more).
+    """
     robot = judges.load("solo8")
     standing = robot.standing()
-    controller = fb.WholeBodyController(robot, judges.stance(robot), fb.standing_tasks(standing), backend=backend)
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot), fb.standing_tasks(standing), backend=backend
+    )
     push = fb.Push([0.0, 5.0, 0.0], start=0.1, duration=0.1)
     record = fb.rollout(fb.Simulation(robot), controller, 1.5, [push], control_period=period)
     away = np.linalg.norm(record.com - standing.com, axis=1)

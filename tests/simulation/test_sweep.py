@@ -1,4 +1,6 @@
-"""A sweep gives one table: whatever the number of workers, wherever they are, and however often it was killed."""
+"""A sweep gives one table: whatever the number of workers, wherever they are, and however often it
+was killed.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from floatbase.errors import InputError, SimulationError, UnknownNameError
 from floatbase.simulation import Table
 
 GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
-# leaves a mark for every call, so that calls can be counted; it is run as a script, so its function is sent by value
+# leaves a mark for every call, so that calls can be counted; it is run as a script, so its function
+# is sent by value
 SCRIPT = """
 import os, sys, time
 import floatbase as fb
@@ -40,7 +43,11 @@ def spectrum(n: int, scale: float) -> dict[str, Any]:
     matrix = scale * np.vander(np.linspace(0.1, 1.7, 40), 40)[:, -20:]
     if n == 3:
         raise ValueError(f"no {n} here")
-    return {"values": np.linalg.svd(matrix)[1][:n], "sum": np.float32(matrix.sum()), "process": os.getpid()}
+    return {
+        "values": np.linalg.svd(matrix)[1][:n],
+        "sum": np.float32(matrix.sum()),
+        "process": os.getpid(),
+    }
 
 
 def without_process(table: Table) -> list[Any]:
@@ -68,7 +75,9 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     command = [sys.executable, "script.py"]
     rows = tmp_path / "marked.jsonl"
     with subprocess.Popen(command, cwd=tmp_path) as running:
-        while running.poll() is None and (not rows.exists() or rows.read_bytes().count(b"\n") < after):
+        while running.poll() is None and (
+            not rows.exists() or rows.read_bytes().count(b"\n") < after
+        ):
             time.sleep(0.005)
         running.kill()
     assert after <= rows.read_bytes().count(b"\n") < 61
@@ -78,15 +87,24 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     assert said == "Table(60 rows: i, result, error)\n"
     table = Table.read(rows)
     assert table.rows == tuple({"i": i, "result": i / 7, "error": None} for i in range(60))
-    assert rows.read_bytes().count(b"\n") == 61  # no point has two lines, nothing is left of the torn one
+    assert (
+        rows.read_bytes().count(b"\n") == 61
+    )  # no point has two lines, nothing is left of the torn one
     calls = (tmp_path / "calls").read_text().split()
     assert set(calls) == {str(i) for i in range(60)}
-    assert len(calls) - 60 <= 2 * 2  # for each of two workers the point that it was at, and the next
+    assert (
+        len(calls) - 60 <= 2 * 2
+    )  # for each of two workers the point that it was at, and the next
 
 
-def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tmp_path: Path) -> None:
+def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
+    tmp_path: Path,
+) -> None:
     script = tmp_path / "script.py"
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400, -1))  # bytes, of a file: a disc that is full"
+    limit = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400, -1))  # bytes, of a "
+        "file: a disc that is full"
+    )
     script.write_text(f"{limit}\n{SCRIPT}")
     command = [sys.executable, "script.py"]
     full = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
@@ -115,7 +133,9 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path:
             setups.write("x")
 
     with ThreadPoolExecutor(1) as thread:
-        running = thread.submit(fb.sweep, patient, {"i": [0, 1, 2, 3]}, setup=setup, workers=1, progress=False)
+        running = thread.submit(
+            fb.sweep, patient, {"i": [0, 1, 2, 3]}, setup=setup, workers=1, progress=False
+        )
         while not (tmp_path / "begun").exists() and not running.done():
             time.sleep(0.02)
         with raises(InputError, "result", "object"):
@@ -127,7 +147,9 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path:
 
 @pytest.mark.front_end
 def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install floatbase[cluster]")
+    distributed = pytest.importorskip(
+        "distributed", reason="Dask is not installed: pip install floatbase[cluster]"
+    )
 
     def power(made: float, n: int, scale: float) -> dict[str, Any]:
         if n == 2:
@@ -138,16 +160,22 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
         return 1.1
 
     here = fb.sweep(power, GRID, setup=setup, workers=1, progress=False)
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
         workers = {worker.pid for worker in cluster.workers.values()}
-        by_address = fb.sweep(power, GRID, setup=setup, cluster=cluster.scheduler_address, progress=False)
+        by_address = fb.sweep(
+            power, GRID, setup=setup, cluster=cluster.scheduler_address, progress=False
+        )
         with distributed.Client(cluster) as client:
             by_client = fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
             with raises(InputError, "result", "object"):
                 fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
             cluster.scheduler.allowed_failures = 0  # else it tries three times more
             with raises(SimulationError, "KilledWorker"):
-                fb.sweep(lambda n: os.kill(os.getpid(), 9), {"n": [1]}, cluster=client, progress=False)
+                fb.sweep(
+                    lambda n: os.kill(os.getpid(), 9), {"n": [1]}, cluster=client, progress=False
+                )
         with raises(InputError, "Dask"):
             fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
     assert without_process(here) == without_process(by_address) == without_process(by_client)
@@ -174,7 +202,11 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
     ):
         with raises(InputError, "rows.jsonl", *named):
             fb.sweep(function, grid, file=path, progress=False)
-    assert fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False).rows == first.rows == Table.read(path).rows
+    assert (
+        fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False).rows
+        == first.rows
+        == Table.read(path).rows
+    )
     assert path.read_bytes() == kept
     for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):
         path.write_text(content)
@@ -191,7 +223,9 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         list(first)
 
 
-def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.CaptureFixture[str]) -> None:
+def test_what_does_not_fit_is_told_before_any_process_is_started(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     def square(x: float) -> float:
         return x * x
 
@@ -218,11 +252,15 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd: pytest.C
 
 
 def test_a_function_that_ends_its_program_ends_its_point_only() -> None:
-    table = fb.sweep(lambda x: sys.exit(f"no {x}") if x == 1 else x, {"x": [0, 1, 2]}, workers=1, progress=False)
+    table = fb.sweep(
+        lambda x: sys.exit(f"no {x}") if x == 1 else x, {"x": [0, 1, 2]}, workers=1, progress=False
+    )
     assert [row["error"] for row in table.rows] == [None, "SystemExit: no 1", None]
 
 
-def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_bar_counts_points_and_failures_and_can_be_switched_off(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     fb.sweep(lambda x: 1 / x, {"x": [0, 1]}, workers=1)
     bar = capfd.readouterr().err
     assert "2/2" in bar and "failed=1" in bar

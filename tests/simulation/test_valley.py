@@ -1,4 +1,6 @@
-"""A ground of several planes: robots stand in a valley, one even with its centre of mass beside its feet."""
+"""A ground of several planes: robots stand in a valley, one even with its centre of mass beside its
+feet.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +15,38 @@ from floatbase.friction import wrench_set
 from floatbase.simulation import Ground
 
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
-STEADY = 0.01  # part of the weight: what one second of standing leaves of planned forces against measured ones
+# part of the weight: what one second of standing leaves of planned forces against measured ones
+STEADY = 0.01
 
 
 def sides(degrees: float) -> tuple[np.ndarray, np.ndarray]:
-    """Normals of the two sides of a valley along x: of the left one, which falls to the right, and of the right one."""
+    """Normals of the two sides of a valley along x: of the left one, which falls to the right, and
+    of the right one.
+    """
     angle = np.deg2rad(degrees)
-    return np.array([0.0, -np.sin(angle), np.cos(angle)]), np.array([0.0, np.sin(angle), np.cos(angle)])
+    return np.array([0.0, -np.sin(angle), np.cos(angle)]), np.array(
+        [0.0, np.sin(angle), np.cos(angle)]
+    )
 
 
 def with_feet(robot: fb.Robot, base: Sequence[float], centres: dict[str, np.ndarray]) -> fb.State:
-    """The state with a level base there, m, and the feet's centres at given places, by Newton's method."""
+    """The state with a level base there, m, and the feet's centres at given places, by Newton's
+    method.
+    """
     q = robot.standing().q.copy()
     q[:3], q[3:7] = base, [0.0, 0.0, 0.0, 1.0]
     for _ in range(50):
         state = fb.State(robot, q)
-        error = np.concatenate([state.frame_pose(name).translation - centre for name, centre in centres.items()])
-        q[7:] -= np.clip(np.linalg.solve(np.vstack([state.frame_jacobian(name)[:3, 6:] for name in centres]), error), -0.2, 0.2)
+        error = np.concatenate(
+            [state.frame_pose(name).translation - centre for name, centre in centres.items()]
+        )
+        q[7:] -= np.clip(
+            np.linalg.solve(
+                np.vstack([state.frame_jacobian(name)[:3, 6:] for name in centres]), error
+            ),
+            -0.2,
+            0.2,
+        )
     assert np.max(np.abs(error)) < LENGTHS
     return fb.State(robot, q)
 
@@ -37,7 +54,9 @@ def with_feet(robot: fb.Robot, base: Sequence[float], centres: dict[str, np.ndar
 def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options: int) -> fb.Rollout:
     """A second of standing in a state."""
     sim.reset(state)
-    record = fb.rollout(sim, fb.WholeBodyController(sim.robot, contacts, fb.standing_tasks(state), **options), 1.0)
+    record = fb.rollout(
+        sim, fb.WholeBodyController(sim.robot, contacts, fb.standing_tasks(state), **options), 1.0
+    )
     assert record.outcome == "completed"
     return record
 
@@ -45,61 +64,98 @@ def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options:
 @pytest.mark.parametrize("shift", [0.0, 0.04])  # m, of the valley's bottom to the left
 def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
     robot, (left, right) = judges.load("go2"), sides(20.0)
-    sim = fb.Simulation(robot, Ground(normal=[left, right], offset=[shift * left[1], shift * right[1]]))
+    sim = fb.Simulation(
+        robot, Ground(normal=[left, right], offset=[shift * left[1], shift * right[1]])
+    )
     start = sim.state
-    assert np.allclose(start.frame_pose("base").rotation, robot.standing().frame_pose("base").rotation, atol=LENGTHS)
+    assert np.allclose(
+        start.frame_pose("base").rotation,
+        robot.standing().frame_pose("base").rotation,
+        atol=LENGTHS,
+    )
     clearances = sim.ground.clearances(sim.contact_positions())
     assert np.allclose(clearances.min(axis=1), 0.0, atol=LENGTHS)
     on_left = np.argmin(clearances, axis=1) == 0
     assert [name[1] == "L" for name in sim.point_names] == on_left.tolist()
-    normals = dict(zip(sim.point_names, sim.ground.normals[np.argmin(clearances, axis=1)], strict=True))
+    normals = dict(
+        zip(sim.point_names, sim.ground.normals[np.argmin(clearances, axis=1)], strict=True)
+    )
     contacts = fb.Contacts.points(robot, normals=normals)
     assert np.allclose(contacts.positions(start), sim.contact_positions(), atol=LENGTHS)
     record = stood(sim, contacts, start)
     assert record.slip().max() < 2e-3
-    assert np.allclose(record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight)
-    assert np.allclose(record.measured[-1].reshape(4, 3).sum(axis=0), [0.0, 0.0, robot.weight], atol=STEADY * robot.weight)
+    assert np.allclose(
+        record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight
+    )
+    assert np.allclose(
+        record.measured[-1].reshape(4, 3).sum(axis=0),
+        [0.0, 0.0, robot.weight],
+        atol=STEADY * robot.weight,
+    )
 
 
 def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() -> None:
-    """The lower feet push the upper ones outwards, into their slope: seen from above the CoM is not between the feet."""
+    """The lower feet push the upper ones outwards, into their slope: seen from above the CoM is not
+    between the feet.
+    """
     robot, (left, right) = judges.load("go2"), sides(40.0)
     slope, y_high, y_low = np.tan(np.deg2rad(40.0)), 0.16, -0.06
     centres, normals = {}, {}
     for foot in robot.feet:
         y, normal = (y_high, left) if foot.frame[1] == "L" else (y_low, right)
-        on_ground = np.array([robot.standing().frame_pose(foot.frame).translation[0], y, slope * abs(y)])
+        on_ground = np.array(
+            [robot.standing().frame_pose(foot.frame).translation[0], y, slope * abs(y)]
+        )
         centres[foot.frame], normals[foot.frame] = on_ground + foot.radius * normal, normal
     state = with_feet(robot, [0.0, y_high + 0.03, slope * y_high + 0.2], centres)
     contacts = fb.Contacts.points(robot, mu=1.0, normals=normals)
     assert state.com[1] > contacts.positions(state)[:, 1].max() + 0.015
     region = wrench_set(state, contacts, facets=8).support_region()
     assert region[:, 1].max() > state.com[1]
-    record = stood(fb.Simulation(robot, Ground(mu=1.2, normal=[left, right])), contacts, state, facets=8)
+    record = stood(
+        fb.Simulation(robot, Ground(mu=1.2, normal=[left, right])), contacts, state, facets=8
+    )
     assert record.slip().max() < 2e-3
     assert np.linalg.norm(record.final.com - state.com) < 5e-3
-    assert np.allclose(record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight)
+    assert np.allclose(
+        record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight
+    )
     # on level ground the same feet, at the same places seen from above, cannot
     level = fb.Contacts.points(robot, mu=1.0)
-    spot = with_feet(robot, [0.0, y_high + 0.03, 0.3], {name: at * [1, 1, 0] + [0, 0, 0.02] for name, at in centres.items()})
+    spot = with_feet(
+        robot,
+        [0.0, y_high + 0.03, 0.3],
+        {name: at * [1, 1, 0] + [0, 0, 0.02] for name, at in centres.items()},
+    )
     assert wrench_set(spot, level, facets=8).support_region()[:, 1].max() < spot.com[1]
 
 
 def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> None:
     robot, (left, right) = judges.load("go2"), sides(30.0)
-    home, contacts, bottom = robot.standing(), fb.Contacts.points(robot), robot.feet[0].radius / np.cos(np.deg2rad(30.0))
-    centres = {foot.frame: home.frame_pose(foot.frame).translation * [1, 0, 0] + [0, 0, bottom] for foot in robot.feet}
+    home, contacts, bottom = (
+        robot.standing(),
+        fb.Contacts.points(robot),
+        robot.feet[0].radius / np.cos(np.deg2rad(30.0)),
+    )
+    centres = {
+        foot.frame: home.frame_pose(foot.frame).translation * [1, 0, 0] + [0, 0, bottom]
+        for foot in robot.feet
+    }
     sim = fb.Simulation(robot, Ground(normal=[left, right]))
     sim.reset(with_feet(robot, home.q[:3] + [0.0, 0.0, 0.01], centres))
     assert np.allclose(
-        sim.ground.clearances([sim.data.geom(name).xpos for name in sim.point_names]), robot.feet[0].radius, atol=LENGTHS
+        sim.ground.clearances([sim.data.geom(name).xpos for name in sim.point_names]),
+        robot.feet[0].radius,
+        atol=LENGTHS,
     )
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(sim.state))
     record = fb.rollout(sim, controller, 0.1)
     assert len(sim.data.contact.geom) == 8
     forces = sim.contact_forces()
     assert np.allclose(record.measured[-1], forces.ravel())
-    assert np.allclose(forces[:, 2], record.planned[-1].reshape(4, 3)[:, 2], atol=0.1 * robot.weight)
+    assert np.allclose(
+        forces[:, 2], record.planned[-1].reshape(4, 3)[:, 2], atol=0.1 * robot.weight
+    )
     assert forces[:, 2].sum() == pytest.approx(robot.weight, rel=0.1)
 
 
@@ -113,7 +169,9 @@ def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(n
         for _ in range(20):
             sim.step(np.zeros(robot.d))
     assert np.any(near.contact_forces())
-    assert np.allclose(far.contact_forces(), near.contact_forces(), rtol=1e-3, atol=1e-3 * robot.weight)
+    assert np.allclose(
+        far.contact_forces(), near.contact_forces(), rtol=1e-3, atol=1e-3 * robot.weight
+    )
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
@@ -121,7 +179,13 @@ def test_standing_on_a_slope_may_keep_the_base_level(name: str) -> None:
     robot, normal = judges.load(name), np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
     state, home = robot.standing(normal=normal, offset=0.2), robot.standing()
     for foot in robot.feet:
-        assert state.point(foot.frame, foot.middle) @ normal - foot.radius == pytest.approx(0.2, abs=LENGTHS)
-        assert not foot.is_flat or np.allclose(state.frame_pose(foot.frame).rotation[:, 2], normal, atol=LENGTHS)
-    assert np.allclose(state.frame_pose("base").rotation, home.frame_pose("base").rotation, atol=LENGTHS)
+        assert state.point(foot.frame, foot.middle) @ normal - foot.radius == pytest.approx(
+            0.2, abs=LENGTHS
+        )
+        assert not foot.is_flat or np.allclose(
+            state.frame_pose(foot.frame).rotation[:, 2], normal, atol=LENGTHS
+        )
+    assert np.allclose(
+        state.frame_pose("base").rotation, home.frame_pose("base").rotation, atol=LENGTHS
+    )
     assert np.allclose(robot.standing(normal=[0.0, 0.0, 2.0]).q, home.q, atol=LENGTHS)

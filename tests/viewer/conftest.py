@@ -34,7 +34,9 @@ def contacts(go2: Robot) -> Contacts:
 
 @pytest.fixture
 def forces(go2: Robot) -> np.ndarray:
-    """A quarter of the weight on each foot: one inside its cone, one on it, one outside, one inside."""
+    """A quarter of the weight on each foot: one inside its cone, one on it, one outside, one
+    inside.
+    """
     quarter = go2.weight / 4
     tangent = np.array([0.1, 0.6, 0.9, 0.0])
     return quarter * np.stack([tangent, np.zeros(4), np.ones(4)], axis=1)
@@ -60,7 +62,9 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="package")
 def tab(browser) -> Iterator[Any]:
-    """One page for all tests: a new one costs three times as much as another address in the same one."""
+    """One page for all tests: a new one costs three times as much as another address in the same
+    one.
+    """
     opened = browser.new_page()
     yield opened
     opened.close()
@@ -72,7 +76,9 @@ def page(tab) -> Iterator[Any]:
     errors: list[str] = []
     hears = {
         "pageerror": lambda error: errors.append(str(error)),
-        "console": lambda line: errors.append(line.text) if line.text.startswith("floatbase") else None,
+        "console": lambda line: (
+            errors.append(line.text) if line.text.startswith("floatbase") else None
+        ),
     }
     tab.set_viewport_size(SIZE)
     for event, hear in hears.items():

@@ -1,4 +1,6 @@
-"""What the browser tests look with: screenshots, kept in build/screenshots, and the page's own scene."""
+"""What the browser tests look with: screenshots, kept in build/screenshots, and the page's own
+scene.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from floatbase.viewer.transport.window import Window
 
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
-CONTEXTS = 4  # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
+# WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
+CONTEXTS = 4
 
 # world position of a node, in our coordinates
 WHERE = """(path) => {
@@ -28,7 +31,9 @@ DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_rend
 
 def settle(page, title: str | None = None) -> None:
     """Wait until the page has drawn, with this title if there is one."""
-    titled = "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
+    titled = (
+        "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
+    )
     page.wait_for_function(DRAWN + titled)
 
 
@@ -46,7 +51,9 @@ class Screen:
         commands = [protocol.encode(command) for command in viewer.window.scene.commands().values()]
         handled = self.page.evaluate("viewer.num_messages_received")
         self.window.put([protocol.delete("/meshcat"), *commands])
-        self.page.wait_for_function(f"viewer.num_messages_received > {handled} && !viewer.needs_render")
+        self.page.wait_for_function(
+            f"viewer.num_messages_received > {handled} && !viewer.needs_render"
+        )
 
 
 def picture(page, name: str) -> np.ndarray:

@@ -1,4 +1,6 @@
-"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows widgets as notebooks do."""
+"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows
+widgets as notebooks do.
+"""
 
 from __future__ import annotations
 
@@ -26,13 +28,16 @@ _CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each 
 
 def hear(widget: Any, content: Any) -> None:
     """Let a widget have a message of its page."""
-    widget.comm.handle_msg({"content": {"data": {"method": "custom", "content": content}}, "buffers": []})
+    widget.comm.handle_msg(
+        {"content": {"data": {"method": "custom", "content": content}}, "buffers": []}
+    )
 
 
 class Client:
     """A page of a widget, as the kernel hears it. It answers only when it is told to.
 
-    name: of the page. in_cell: whether what it says is heard by the kernel's main thread, and so only between cells.
+    name: of the page. in_cell: whether what it says is heard by the kernel's main thread, and so
+        only between cells.
     """
 
     def __init__(self, widget: Any, name: str = "page", in_cell: bool = False, hello: bool = True):
@@ -40,7 +45,9 @@ class Client:
         self.messages: queue.Queue[tuple[dict[str, Any], list[bytes]]] = queue.Queue()
         clients: list[Client] = _CLIENTS.setdefault(widget, [])
         clients[:] = [client for client in clients if client.name != name] + [self]
-        widget.send = lambda content, buffers=None: [client.take(content, buffers or []) for client in clients]
+        widget.send = lambda content, buffers=None: [
+            client.take(content, buffers or []) for client in clients
+        ]
         if hello:
             self.say("hello")
 
@@ -123,11 +130,14 @@ window.started = true;
 
 
 class Notebook:
-    """A web server with a page that shows widgets. What pages say is heard in the server's thread, as in a subshell.
+    """A web server with a page that shows widgets. What pages say is heard in the server's thread,
+    as in a subshell.
 
-    At `/sealed` it is a page that cannot reach into its frames, as where a notebook seals its outputs off.
+    At `/sealed` it is a page that cannot reach into its frames, as where a notebook seals its
+    outputs off.
 
-    sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not arrive.
+    sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not
+        arrive.
     """
 
     def __init__(self) -> None:
@@ -146,9 +156,15 @@ class Notebook:
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         own = {"notebook": self}
-        pages = [(r"/", _Page, {}), (r"/sealed", _Page, {"policy": "sandbox allow-scripts"}), (r"/comm", _Comm, own)]
+        pages = [
+            (r"/", _Page, {}),
+            (r"/sealed", _Page, {"policy": "sandbox allow-scripts"}),
+            (r"/comm", _Comm, own),
+        ]
         pages += [(r"/widget.js", _Code, own)]
-        server = tornado.httpserver.HTTPServer(tornado.web.Application(pages, websocket_max_message_size=64 << 20))
+        server = tornado.httpserver.HTTPServer(
+            tornado.web.Application(pages, websocket_max_message_size=64 << 20)
+        )
         server.add_sockets(self._listening)
         self._loop.run_forever()
         server.stop()
@@ -156,10 +172,14 @@ class Notebook:
     def show(self, page: Any, widget: Any) -> Any:
         """Put an output below the others; its frame."""
         self.widgets[widget.model_id] = widget
-        widget.send = lambda content, buffers=None: self._send(widget.model_id, content, buffers or [])
+        widget.send = lambda content, buffers=None: self._send(
+            widget.model_id, content, buffers or []
+        )
         state = {name: getattr(widget, name) for name in ("version", "name", "height")}
         thumbnail = base64.b64encode(widget.thumbnail).decode()
-        page.evaluate("([id, state]) => show(id, state)", [widget.model_id, {**state, "thumbnail": thumbnail}])
+        page.evaluate(
+            "([id, state]) => show(id, state)", [widget.model_id, {**state, "thumbnail": thumbnail}]
+        )
         return page.locator(".output").last.locator("iframe").element_handle().content_frame()
 
     def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:
@@ -169,8 +189,12 @@ class Notebook:
             if self.lose:
                 self.lose -= 1
                 return
-        text = json.dumps({"content": content, "buffers": [base64.b64encode(data).decode() for data in buffers]})
-        self._loop.call_soon_threadsafe(lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])])
+        text = json.dumps(
+            {"content": content, "buffers": [base64.b64encode(data).decode() for data in buffers]}
+        )
+        self._loop.call_soon_threadsafe(
+            lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])]
+        )
 
     def send_again(self) -> None:
         """Send the newest frame once more."""
@@ -187,7 +211,9 @@ class Notebook:
 
     @contextmanager
     def deaf(self) -> Iterator[list[tuple[Any, Any]]]:
-        """A while in which nothing is heard of pages, as by a kernel that runs a cell; what they say is heard afterwards."""
+        """A while in which nothing is heard of pages, as by a kernel that runs a cell; what they
+        say is heard afterwards.
+        """
         said = self._said = []
         try:
             yield said
@@ -197,7 +223,9 @@ class Notebook:
 
     def end(self) -> None:
         """End the connections, as a kernel that has gone."""
-        self._loop.call_soon_threadsafe(lambda: [one.close() for some in self.sockets.values() for one in some])
+        self._loop.call_soon_threadsafe(
+            lambda: [one.close() for some in self.sockets.values() for one in some]
+        )
 
     def close(self) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -218,7 +246,9 @@ class _Code(tornado.web.RequestHandler):
         self.notebook = notebook
 
     def get(self) -> None:
-        """The widget's own, which is the same for all; the page asks for it when the first one is shown."""
+        """The widget's own, which is the same for all; the page asks for it when the first one is
+        shown.
+        """
         self.set_header("Content-Type", "text/javascript")
         self.set_header("Access-Control-Allow-Origin", "*")  # a sealed page is of no origin
         self.finish(next(iter(self.notebook.widgets.values())).get_state()["_esm"])

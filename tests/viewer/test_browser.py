@@ -22,10 +22,16 @@ from .looks import EYE, SMALL, WHERE, Screen, hue_pixels, picture, settle
 
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 # of 600 x 400 pixels
-LIGHT, DARK, CHANGE = 220, 70, 60  # brightness of 255 of a push's arrow or outline, and its least difference to what it hides
+LIGHT, DARK, CHANGE = (
+    220,
+    70,
+    60,
+)  # brightness of 255 of a push's arrow or outline, and its least difference to what it hides
 
 
-def test_a_page_has_what_is_shown(page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_a_page_has_what_is_shown(
+    page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     viewer.show(standing, contacts, forces=forces, title="go2 stands")
     page.goto(viewer.url)
     settle(page, "go2 stands")
@@ -36,7 +42,9 @@ def test_a_page_has_what_is_shown(page, viewer: Viewer, standing: State, contact
     assert tree["robot"] == 13
     assert tree["measured"] == tree["cone"] == tree["patch"] == 4
     for name, position in zip(contacts.point_names, contacts.positions(standing), strict=True):
-        np.testing.assert_allclose(page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5)
+        np.testing.assert_allclose(
+            page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5
+        )
     image = picture(page, "go2_standing")
     for colour in (MEASURED, CALM, WARNING, ALARM, COM):
         assert hue_pixels(image, colour) > 100
@@ -46,7 +54,10 @@ def test_a_page_has_what_is_shown(page, viewer: Viewer, standing: State, contact
 
     viewer.show(standing, com=False, title="bare")
     settle(page, "bare")
-    assert page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.measured.children)") == []
+    assert (
+        page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.measured.children)")
+        == []
+    )
     image = picture(page, "go2_bare")
     for colour in (MEASURED, WARNING, ALARM, COM):
         assert hue_pixels(image, colour) < 30
@@ -83,7 +94,9 @@ def test_the_page_comes_back_when_the_window_does(page) -> None:
 
 
 @pytest.mark.front_end
-def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer: Viewer, go2: Robot, standing: State) -> None:
+def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(
+    page, viewer: Viewer, go2: Robot, standing: State
+) -> None:
     page.set_viewport_size({"width": 600, "height": 400})
     page.goto(viewer.url)
     q = standing.q.copy()
@@ -91,13 +104,19 @@ def test_pushes_and_frames_are_seen_through_the_robot_and_its_ghost(page, viewer
     seen = []
     for ghost in (None, State(go2, q)):
         shots = []
-        for title, parts in (("bare", {}), ("push", {"push": ("base", [0.0, 60.0, 0.0])}), ("frame", {"frames": ["base"]})):
+        for title, parts in (
+            ("bare", {}),
+            ("push", {"push": ("base", [0.0, 60.0, 0.0])}),
+            ("frame", {"frames": ["base"]}),
+        ):
             viewer.show(standing, com=False, ghost=ghost, title=title, **parts)
             settle(page, title)
             shots.append(picture(page, f"{title}_and_ghost" if ghost else title))
         bare, push, frame = shots
         darker = (push - bare).max(axis=2) < -40
-        seen.append((np.sum((darker & (push.max(axis=2) < DARK))[:220]), hue_pixels(frame, X_AXIS)))  # above the scale bar
+        seen.append(
+            (np.sum((darker & (push.max(axis=2) < DARK))[:220]), hue_pixels(frame, X_AXIS))
+        )  # above the scale bar
     (push, axes), (push_and_ghost, axes_and_ghost) = seen
     assert push > 90 and push_and_ghost > 0.9 * push
     assert axes > 22 and axes_and_ghost > 0.9 * axes
@@ -120,7 +139,9 @@ def test_a_push_on_a_robot_of_its_own_colour_has_an_outline(screen: Screen) -> N
 
 
 @pytest.mark.front_end
-def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(page, viewer: Viewer, standing: State) -> None:
+def test_the_camera_moves_when_it_is_called_and_not_when_a_picture_is_drawn(
+    page, viewer: Viewer, standing: State
+) -> None:
     def eye_at(title: str) -> list[float]:
         """Where the page looks from once it has the title."""
         viewer.show(standing, title=title)
@@ -179,7 +200,10 @@ def test_a_legend_never_hides_the_robot_and_is_folded_where_it_would(
     viewer.show(standing, contacts, forces, forces, support=True, ghost=standing, title="legend")
     page.goto(viewer.url)
     settle(page, "legend")
-    beside, above = ((1000, 480, False), (1300, 240, False)), ((420, 360, True), (590, 360, True), (1300, 160, True))
+    beside, above = (
+        ((1000, 480, False), (1300, 240, False)),
+        ((420, 360, True), (590, 360, True), (1300, 160, True)),
+    )
     for width, height, folded in (*beside, *above):
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_function(f"{FOLDED} == {str(folded).lower()}")
@@ -202,7 +226,9 @@ def test_a_legend_never_hides_the_robot_and_is_folded_where_it_would(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("background", ["light", "dark"])
-def test_a_folded_legend_opens_by_mouse_and_by_keyboard(browser, go2: Robot, standing: State, background: str) -> None:
+def test_a_folded_legend_opens_by_mouse_and_by_keyboard(
+    browser, go2: Robot, standing: State, background: str
+) -> None:
     viewer = Viewer(go2, background=background)
     viewer.show(standing, ghost=standing, title="folded")
     page = browser.new_page(viewport=SMALL)
@@ -239,7 +265,9 @@ def test_a_folded_legend_opens_by_mouse_and_by_keyboard(browser, go2: Robot, sta
 
 
 @pytest.mark.front_end
-def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, viewer: Viewer, tmp_path: Path) -> None:
+def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(
+    browser, viewer: Viewer, tmp_path: Path
+) -> None:
     viewer.play(rollout(Simulation(viewer.robot), judges.limp, 0.05))
     page = browser.new_page()
     page.goto(viewer.save(tmp_path / "record.html").as_uri())
@@ -248,29 +276,45 @@ def test_a_folded_legend_leaves_room_for_the_player_of_a_recording(browser, view
         page.wait_for_function(f"window.viewer && viewer.num_messages_received > 0 && {FOLDED}")
         button, player = (page.evaluate(BOX, name) for name in ("#legend button", "#player"))
         assert player["right"] < width, width
-        assert button["right"] < player["left"] or (button["bottom"] <= player["top"] and width < 340), width
+        assert button["right"] < player["left"] or (
+            button["bottom"] <= player["top"] and width < 340
+        ), width
         picture(page, f"record_{width}")
     page.close()
 
 
 NAMES = ('<img src=x onerror="hit = true">', "x<y & z > w", "&amp;", "__proto__", 'it\'s \\ "so" τ')
-LABELS = "[...document.querySelectorAll('#panel .row > span, #panel .buttons button')].map((label) => label.textContent)"
-VALUES = "Object.values(viewer.gui_controllers).map((one) => one.getValue()).filter((value) => typeof value != 'function')"
+LABELS = (
+    "[...document.querySelectorAll('#panel .row > span, #panel .buttons "
+    "button')].map((label) => label.textContent)"
+)
+VALUES = (
+    "Object.values(viewer.gui_controllers).map((one) => one.getValue()).filter((value) => "
+    "typeof value != 'function')"
+)
 
 
 @pytest.mark.front_end
-def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer: Viewer) -> None:
+def test_controls_have_any_name_and_the_same_values_in_every_page(
+    page, browser, viewer: Viewer
+) -> None:
     heard: defaultdict[str, list[object]] = defaultdict(list)
     for name in NAMES:
         viewer.add_slider(name, heard[name].append, 0.0, -1.0, 1.0)
         viewer.add_checkbox(f"box {name}", heard[f"box {name}"].append, True)
-        viewer.add_button(f"button {name}", lambda name=name: heard[f"button {name}"].append("pressed"))
+        viewer.add_button(
+            f"button {name}", lambda name=name: heard[f"button {name}"].append("pressed")
+        )
     names = [text for name in NAMES for text in (name, f"box {name}", f"button {name}")]
     page.goto(viewer.url)
-    page.wait_for_function(f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}")
+    page.wait_for_function(
+        f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}"
+    )
     other = browser.new_page(viewport=SMALL)
     other.goto(viewer.url)
-    other.wait_for_function(f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}")
+    other.wait_for_function(
+        f"window.viewer && Object.keys(viewer.gui_controllers).length == {len(names)}"
+    )
     assert [label for label in page.evaluate(LABELS) if label in names] == names
     for name in NAMES:
         page.evaluate("(name) => viewer.gui_controllers[name].setValue(0.5)", name)
@@ -284,13 +328,17 @@ def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser,
         assert one.evaluate("window.hit") is None
     page.reload()
     page.wait_for_function(f"window.viewer && {now} == '{present}'")
-    viewer.add_slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)  # made again, as a cell that is run again does
+    viewer.add_slider(
+        NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0
+    )  # made again, as a cell that is run again does
     other.wait_for_function(f"{VALUES}[0] == 1")
     other.close()
     picture(page, "controls")
     first, *rest = NAMES
     assert heard[first] == [0.5, -0.25] and all(heard[name] == [0.5] for name in rest)
-    assert all(heard[f"box {name}"] == [False] and heard[f"button {name}"] == ["pressed"] for name in NAMES)
+    assert all(
+        heard[f"box {name}"] == [False] and heard[f"button {name}"] == ["pressed"] for name in NAMES
+    )
 
 
 def test_backgrounds(screen: Screen, go2: Robot, standing: State) -> None:
@@ -313,9 +361,15 @@ def test_every_robot_is_in_the_page(screen: Screen) -> None:
         viewer.show(robot.standing(), com=False)
         screen.show(viewer)
         viewer.close()
-        parts = screen.page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.robot.children).length")
-        assert parts == len([path for path in viewer.renderer.picture if path.startswith("robot/")]), name
-        rows, columns = np.nonzero(np.abs(picture(screen.page, f"robot_{name}") - 255).sum(axis=2) > 150)
+        parts = screen.page.evaluate(
+            "Object.keys(viewer.scene_tree.children.meshcat.children.robot.children).length"
+        )
+        assert parts == len(
+            [path for path in viewer.renderer.picture if path.startswith("robot/")]
+        ), name
+        rows, columns = np.nonzero(
+            np.abs(picture(screen.page, f"robot_{name}") - 255).sum(axis=2) > 150
+        )
         assert np.ptp(rows) > 0.45 * 300 or np.ptp(columns) > 0.45 * 450, name
 
 
@@ -335,7 +389,13 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ids=["WebGL", "DecompressionStream"],
 )
 def test_a_page_says_what_its_browser_lacks(
-    browser, viewer: Viewer, standing: State, tmp_path: Path, lacks: str, pages: tuple[str, ...], words: tuple[str, ...]
+    browser,
+    viewer: Viewer,
+    standing: State,
+    tmp_path: Path,
+    lacks: str,
+    pages: tuple[str, ...],
+    words: tuple[str, ...],
 ) -> None:
     viewer.show(standing)
     addresses = {"live": viewer.url, "file": viewer.save(tmp_path / "scene.html").as_uri()}

@@ -26,7 +26,9 @@ SOME = 20  # of 255: by which a pixel is another
 @pytest.fixture(scope="module")
 def view(request: pytest.FixtureRequest) -> fb.Viewer:
     robot = fb.load("go2")
-    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+    controller = fb.WholeBodyController(
+        robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+    )
     run = fb.rollout(fb.Simulation(robot), controller, 0.2, [Push((0.0, 400.0, 0.0), 0.05, 0.1)])
     view = fb.Viewer(robot)
     view.play(run, speed=0.5, follow=False)
@@ -51,7 +53,9 @@ def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
 
 
 @needs_chromium
-def test_a_film_lasts_as_long_as_the_recording_in_slow_motion_and_shows_the_push(view: fb.Viewer, tmp_path: Path) -> None:
+def test_a_film_lasts_as_long_as_the_recording_in_slow_motion_and_shows_the_push(
+    view: fb.Viewer, tmp_path: Path
+) -> None:
     av = pytest.importorskip("av", reason="av writes and reads films")
     path = view.save(tmp_path / "push.mp4", size=SIZE)
     with av.open(str(path)) as container:
@@ -59,7 +63,11 @@ def test_a_film_lasts_as_long_as_the_recording_in_slow_motion_and_shows_the_push
         rate = float(container.streams.video[0].average_rate)
     assert pictures[0].shape == (SIZE[1], SIZE[0], 3)
     assert abs(len(pictures) / rate - 0.2 / 0.5) < 2.0 / rate
-    assert share_of_others(pictures[0], pictures[1]) < 0.01 < share_of_others(pictures[0], pictures[-1])
+    assert (
+        share_of_others(pictures[0], pictures[1])
+        < 0.01
+        < share_of_others(pictures[0], pictures[-1])
+    )
 
 
 @needs_chromium
@@ -72,18 +80,35 @@ def test_a_gif_repeats_and_an_image_is_its_first_picture(view: fb.Viewer, tmp_pa
     assert np.ptp(np.array(image), axis=(0, 1)).min() > 100  # a robot is in it
 
 
-def test_what_a_film_needs_is_told(view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_film_needs_is_told(
+    view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     refused(lambda: view.save(tmp_path / "nowhere" / "push.gif"), ViewerError, "nowhere/push.gif")
-    refused(lambda: view.save(tmp_path / "push.avi"), ViewerError, "push.avi", "html", "mp4", "gif", "png")
+    refused(
+        lambda: view.save(tmp_path / "push.avi"),
+        ViewerError,
+        "push.avi",
+        "html",
+        "mp4",
+        "gif",
+        "png",
+    )
     for size in ((321, 200), (20, 20), (10_000, 200)):
         with raises(InputError, "size", *size, 100, 4000):
             view.save(tmp_path / "push.mp4", size=size)
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
-    refused(lambda: view.save(tmp_path / "push.png", size=SIZE), ViewerError, "playwright", "floatbase[video]")
+    refused(
+        lambda: view.save(tmp_path / "push.png", size=SIZE),
+        ViewerError,
+        "playwright",
+        "floatbase[video]",
+    )
 
 
 @needs_chromium
-def test_a_machine_without_a_browser_is_told(view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_machine_without_a_browser_is_told(
+    view: fb.Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("playwright", reason="playwright is not installed")
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))

@@ -37,14 +37,22 @@ def walked(go2: Robot) -> tuple[Rollout, Walk]:
     contacts = Contacts.feet(go2, mu=0.6)
     walk = Walk(go2, contacts, Gait.trot(go2, swing=SWING, start=START), velocity=(0.2, 0.0))
     push = fb.Push([0.0, 40.0, 0.0], start=0.5)
-    return fb.rollout(Simulation(go2), walk, START + 4.5 * SWING, pushes=[push], control_period=2e-3), walk
+    return fb.rollout(
+        Simulation(go2), walk, START + 4.5 * SWING, pushes=[push], control_period=2e-3
+    ), walk
 
 
 @pytest.fixture(scope="module")
 def biped() -> tuple[Rollout, Walk]:
     """talos, turning left, with one foot in the air where the record ends."""
     robot = fb.load("talos")
-    walk = Walk(robot, Contacts.feet(robot, mu=0.6), Gait.walk(robot, start=0.1), velocity=(0.2, 0.0), yaw_rate=0.4)
+    walk = Walk(
+        robot,
+        Contacts.feet(robot, mu=0.6),
+        Gait.walk(robot, start=0.1),
+        velocity=(0.2, 0.0),
+        yaw_rate=0.4,
+    )
     return fb.rollout(Simulation(robot), walk, 0.4, control_period=4e-3), walk
 
 
@@ -52,8 +60,12 @@ def vertices(item: Item) -> np.ndarray:
     """Vertices of an item, (n, 3), m, world."""
     (packed,) = item.shape.data["geometries"]
     raw = packed["data"]["attributes"]["position"]
-    unit = np.frombuffer(raw["array"].data, "<f4" if raw["type"] == "Float32Array" else "<i2").reshape(-1, 3)
-    return unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    unit = np.frombuffer(
+        raw["array"].data, "<f4" if raw["type"] == "Float32Array" else "<i2"
+    ).reshape(-1, 3)
+    return (
+        unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+    )
 
 
 def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
@@ -62,19 +74,31 @@ def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, W
     assert walk.plan is not None and walk.time == run.time[-1]
     swinging = set(walk.contacts.names) ^ set(run.contacts.names)
     assert len(swinging) == 2
-    assert set(look) == {"dcm", "zmp"} | {f"foothold/{f}" for f in walk.footholds} | {f"swing/{f}" for f in swinging}
+    assert set(look) == {"dcm", "zmp"} | {f"foothold/{f}" for f in walk.footholds} | {
+        f"swing/{f}" for f in swinging
+    }
     np.testing.assert_allclose(
-        look["dcm"].matrix[:2, 3], capture_point(state.com, state.com_velocity, walk.omega), atol=ROUNDED
+        look["dcm"].matrix[:2, 3],
+        capture_point(state.com, state.com_velocity, walk.omega),
+        atol=ROUNDED,
     )
     np.testing.assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
     for foot, place in walk.footholds.items():  # go2's frames are in the middles of its balls
         ring = look[f"foothold/{foot}"]
         np.testing.assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
-        assert 0.0 < ring.matrix[2, 3] - (place[2] - run.robot.feet[0].radius) < 0.01 * viewer.painter.size
-        assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius  # seen around the foot
+        assert (
+            0.0
+            < ring.matrix[2, 3] - (place[2] - run.robot.feet[0].radius)
+            < 0.01 * viewer.painter.size
+        )
+        assert (
+            np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
+        )  # seen around the foot
 
 
-def test_a_line_follows_the_swing_to_its_foothold(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_a_line_follows_the_swing_to_its_foothold(
+    viewer: Viewer, walked: tuple[Rollout, Walk]
+) -> None:
     run, walk = walked
     look = viewer.walk_overlay(walk, run.final)
     for foot, path in walk.swings.items():
@@ -84,35 +108,55 @@ def test_a_line_follows_the_swing_to_its_foothold(viewer: Viewer, walked: tuple[
         for point, at in ((line[0], path.start), (line[-1], path.end)):
             np.testing.assert_allclose(point, at + ground, atol=POINTS * size)
         middle, *_ = path((path.lift_off + path.touchdown) / 2.0)
-        # the ground is level but for how feet come down, so the curve leans by what the ends differ in height
+        # the ground is level but for how feet come down, so the curve leans by what the ends differ
+        # in height
         leans = abs(path.end[2] - path.start[2]) + POINTS * size
         np.testing.assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
 
 
-def test_a_swing_aimed_elsewhere_costs_no_new_shape(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_a_swing_aimed_elsewhere_costs_no_new_shape(
+    viewer: Viewer, walked: tuple[Rollout, Walk]
+) -> None:
     run, walk = walked
     viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final))
     shapes = {path: item.shape for path, item in viewer.renderer.picture.items()}
-    other = run.state(-20)  # the capture point is elsewhere, and so the picture of the same step differs
-    viewer.show(other, walk.contacts, extra=viewer.step_overlay(walk.history[-1], float(run.time[-20]), other))
+    other = run.state(
+        -20
+    )  # the capture point is elsewhere, and so the picture of the same step differs
+    viewer.show(
+        other,
+        walk.contacts,
+        extra=viewer.step_overlay(walk.history[-1], float(run.time[-20]), other),
+    )
     now = viewer.renderer.picture
     assert all(now[path].shape is shapes[path] for path in now)
-    assert np.abs(now["dcm"].matrix[:2, 3] - viewer.walk_overlay(walk, run.final)["dcm"].matrix[:2, 3]).max() > 1e-4
+    assert (
+        np.abs(
+            now["dcm"].matrix[:2, 3] - viewer.walk_overlay(walk, run.final)["dcm"].matrix[:2, 3]
+        ).max()
+        > 1e-4
+    )
 
 
-def test_a_stored_step_is_drawn_as_it_was_planned(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_a_stored_step_is_drawn_as_it_was_planned(
+    viewer: Viewer, walked: tuple[Rollout, Walk]
+) -> None:
     run, walk = walked
     step, t = walk.history[2], walk.history[2].time + 0.1
     row = int(np.searchsorted(run.time, t - 1e-9))
     look = viewer.step_overlay(step, t, run.state(row))
     assert set(step.swings) == set(run.contacts.names) - set(step.stance) and len(step.swings) == 2
-    assert {path for path in look if path.startswith("swing/")} == {f"swing/{foot}" for foot in step.swings}
+    assert {path for path in look if path.startswith("swing/")} == {
+        f"swing/{foot}" for foot in step.swings
+    }
     np.testing.assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
     for foot, place in step.footholds.items():
         np.testing.assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
-def test_before_its_first_tick_a_walk_has_nothing_to_draw(viewer: Viewer, go2: Robot, standing: State) -> None:
+def test_before_its_first_tick_a_walk_has_nothing_to_draw(
+    viewer: Viewer, go2: Robot, standing: State
+) -> None:
     walk = Walk(go2, Contacts.feet(go2), Gait.trot(go2))
     assert viewer.walk_overlay(walk, standing) == {} and walk.time is None
 
@@ -126,9 +170,13 @@ def test_soles_are_outlined_where_and_as_they_will_stand(biped: tuple[Rollout, W
         outline = vertices(look[f"foothold/{foot}"])
         corners = run.robot.feet[0].corners[:, :2]
         middle = outline[:, :2].mean(axis=0)
-        np.testing.assert_allclose(middle, walk.footholds[foot][:2], atol=1e-3)  # m: the sole's frame is in its middle
+        np.testing.assert_allclose(
+            middle, walk.footholds[foot][:2], atol=1e-3
+        )  # m: the sole's frame is in its middle
         radii = np.linalg.norm(outline[:4, :2] - middle, axis=1)
-        np.testing.assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)  # vertices are 16-bit numbers
+        np.testing.assert_allclose(
+            radii, np.linalg.norm(corners, axis=1), atol=1e-3
+        )  # vertices are 16-bit numbers
         x, y = look[f"foothold/{foot}"].matrix[:2, 0]
         left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
         base = run.final.frame_pose("base").rotation
@@ -141,10 +189,15 @@ def test_marks_have_legends_of_their_own_and_no_colour_of_a_force_or_a_cone(
     viewer: Viewer, walked: tuple[Rollout, Walk]
 ) -> None:
     run, walk = walked
-    viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final), title="go2 trots")
+    viewer.show(
+        run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final), title="go2 trots"
+    )
     items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
     shown = {text: (colour, symbol) for colour, text, symbol in items}
-    assert shown["capture point"] == (hex_code(COM), "ring") and shown["centre of mass"] == (hex_code(COM), "disc")
+    assert shown["capture point"] == (hex_code(COM), "ring") and shown["centre of mass"] == (
+        hex_code(COM),
+        "disc",
+    )
     assert shown["planned ZMP"] == (hex_code(viewer.painter.text_colour), "diamond")
     assert shown["planned foothold"] == (hex_code(GREYS[1]), "ring") and "swing path" in shown
     assert len({*shown.values()}) == len(shown)  # two of one colour differ in their symbol
@@ -152,13 +205,24 @@ def test_marks_have_legends_of_their_own_and_no_colour_of_a_force_or_a_cone(
     assert len(kinds) == 4 and not {MEASURED, PLANNED, *CONE.values()} & set(kinds.values())
 
 
-def test_what_cannot_be_drawn_is_refused_by_name(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_what_cannot_be_drawn_is_refused_by_name(
+    viewer: Viewer, walked: tuple[Rollout, Walk]
+) -> None:
     run, walk = walked
     refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
-    refused(lambda: viewer.walk_overlay(walk, fb.load("solo12").standing()), InputError, "go2", "solo12")
+    refused(
+        lambda: viewer.walk_overlay(walk, fb.load("solo12").standing()), InputError, "go2", "solo12"
+    )
     refused(lambda: viewer.step_overlay(walk, 0.0, run.final), InputError, "step", "Step", "Walk")
-    refused(lambda: viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final), UnknownNameError, "go2", "paw")
-    refused(lambda: viewer.step_overlay(walk.history[1], np.nan, run.final), InputError, "t", np.nan)
+    refused(
+        lambda: viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final),
+        UnknownNameError,
+        "go2",
+        "paw",
+    )
+    refused(
+        lambda: viewer.step_overlay(walk.history[1], np.nan, run.final), InputError, "t", np.nan
+    )
     refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
     refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "Step", "Rollout")
     refused(lambda: plots.plot_normal_forces(run, [plt.gca()]), InputError, "axes", 1, 4)
@@ -180,17 +244,34 @@ def arm() -> Rollout:
 def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
     run, walk = walked
     viewer.play(run, steps=walk.history)
-    (command,) = (c for (_, kind, _), c in viewer.window.scene.commands().items() if kind == "set_animation")
-    tracks = {(clip["path"], track["name"]): track for clip in command["animations"] for track in clip["clip"]["tracks"]}
-    first, second = walk.history[1], walk.history[2]  # after standing: one pair lifts, then the other
+    (command,) = (
+        c for (_, kind, _), c in viewer.window.scene.commands().items() if kind == "set_animation"
+    )
+    tracks = {
+        (clip["path"], track["name"]): track
+        for clip in command["animations"]
+        for track in clip["clip"]["tracks"]
+    }
+    first, second = (
+        walk.history[1],
+        walk.history[2],
+    )  # after standing: one pair lifts, then the other
     for foot in first.swings:
         track = tracks[f"/meshcat/swing/{foot}", ".visible"]
         times, seen = np.array(track["times"]), np.array(track["values"])
-        assert seen[(times >= first.time) & (times < second.time)].all() and not seen[times < first.time].any()
+        assert (
+            seen[(times >= first.time) & (times < second.time)].all()
+            and not seen[times < first.time].any()
+        )
     assert ("/meshcat/dcm", ".position") in tracks
     before = set(viewer.renderer.picture)
     viewer.play(run)
-    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == {"dcm", "zmp", "foothold", "swing"}
+    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == {
+        "dcm",
+        "zmp",
+        "foothold",
+        "swing",
+    }
 
 
 def test_a_followed_place_goes_straight_ways_and_leaves_out_the_steps() -> None:
@@ -212,7 +293,9 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     lines = vertices(viewer.renderer.picture["ground"])
     low, high = lines.min(axis=0), lines.max(axis=0)
     assert (low[:2] < q[:2] - 3.0).all() and (high[:2] > q[:2] + 3.0).all()
-    np.testing.assert_allclose(lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3)  # the same lines
+    np.testing.assert_allclose(
+        lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3
+    )  # the same lines
 
 
 TARGET = "viewer.controls.target.toArray()"
@@ -257,10 +340,18 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_t
           };
           look();
         })""")
-        assert (np.diff(ways) >= 0.0).all() and len({round(x, 3) for x in ways}) > 4  # on its way, not at once
-        np.testing.assert_allclose(np.subtract(page.evaluate(TARGET), before), [1.0, rise, -0.5], atol=SEEN)
-        np.testing.assert_allclose(np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, rise], atol=SEEN)
-        np.testing.assert_allclose(np.subtract(page.evaluate(LIGHTS), lights), [[1.0, 0.5, rise]] * 2, atol=SEEN)
+        assert (np.diff(ways) >= 0.0).all() and len(
+            {round(x, 3) for x in ways}
+        ) > 4  # on its way, not at once
+        np.testing.assert_allclose(
+            np.subtract(page.evaluate(TARGET), before), [1.0, rise, -0.5], atol=SEEN
+        )
+        np.testing.assert_allclose(
+            np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, rise], atol=SEEN
+        )
+        np.testing.assert_allclose(
+            np.subtract(page.evaluate(LIGHTS), lights), [[1.0, 0.5, rise]] * 2, atol=SEEN
+        )
         after = page.evaluate(TARGET)
         page.reload()  # a page that comes later looks at the robot where it is
         settle(page, "gone")
@@ -292,13 +383,17 @@ def test_a_saved_walk_is_followed_and_looks_as_it_was(
         picture(page, f"trot_{t:.2f}")
     gone = np.subtract(page.evaluate(TARGET), before)
     # the mean over a stride is not where the base is at the end of one
-    np.testing.assert_allclose(gone, [*(run.q[-1] - run.q[0])[:1], 0.0, -(run.q[-1] - run.q[0])[1]], atol=0.03)
+    np.testing.assert_allclose(
+        gone, [*(run.q[-1] - run.q[0])[:1], 0.0, -(run.q[-1] - run.q[0])[1]], atol=0.03
+    )
     page.evaluate("viewer.animator.seek(0); viewer.set_dirty()")
     page.wait_for_function("!viewer.needs_render")
     np.testing.assert_allclose(page.evaluate(TARGET), before, atol=SEEN)
 
 
-def test_a_gait_diagram_has_the_stances_and_the_measured_contacts(walked: tuple[Rollout, Walk]) -> None:
+def test_a_gait_diagram_has_the_stances_and_the_measured_contacts(
+    walked: tuple[Rollout, Walk],
+) -> None:
     run, _ = walked
     axis = plots.plot_gait(run)
     names = [label.get_text() for label in axis.get_yticklabels()]
@@ -333,7 +428,9 @@ def test_normal_forces_are_those_of_each_foot_beside_the_gait(biped: tuple[Rollo
     plt.close("all")
 
 
-def test_a_record_of_one_stance_has_a_gait_diagram_too(go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_a_record_of_one_stance_has_a_gait_diagram_too(
+    go2: Robot, standing: State, contacts: Contacts
+) -> None:
     controller = fb.WholeBodyController(go2, contacts, fb.standing_tasks(standing))
     run = fb.rollout(Simulation(go2), controller, 0.05)
     assert not run.stances

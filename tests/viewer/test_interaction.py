@@ -1,4 +1,6 @@
-"""The picture among other things: wheel and finger, the way home, keys, parts that hide, motion that some cannot bear."""
+"""The picture among other things: wheel and finger, the way home, keys, parts that hide, motion
+that some cannot bear.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +24,26 @@ SCENE = "viewer.scene_tree.children.meshcat.children"
 
 
 @pytest.fixture
-def framed(page, go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> Iterator[tuple]:
+def framed(
+    page, go2: Robot, standing: State, contacts: Contacts, tmp_path: Path
+) -> Iterator[tuple]:
     """A page that scrolls, with a saved picture in a frame from 300 to 780 pixels, and that frame."""
     view = Viewer(go2, facets=4)
-    view.show(standing, contacts, forces=np.tile([5.0, 0.0, 40.0], 4), ghost=standing, title="go2 standing")
+    view.show(
+        standing,
+        contacts,
+        forces=np.tile([5.0, 0.0, 40.0], 4),
+        ghost=standing,
+        title="go2 standing",
+    )
     view.save(tmp_path / "picture.html")
     view.close()
     outer = tmp_path / "outer.html"
     frame = '<iframe src="picture.html" style="width: 100%; height: 480px; border: 0"></iframe>'
-    outer.write_text(f'<body style="margin: 0"><div style="height: 300px"></div>{frame}<div style="height: 2000px"></div>')
+    outer.write_text(
+        f'<body style="margin: 0"><div style="height: 300px"></div>{frame}<div style="height: '
+        f'2000px"></div>'
+    )
     page.set_viewport_size({"width": 900, "height": 800})
     page.goto(outer.as_uri())
     inner = page.frames[-1]
@@ -69,9 +82,14 @@ def test_a_finger_pans_the_page(browser, framed) -> None:
     page.goto(outer)
     page.frames[-1].wait_for_function(DRAWN)
     touch = context.new_cdp_session(page)
-    touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": 200, "y": 600}]})
+    touch.send(
+        "Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": 200, "y": 600}]}
+    )
     for i in range(1, 20):
-        touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": 200, "y": 600 - 10 * i}]})
+        touch.send(
+            "Input.dispatchTouchEvent",
+            {"type": "touchMove", "touchPoints": [{"x": 200, "y": 600 - 10 * i}]},
+        )
         page.wait_for_timeout(16)
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     page.wait_for_function("scrollY > 60")
@@ -86,13 +104,22 @@ def test_views_parts_and_keys(framed) -> None:
     picture(page, "tools")
     for label in ("feet", "side", "front", "top"):
         inner.evaluate(
-            "(label) => [...document.querySelectorAll('#tools div button')].find((one) => one.textContent == label).click()",
+            "(label) => [...document.querySelectorAll('#tools div button')].find((one) => "
+            "one.textContent == label).click()",
             label,
         )
         assert not np.allclose(inner.evaluate(CAMERA), home), label
     assert inner.evaluate(CAMERA)[1] > 2 * home[1]  # from the top
-    for name, node in (("cones", "cone"), ("forces", "measured"), ("robot", "robot"), ("ghost", "ghost")):
-        press = "(name) => [...document.querySelectorAll('#tools label')].find((one) => one.textContent == name).click()"
+    for name, node in (
+        ("cones", "cone"),
+        ("forces", "measured"),
+        ("robot", "robot"),
+        ("ghost", "ghost"),
+    ):
+        press = (
+            "(name) => [...document.querySelectorAll('#tools label')].find((one) => "
+            "one.textContent == name).click()"
+        )
         for is_seen in (False, True):
             inner.evaluate(press, name)
             inner.wait_for_function(f"{SCENE}['{node}'].object.visible == {str(is_seen).lower()}")
@@ -102,16 +129,23 @@ def test_views_parts_and_keys(framed) -> None:
     inner.evaluate("document.querySelector('#tools button').click()")
     inner.evaluate("viewer.renderer.domElement.focus()")
     far = np.linalg.norm(home)
-    for key, changes in (("ArrowLeft", lambda at: at[1] == pytest.approx(home[1])), ("+", lambda at: np.linalg.norm(at) < far)):
+    for key, changes in (
+        ("ArrowLeft", lambda at: at[1] == pytest.approx(home[1])),
+        ("+", lambda at: np.linalg.norm(at) < far),
+    ):
         page.keyboard.press(key)
-        inner.wait_for_function(f"JSON.stringify({CAMERA}) != '{inner.evaluate(f'JSON.stringify({home})')}'")
+        inner.wait_for_function(
+            f"JSON.stringify({CAMERA}) != '{inner.evaluate(f'JSON.stringify({home})')}'"
+        )
         assert changes(inner.evaluate(CAMERA)), key
         page.keyboard.press("h")
         np.testing.assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
     assert inner.evaluate("viewer.renderer.domElement.getAttribute('aria-label')") == "go2 standing"
 
 
-def test_a_recording_waits_for_who_asked_for_less_motion(browser, go2: Robot, tmp_path: Path) -> None:
+def test_a_recording_waits_for_who_asked_for_less_motion(
+    browser, go2: Robot, tmp_path: Path
+) -> None:
     view = Viewer(go2)
     controller = lambda q, v, t: type("Limp", (), {"tau": np.zeros(12)})()  # noqa: E731
     view.play(rollout(Simulation(go2), controller, 0.1))
@@ -126,7 +160,9 @@ def test_a_recording_waits_for_who_asked_for_less_motion(browser, go2: Robot, tm
         context.close()
 
 
-def test_a_page_whose_viewer_has_closed_says_what_it_was_told_to(page, go2: Robot, standing: State) -> None:
+def test_a_page_whose_viewer_has_closed_says_what_it_was_told_to(
+    page, go2: Robot, standing: State
+) -> None:
     view = Viewer(go2)
     view.show(standing)
     view.set_disconnect_message("Start it again with\npython -m floatbase view go2")
@@ -140,7 +176,10 @@ def test_a_page_whose_viewer_has_closed_says_what_it_was_told_to(page, go2: Robo
 
 def test_labels_keep_their_size_in_a_small_window(framed) -> None:
     page, inner = framed
-    tall = "viewer.scene_tree.find(['meshcat', 'scale', 'label', '<object>']).object.scale.y * viewer.camera.zoom"
+    tall = (
+        "viewer.scene_tree.find(['meshcat', 'scale', 'label', '<object>']).object.scale.y * "
+        "viewer.camera.zoom"
+    )
     before = inner.evaluate(tall)
     page.set_viewport_size({"width": 390, "height": 800})
     inner.wait_for_function("viewer.camera.zoom < 0.8 && !viewer.needs_render")

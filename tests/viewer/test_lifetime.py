@@ -1,4 +1,6 @@
-"""What a window goes through: killed browsers, pages that never read, interrupts, restarts; nothing hangs, grows or stays."""
+"""What a window goes through: killed browsers, pages that never read, interrupts, restarts; nothing
+hangs, grows or stays.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ from floatbase.viewer.transport.window import Window
 from .test_window import window_threads
 
 MB = 1 << 20
-HUNG = 5.0  # s: a sixth of what a page may take over a frame, so a call that waits for a page takes longer
+# s: a sixth of what a page may take over a frame, so a call that waits for a page takes longer
+HUNG = 5.0
 
 
 def memory() -> int:
@@ -50,11 +53,20 @@ def answers(port: int) -> bool:
 @pytest.mark.front_end
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found on the path")
 def test_a_killed_browser_leaves_nothing_behind(
-    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, tmp_path: Path
+    viewer: Viewer,
+    go2: Robot,
+    standing: State,
+    contacts: Contacts,
+    forces: np.ndarray,
+    tmp_path: Path,
 ) -> None:
     viewer.show(standing, contacts, forces)
     address = viewer.url
-    threads, files, entries = threading.active_count(), len(os.listdir("/proc/self/fd")), len(viewer.window.scene)
+    threads, files, entries = (
+        threading.active_count(),
+        len(os.listdir("/proc/self/fd")),
+        len(viewer.window.scene),
+    )
     browser = subprocess.Popen(
         [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", address],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
@@ -86,7 +98,8 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
     with socket.create_connection(("127.0.0.1", window.port)) as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.sendall(
-            f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{window.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{window.port}\r\nUpgrade: websocket\r\n"
+            f"Connection: Upgrade\r\n"
             "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
         )
         until(lambda: window.n_pages == 1)
@@ -94,13 +107,17 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 
 
 @pytest.mark.front_end
-def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window: Window, sleeper: socket.socket) -> None:
+def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(
+    window: Window, sleeper: socket.socket
+) -> None:
     (_, command) = protocol.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):
             path = f"/meshcat/{i % 5}"
-            window.put([((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))])
+            window.put(
+                [((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))]
+            )
 
     draw(5_000)
     before = memory()
@@ -114,7 +131,9 @@ def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(w
     assert not answers(window.port)
 
 
-def test_a_page_that_never_reads_is_dropped(window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_never_reads_is_dropped(
+    window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     files = len(os.listdir("/proc/self/fd"))
 
@@ -126,7 +145,9 @@ def test_a_page_that_never_reads_is_dropped(window: Window, sleeper: socket.sock
     until(lambda: len(os.listdir("/proc/self/fd")) < files)
 
 
-def test_several_viewers_in_one_process_do_not_know_each_other(viewer: Viewer, standing: State) -> None:
+def test_several_viewers_in_one_process_do_not_know_each_other(
+    viewer: Viewer, standing: State
+) -> None:
     with Window() as other:
         arm = load("ur5")
         second = Viewer(arm)
@@ -172,17 +193,28 @@ class Kernel:
 def test_a_kernel_is_interrupted_and_restarted_under_a_viewer() -> None:
     kernel = Kernel()
     try:
-        make = "import floatbase as fb; view = fb.Viewer(fb.load('ur5'), port={}); s = view.robot.standing(); view.show(s)"
+        make = (
+            "import floatbase as fb; view = fb.Viewer(fb.load('ur5'), port={}); s = "
+            "view.robot.standing(); view.show(s)"
+        )
         port = int(kernel.run(make.format(0) + "\nprint(view.window.port)"))
         assert answers(port)
 
-        told = kernel.told(kernel.client.execute("print('drawing')\nwhile True: view.show(s, com=False); view.show(s)"))
+        told = kernel.told(
+            kernel.client.execute(
+                "print('drawing')\nwhile True: view.show(s, com=False); view.show(s)"
+            )
+        )
         assert next(told).startswith("drawing")
         kernel.manager.interrupt_kernel()
-        # In the text, not as the error's name: where the interrupt lands on an instruction without a line, Python 3.11 and
+        # In the text, not as the error's name: where the interrupt lands on an instruction without
+        # a line, Python 3.11 and
         # IPython's formatter of tracebacks print "KeyboardInterrupt" as text instead.
         assert "KeyboardInterrupt" in "".join(told)
-        assert kernel.run("view.show(s); print(view.window.is_open, len(view.renderer.picture) > 0)") == "True True\n"
+        assert (
+            kernel.run("view.show(s); print(view.window.is_open, len(view.renderer.picture) > 0)")
+            == "True True\n"
+        )
 
         kernel.manager.restart_kernel(now=False)
         until(lambda: not answers(port))
@@ -209,7 +241,10 @@ display(view, push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, f
 field = playground("go2")
 display(field)
 print(repr(view), repr(field), type(view.widget()).__name__)"""
-PORTS = "import psutil; print(sorted(c.laddr.port for c in psutil.Process().net_connections('inet') if c.status == 'LISTEN'))"
+PORTS = (
+    "import psutil; print(sorted(c.laddr.port for c in "
+    "psutil.Process().net_connections('inet') if c.status == 'LISTEN'))"
+)
 
 
 @pytest.mark.front_end

@@ -28,7 +28,9 @@ def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(catalogue())
 
 
-def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_name_or_port_is_a_message_not_a_traceback(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main(["view", "go3", "--no-browser"]) == 2
     assert not missing(capsys.readouterr().err, "go3", "go2")
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
@@ -60,7 +62,9 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     assert "ur5 at http://127.0.0.1" in process.stdout.readline()
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
-    compiled = "floatbase compiles its controller, once: about a minute.\n"  # where `make setup` did not
+    compiled = (
+        "floatbase compiles its controller, once: about a minute.\n"  # where `make setup` did not
+    )
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 
@@ -109,11 +113,15 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control("CoM x [m]", "setValue(0.04)")
-    until(lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work)
+    until(
+        lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work
+    )
     control("facets", "setValue(6)")
     control("friction believed", "setValue(0.3)")
     until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
-    until(lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work)
+    until(
+        lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work
+    )
     picture(page, "bare_page")
     control("pause", "fire()")
     until(lambda: playground.run.status == "paused", work)
@@ -126,7 +134,9 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
 
 
 @pytest.mark.front_end
-def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground: Playground) -> None:
+def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
+    page, playground: Playground
+) -> None:
     def work() -> None:
         page.wait_for_timeout(20)
 
@@ -144,7 +154,13 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
     until(lambda: place()[0] > 0.3, work)
     picture(page, "bare_page_walking")
     control("gait", "setValue(0)")
-    until(lambda: playground.session.last.contacts_at(-1).names == tuple(foot.frame for foot in playground.robot.feet), work)
+    until(
+        lambda: (
+            playground.session.last.contacts_at(-1).names
+            == tuple(foot.frame for foot in playground.robot.feet)
+        ),
+        work,
+    )
     stopped = place()
     control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
     until(lambda: place()[2] < stopped[2] - 0.01, work)
@@ -155,7 +171,9 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground:
 
 
 @pytest.mark.front_end
-def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground: Playground) -> None:
+def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
+    page, playground: Playground
+) -> None:
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
     page.goto(playground.url)
@@ -164,7 +182,9 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
     page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
     arrow = None
-    for _ in range(8):  # the arrow stays for half a second, in which a busy machine may draw no frame
+    for _ in range(
+        8
+    ):  # the arrow stays for half a second, in which a busy machine may draw no frame
         page.evaluate("viewer.gui_controllers['push'].fire()")
         with suppress(PlaywrightTimeoutError):
             # its shape comes with one message, its direction, which is not up, with the next
@@ -177,7 +197,9 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, 
     picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
     playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
-    page.wait_for_function("document.getElementById('title').textContent.includes('fell: press reset')")
+    page.wait_for_function(
+        "document.getElementById('title').textContent.includes('fell: press reset')"
+    )
     page.evaluate("viewer.gui_controllers['reset'].fire()")
     page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")
     assert playground.run.status == "running"

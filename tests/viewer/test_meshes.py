@@ -1,4 +1,6 @@
-"""Light meshes: their size, their likeness to the originals, and what robots without them are shown with."""
+"""Light meshes: their size, their likeness to the originals, and what robots without them are shown
+with.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,11 @@ from floatbase.viewer.scene.meshes import robot_meshes
 from floatbase.viewer.scene.visuals import urdf_visuals
 
 MESHES = Path(__file__).parents[2] / "assets" / "meshes"
-BOX = 0.01  # m: by which decimation may move an outermost vertex; three pixels in a picture of a whole robot
-REACH = 0.03  # m from a contact to the nearest vertex: a foot's ball has a radius of 2 cm, and a sole few vertices
+# m: by which decimation may move an outermost vertex; three pixels in a picture of a whole robot
+BOX = 0.01
+# m from a contact to the nearest vertex: a foot's ball has a radius of 2 cm, and a sole few
+# vertices
+REACH = 0.03
 
 
 def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
@@ -29,12 +34,16 @@ def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
 
 
 @pytest.mark.parametrize("name", catalogue())
-def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(name: str) -> None:
+def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(
+    name: str,
+) -> None:
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
-    visuals = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders).geometryObjects
+    visuals = pin.buildGeomFromUrdfString(
+        robot.model, robot.urdf, pin.VISUAL, package_dirs=folders
+    ).geometryObjects
     pieces = urdf_visuals(robot)
     assert {(piece.joint, piece.source) for piece in pieces} == {
         (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
@@ -55,7 +64,10 @@ def test_light_meshes_reach_down_to_the_contacts() -> None:
         state = robot.standing()
         contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
         poses = state.joint_transforms
-        points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in robot_meshes(robot)]
+        points = [
+            mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3]
+            for mesh in robot_meshes(robot)
+        ]
         for position in contacts.positions(state):
             assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < REACH, name
 
@@ -68,7 +80,9 @@ def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
 
 def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    robot = load_urdf(load("go2").urdf.replace("package://", "package://unheard/of/"), feet=["RR_foot"])
+    robot = load_urdf(
+        load("go2").urdf.replace("package://", "package://unheard/of/"), feet=["RR_foot"]
+    )
     meshes = robot_meshes(robot)
     assert [mesh.joint for mesh in meshes] == list(range(1, robot.model.njoints))
     calf = meshes[-1].vertices
@@ -77,17 +91,29 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
 
 
 def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
-    """The same text under another name, of other masses or with legs further apart, has them. One of the same name with
-    other feet, with a joint more, or another robot altogether, has not."""
+    """The same text under another name, of other masses or with legs further apart, has them. One
+    of the same name with other feet, with a joint more, or another robot altogether, has not.
+    """
     urdf = load("go2").urdf
     light = [mesh.vertices for mesh in robot_meshes(load("go2"))]
-    for old, new, same in (("6.921", "7.5", True), ("0 0.0955 0", "0 0.12 0", True), ("0 0 -0.213", "0 0 -0.25", False)):
+    for old, new, same in (
+        ("6.921", "7.5", True),
+        ("0 0.0955 0", "0 0.12 0", True),
+        ("0 0 -0.213", "0 0 -0.25", False),
+    ):
         assert old in urdf
-        drawn = [mesh.vertices for mesh in robot_meshes(load_urdf(urdf.replace(old, new), name="mine" if same else "go2"))]
+        drawn = [
+            mesh.vertices
+            for mesh in robot_meshes(
+                load_urdf(urdf.replace(old, new), name="mine" if same else "go2")
+            )
+        ]
         assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
     ankle = re.sub('"FL_foot_joint"\\s*type="fixed"', '"FL_foot_joint" type="continuous"', urdf)
     walker = load_urdf(re.sub('<axis\\s*xyz="0 0 0"', '<axis xyz="0 1 0"', ankle))
-    assert walker.model.getJointId("FL_foot_joint") in {mesh.joint for mesh in robot_meshes(walker)}  # its foot turns
+    assert walker.model.getJointId("FL_foot_joint") in {
+        mesh.joint for mesh in robot_meshes(walker)
+    }  # its foot turns
     other = load_urdf(MESHES.parent / "models" / "cart.urdf", name="go2")
     assert len(robot_meshes(other)) < len(light)
 
@@ -107,7 +133,13 @@ def test_what_a_locked_joint_moved_hangs_on_the_joint_above() -> None:
     stiff = load("ur5", locked=["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"])
     meshes = robot_meshes(stiff)
     assert [mesh.joint for mesh in meshes] == [0, 1, 2, 3]
-    assert sum(len(mesh.faces) for mesh in meshes) == sum(len(mesh.faces) for mesh in robot_meshes(arm))
+    assert sum(len(mesh.faces) for mesh in meshes) == sum(
+        len(mesh.faces) for mesh in robot_meshes(arm)
+    )
     home, whole = arm.standing(), robot_meshes(arm)[-1]
     tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
-    np.testing.assert_allclose(tip, home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3), atol=1e-5)
+    np.testing.assert_allclose(
+        tip,
+        home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3),
+        atol=1e-5,
+    )

@@ -1,4 +1,6 @@
-"""The picture in a notebook: how many frames pages get, busy kernels, pages that are slow, lost or strange, what is saved."""
+"""The picture in a notebook: how many frames pages get, busy kernels, pages that are slow, lost or
+strange, what is saved.
+"""
 
 from __future__ import annotations
 
@@ -104,12 +106,16 @@ def test_a_page_that_answers_gets_the_pace_and_no_more(window: Window) -> None:
 
 
 def test_a_hundred_thousand_updates_for_a_stalled_page_take_no_memory(window: Window) -> None:
-    (_, command) = protocol.set_object("/meshcat/a", protocol.umsgpack.packb({"data": "x" * 20_000}))
+    (_, command) = protocol.set_object(
+        "/meshcat/a", protocol.umsgpack.packb({"data": "x" * 20_000})
+    )
 
     def draw(n: int) -> None:
         for i in range(n):
             path = f"/meshcat/{i % 5}"
-            window.put([((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))])
+            window.put(
+                [((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))]
+            )
 
     draw(5)
     client = Client(window.widget("a", 100))
@@ -142,7 +148,9 @@ def busy(shell: InteractiveShell) -> Iterator[None]:
     shell.events.trigger("post_run_cell", None)
 
 
-def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell: InteractiveShell, window_of_shell: Window) -> None:
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(
+    shell: InteractiveShell, window_of_shell: Window
+) -> None:
     window = window_of_shell
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=True)
@@ -198,7 +206,9 @@ def test_a_long_cell_does_not_make_a_page_look_lost(
     assert newest(client.commands()) == -1 and window.n_pages == 1
 
 
-def test_a_page_that_is_let_go_is_told_and_comes_back(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_is_let_go_is_told_and_comes_back(
+    window: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     put(window, 0)
     client = Client(window.widget("a", 100))
@@ -229,12 +239,23 @@ def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) ->
     assert window.n_pages == 0
 
 
-def test_what_no_page_of_a_notebook_says_is_ignored(window: Window, caplog: pytest.LogCaptureFixture) -> None:
+def test_what_no_page_of_a_notebook_says_is_ignored(
+    window: Window, caplog: pytest.LogCaptureFixture
+) -> None:
     put(window, 1)
     widget = window.widget("a", 100)
     client = Client(widget)
     client.commands()
-    for content in (None, 3, "x", [], {}, {"page": "page"}, {"page": 3, "say": "hello"}, {"page": "page", "say": {}}):
+    for content in (
+        None,
+        3,
+        "x",
+        [],
+        {},
+        {"page": "page"},
+        {"page": 3, "say": "hello"},
+        {"page": "page", "say": {}},
+    ):
         hear(widget, content)
     for words in STRANGE:
         if isinstance(words, str) and words != "hello":
@@ -337,7 +358,9 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 
 @pytest.mark.front_end
-def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(notebook: Notebook, page: Any, viewer: Viewer) -> None:
+def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(
+    notebook: Notebook, page: Any, viewer: Viewer
+) -> None:
     notebook.show(page, viewer.widget())
     page.evaluate("""() => {
       const slider = document.createElement("div");
@@ -349,8 +372,13 @@ def test_keys_that_move_a_slider_are_no_shortcuts_of_the_notebook(notebook: Note
     suppressed = {}
     for key in ("ArrowLeft", "ArrowUp", "PageDown", "Home", "Shift+Enter", "End", "a"):
         page.keyboard.press(key)
-        suppressed[key] = page.evaluate("document.activeElement.hasAttribute('data-lm-suppress-shortcuts')")
-    assert [key for key, is_no_shortcut in suppressed.items() if not is_no_shortcut] == ["Shift+Enter", "a"]
+        suppressed[key] = page.evaluate(
+            "document.activeElement.hasAttribute('data-lm-suppress-shortcuts')"
+        )
+    assert [key for key, is_no_shortcut in suppressed.items() if not is_no_shortcut] == [
+        "Shift+Enter",
+        "a",
+    ]
 
 
 @pytest.mark.front_end
@@ -378,7 +406,11 @@ def test_an_output_has_the_widget_and_an_image_or_when_asked_the_scene(
     assert data["text/plain"] == repr(viewer)
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     shown = viewer._repr_mimebundle_()
-    assert set(shown) == {"text/html"} and "srcdoc=" in shown["text/html"] and viewer.url not in shown["text/html"]
+    assert (
+        set(shown) == {"text/html"}
+        and "srcdoc=" in shown["text/html"]
+        and viewer.url not in shown["text/html"]
+    )
     monkeypatch.delenv("FLOATBASE_VIEWER")
     viewer.close()
     assert set(viewer._repr_mimebundle_()) == {"text/html"}
@@ -401,7 +433,9 @@ push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tas
 
 @pytest.mark.front_end
 def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
-    saved = NotebookClient(new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120).execute()
+    saved = NotebookClient(
+        new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120
+    ).execute()
     saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default
     nbformat.write(saved, tmp_path / "saved.ipynb")
     assert (tmp_path / "saved.ipynb").stat().st_size < 0.3 * MB

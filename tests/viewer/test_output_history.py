@@ -1,4 +1,6 @@
-"""A viewer that a notebook shows several times: the newest display is live, earlier ones keep the picture they had."""
+"""A viewer that a notebook shows several times: the newest display is live, earlier ones keep the
+picture they had.
+"""
 
 from __future__ import annotations
 
@@ -55,22 +57,37 @@ def test_displays_in_one_cell_keep_each_its_own_and_only_the_last_twenty(window:
         put(window, number)
         widgets.append(display(window))
     live = (30.0, False)
-    assert [shown(widget) for widget in widgets] == 9 * [live] + [(float(n), True) for n in range(10, 30)] + [live]
+    assert [shown(widget) for widget in widgets] == 9 * [live] + [
+        (float(n), True) for n in range(10, 30)
+    ] + [live]
 
 
 def test_a_page_is_told_what_leads_from_one_scene_to_another(window: Window) -> None:
-    window.put([protocol.page_command("set_title", text="one"), protocol.page_command("set_theme", name="light")])
+    window.put(
+        [
+            protocol.page_command("set_title", text="one"),
+            protocol.page_command("set_theme", name="light"),
+        ]
+    )
     put(window, 1)
     client = Client(display(window))
     assert number_in(client.commands()) == 1
     window.put([protocol.page_command("set_title", text="other"), protocol.delete("/meshcat/gone")])
-    window.put([protocol.encode({"type": "set_animation", "path": "", "animations": [1], "options": {}})])
+    window.put(
+        [protocol.encode({"type": "set_animation", "path": "", "animations": [1], "options": {}})]
+    )
     window.put([protocol.set_follow("last", np.zeros(3), np.zeros(3), smooth=True)])
     while not any(command["type"] == "set_follow" for command in client.commands()):
         pass
     display(window)
     back = client.commands()
-    assert [command["type"] for command in back] == ["delete", "set_animation", "set_title", "set_transform", "set_frozen"]
+    assert [command["type"] for command in back] == [
+        "delete",
+        "set_animation",
+        "set_title",
+        "set_transform",
+        "set_frozen",
+    ]
     assert (back[1]["animations"], back[2]["text"], back[4]["frozen"]) == ([], "one", True)
     client.make_live()
     there = client.commands()
@@ -146,7 +163,9 @@ def stands_at(frame, z: float) -> None:
 
 
 @pytest.mark.front_end
-def test_later_cells_leave_the_pictures_of_earlier_ones_alone(shell: InteractiveShell, notebook: Notebook, page) -> None:
+def test_later_cells_leave_the_pictures_of_earlier_ones_alone(
+    shell: InteractiveShell, notebook: Notebook, page
+) -> None:
     one = add(notebook, page, run(shell, "view.show(at(0.30)).widget()"))
     run(shell, "view.show(at(0.40), title='still the first')")
     stands_at(one, 0.40)  # no newer display: it follows
@@ -189,7 +208,9 @@ def test_an_animation_stays_one_when_the_next_cell_shows_something_else(
     shell: InteractiveShell, notebook: Notebook, page
 ) -> None:
     run(shell, "[view.painter.picture(at(z)) for z in (0.3, 0.4)]")
-    one = add(notebook, page, run(shell, "view.play_pictures([0.0, 1.0], answer, paused=True).widget()"))
+    one = add(
+        notebook, page, run(shell, "view.play_pictures([0.0, 1.0], answer, paused=True).widget()")
+    )
     two = add(notebook, page, run(shell, "view.show(at(0.50)).widget()"))
     stands_at(two, 0.50)
     one.wait_for_function(NOTE)
@@ -207,7 +228,9 @@ def test_a_shell_forgets_a_viewer_that_is_closed(shell: InteractiveShell) -> Non
 
 
 @pytest.mark.front_end
-def test_many_displays_share_the_few_contexts_that_a_browser_has(shell: InteractiveShell, notebook: Notebook, page) -> None:
+def test_many_displays_share_the_few_contexts_that_a_browser_has(
+    shell: InteractiveShell, notebook: Notebook, page
+) -> None:
     page.set_viewport_size({"width": 450, "height": 200})
     heard: list[str] = []
     page.on("console", lambda line: heard.append(line.text))
@@ -221,13 +244,22 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(shell: Interact
         """Wait until display i is drawn and awake."""
         frame = frames[i].content_frame()
         frame.wait_for_function(DRAWN)
-        frame.wait_for_function("!viewer.resting() && !viewer.renderer.getContext().isContextLost()")
-        frame.wait_for_function("getComputedStyle(viewer.renderer.domElement).visibility == 'visible'")
+        frame.wait_for_function(
+            "!viewer.resting() && !viewer.renderer.getContext().isContextLost()"
+        )
+        frame.wait_for_function(
+            "getComputedStyle(viewer.renderer.domElement).visibility == 'visible'"
+        )
         stands_at(frame, heights[i])
 
     def until_only_those_in_sight_are_awake() -> None:
         awake = "Boolean(window.viewer) && !viewer.resting()"
-        until(lambda: page.wait_for_timeout(20) or sum(f.content_frame().evaluate(awake) for f in frames) <= 2)
+        until(
+            lambda: (
+                page.wait_for_timeout(20)
+                or sum(f.content_frame().evaluate(awake) for f in frames) <= 2
+            )
+        )
 
     for i in (*range(0, len(heights), 2), 0):  # two in sight, and two that have just left it
         frames[i].evaluate("(frame) => frame.scrollIntoView()")

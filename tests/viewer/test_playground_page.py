@@ -1,4 +1,6 @@
-"""The playground in a browser: every control to both ends, the challenges, the texts; and as a notebook shows it."""
+"""The playground in a browser: every control to both ends, the challenges, the texts; and as a
+notebook shows it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ ENDS = """() => {
   for (const input of document.querySelectorAll('#panel input[type=range]'))
     for (const end of [input.min, input.max]) { input.value = end; input.dispatchEvent(new Event('input')); }
 }"""
-BACK = "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => one.dispatchEvent(new Event('dblclick')))"
+BACK = (
+    "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => "
+    "one.dispatchEvent(new Event('dblclick')))"
+)
 
 
 @pytest.fixture
@@ -40,37 +45,56 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
     opened(page, field)
     page.evaluate(ENDS)
     for count in ("#panel input[type=checkbox]", "#board button", "#panel .buttons button"):
-        for number in range(page.evaluate("(which) => document.querySelectorAll(which).length", count)):
-            page.evaluate("([which, i]) => document.querySelectorAll(which)[i].click()", [count, number])
+        for number in range(
+            page.evaluate("(which) => document.querySelectorAll(which).length", count)
+        ):
+            page.evaluate(
+                "([which, i]) => document.querySelectorAll(which)[i].click()", [count, number]
+            )
             page.wait_for_timeout(30)
     for number in range(page.evaluate("document.querySelectorAll('#panel select').length")):
-        options = page.evaluate("(i) => document.querySelectorAll('#panel select')[i].length", number)
+        options = page.evaluate(
+            "(i) => document.querySelectorAll('#panel select')[i].length", number
+        )
         for option in range(options):
             page.locator("#panel select").nth(number).select_option(str(option), force=True)
             page.wait_for_timeout(30)
     picture(page, "playground_ends")
     page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
     page.evaluate("viewer.gui_controllers['all as at first'].fire()")
-    until(lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0, lambda: page.wait_for_timeout(20))
+    until(
+        lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0,
+        lambda: page.wait_for_timeout(20),
+    )
     assert field.session.settings.friction == (0.7, 0.7) and field.session.refusal == ""
-    said = page.evaluate("[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)")
+    said = page.evaluate(
+        "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
+    )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["perfect", "perfect"]
     page.wait_for_function("viewer.gui_controllers['friction believed'].getValue() == 0.7")
 
 
 def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -> None:
-    number = next(i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?")
+    number = next(
+        i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?"
+    )
     opened(page, field)
     page.evaluate(f"viewer.gui_controllers['challenge'].setValue({number + 1})")
-    page.wait_for_function("document.getElementById('panel').textContent.includes('4 facets: the weakest')")
+    page.wait_for_function(
+        "document.getElementById('panel').textContent.includes('4 facets: the weakest')"
+    )
     page.evaluate("viewer.gui_controllers['facets'].setValue(13)")
     page.wait_for_function("document.getElementById('panel').textContent.includes('Solved')")
     assert "facets=13" in page.evaluate("document.querySelector('#panel pre').textContent")
     picture(page, "playground_solved")
 
 
-def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, field: Playground) -> None:
-    """Its plan lacks 0.5 m g, which only kp times the error in height makes up for: it sinks by 0.5 g / kp = 49 mm."""
+def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(
+    page, field: Playground
+) -> None:
+    """Its plan lacks 0.5 m g, which only kp times the error in height makes up for: it sinks by 0.5
+    g / kp = 49 mm.
+    """
     opened(page, field)
 
     def sunk() -> float:
@@ -81,10 +105,14 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(page, fi
 
     page.evaluate("viewer.gui_controllers['mass [×] true'].setValue(1.5)")
     until(lambda: abs(sunk() - 0.049) < 0.01, work)
-    page.wait_for_function("document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')")
+    page.wait_for_function(
+        "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
+    )
     page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
-    page.wait_for_function("document.querySelector('#panel p.plot').textContent.includes('differ by')")
+    page.wait_for_function(
+        "document.querySelector('#panel p.plot').textContent.includes('differ by')"
+    )
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
 
@@ -100,7 +128,9 @@ def test_in_a_notebook_it_shows_itself_and_runs() -> None:
 
 def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
     """The push puts the robot back on its feet, and a judge begins with it."""
-    field.start_challenge(next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side"))
+    field.start_challenge(
+        next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side")
+    )
     until(lambda: field.session.last is not None and field.session.last.time[-1] < 1.0)
     for size in (240.0, 220.0):
         field.push(size, 90.0)
@@ -112,42 +142,72 @@ def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None
     for challenge in (CHALLENGES[0], None, *CHALLENGES[6:9], None):
         field.start_challenge(challenge)
         before = field.session.sim.time
-        until(lambda start=before: field.run.status == "running" and field.session.sim.time != start)
+        until(
+            lambda start=before: field.run.status == "running" and field.session.sim.time != start
+        )
     assert field.run.error is None
 
 
 def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Playground) -> None:
-    number, challenge = next((i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused)
+    number, challenge = next(
+        (i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused
+    )
     assert challenge.title == "Down an icy slope" and "Press run" in challenge.text and number == 2
     field.start_challenge(challenge)
-    until(lambda: field.run.status == "paused" and field.session.settings.slope == challenge.start.slope)
+    until(
+        lambda: (
+            field.run.status == "paused" and field.session.settings.slope == challenge.start.slope
+        )
+    )
     assert field.session.sim.time < 0.1
     field.run.start()
     until(lambda: field.session.sim.time > 0.2)
 
 
-def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(page, field: Playground) -> None:
+def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(
+    page, field: Playground
+) -> None:
     first = (field.force, field.towards)
     controls = ("speed", "push [N]", "show forces", "show gravity")
 
     def shown() -> list:
         scene = field.view.window.scene
-        said = [[scene.command(("/", kind, name)) for kind in ("set_control_value", "set_control")] for name in controls]
+        said = [
+            [scene.command(("/", kind, name)) for kind in ("set_control_value", "set_control")]
+            for name in controls
+        ]
         return [(moved or made)["value"] for moved, made in said]
 
     before = shown()
     opened(page, field)
-    for name, value in (("speed", 0.1), ("push [N]", 200.0), ("show forces", "false"), ("show gravity", "true")):
+    for name, value in (
+        ("speed", 0.1),
+        ("push [N]", 200.0),
+        ("show forces", "false"),
+        ("show gravity", "true"),
+    ):
         page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-    until(lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old], lambda: page.wait_for_timeout(20))
-    until(lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20))
+    until(
+        lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old],
+        lambda: page.wait_for_timeout(20),
+    )
+    until(
+        lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
+    )
     page.evaluate("viewer.gui_controllers['all as at first'].fire()")
-    until(lambda: shown() == before and (field.force, field.towards) == first, lambda: page.wait_for_timeout(20))
-    until(lambda: "measured/FL_foot" in field.view.renderer.picture, lambda: page.wait_for_timeout(20))
+    until(
+        lambda: shown() == before and (field.force, field.towards) == first,
+        lambda: page.wait_for_timeout(20),
+    )
+    until(
+        lambda: "measured/FL_foot" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
+    )
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
-def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(field: Playground) -> None:
+def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(
+    field: Playground,
+) -> None:
     with raises(TypeError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
@@ -175,5 +235,11 @@ def test_on_a_phone_the_panel_lies_below_and_the_robot_is_seen(page, field: Play
 
 def test_the_true_slope_is_drawn_whatever_is_believed(field: Playground) -> None:
     field.set(slope=(0.0, 20.0))
-    until(lambda: field.session.settings.slope == (0.0, 20.0) and field.view.painter.ground is not None)
-    until(lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3)  # sin 20°: it rises forwards
+    until(
+        lambda: (
+            field.session.settings.slope == (0.0, 20.0) and field.view.painter.ground is not None
+        )
+    )
+    until(
+        lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3
+    )  # sin 20°: it rises forwards

@@ -29,7 +29,9 @@ matplotlib.use("agg")
 
 
 def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
-    """The robot sways and leans harder on its front left foot, at 1 kHz; that foot slips in the middle and is pushed."""
+    """The robot sways and leans harder on its front left foot, at 1 kHz; that foot slips in the
+    middle and is pushed.
+    """
     state, contacts = robot.standing(), on_its_feet(robot)
     time = np.arange(0.0, duration, 1e-3)
     q = np.tile(state.q, (time.size, 1))
@@ -56,19 +58,30 @@ def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray
     for clip in viewer.window.scene.commands()["/", "set_animation", ""]["animations"]:
         for track in clip["clip"]["tracks"]:
             times, values = (numbers(track[name]) for name in ("times", "values"))
-            found[clip["path"].removeprefix("/meshcat/"), track["name"]] = (times, values.reshape(times.size, -1))
+            found[clip["path"].removeprefix("/meshcat/"), track["name"]] = (
+                times,
+                values.reshape(times.size, -1),
+            )
     return found
 
 
 def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
-    return np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
+    return (
+        np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
+    )
 
 
-def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer: Viewer, go2: Robot) -> None:
+def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(
+    viewer: Viewer, go2: Robot
+) -> None:
     made = record(go2, 0.2)
     held = LinearConstraint("held", 2, lambda state, t: (np.eye(2, go2.nv), np.zeros(2)))
     forces = np.hstack([made.measured, np.full((len(made), 2), np.nan)])
-    viewer.play(dataclasses.replace(made, contacts=made.contacts + Contacts([held]), measured=forces, planned=forces))
+    viewer.play(
+        dataclasses.replace(
+            made, contacts=made.contacts + Contacts([held]), measured=forces, planned=forces
+        )
+    )
     drawn = {path for path in viewer.renderer.picture if path.startswith("measured/")}
     assert drawn == {f"measured/{name}" for name in made.contacts.names}
 
@@ -88,19 +101,29 @@ def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -
     rows = np.round(times / 1e-3).astype(int)
     np.testing.assert_allclose(positions, rollout.q[rows, :3], atol=1e-5)
     _, scales = moving["measured/FL_foot", ".scale"]
-    np.testing.assert_allclose(scales[:, 2], viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1), rtol=1e-4)
+    np.testing.assert_allclose(
+        scales[:, 2], viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1), rtol=1e-4
+    )
     assert times[-1] == pytest.approx(rollout.time[-1])
 
 
-def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hidden(viewer: Viewer, go2: Robot) -> None:
+def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hidden(
+    viewer: Viewer, go2: Robot
+) -> None:
     viewer.play(record(go2))
     moving = tracks(viewer)
     times, colours = moving["cone/FL_foot/surface", "shape.material.color"]
     slips = (times > 0.8) & (times < 1.2)
-    np.testing.assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
-    np.testing.assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
+    np.testing.assert_allclose(
+        colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6
+    )
     times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
-    np.testing.assert_allclose(faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6)
+    np.testing.assert_allclose(
+        faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6
+    )
     legend = [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
     assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
@@ -113,15 +136,22 @@ def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, g
     rollout = record(go2)
     swings = (rollout.time > 0.4) & (rollout.time < 1.0)
     stance = rollout.contacts.without("FL_foot")
-    walking = dataclasses.replace(rollout, stances=tuple(stance if away else rollout.contacts for away in swings))
+    walking = dataclasses.replace(
+        rollout, stances=tuple(stance if away else rollout.contacts for away in swings)
+    )
     viewer.play(walking, support=True)
     moving = tracks(viewer)
     for part in ("cone/FL_foot/surface", "patch/FL_foot"):
         times, visible = moving[part, ".visible"]
         np.testing.assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
-    assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(moving)
+    assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(
+        moving
+    )
     regions = [item for path, item in viewer.renderer.picture.items() if path.startswith("support")]
-    points = [item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data for item in regions]
+    points = [
+        item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
+        for item in regions
+    ]
     assert {3, 4} <= {len(numbers) // 6 for numbers in points}
 
 
@@ -129,7 +159,9 @@ def test_quaternions_do_not_jump(go2: Robot, viewer: Viewer) -> None:
     rollout = record(go2)
     angle = 4 * np.pi * rollout.time / rollout.time[-1]
     rollout.q.flags.writeable = True
-    rollout.q[:, 3:7] = np.stack([0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], axis=1)
+    rollout.q[:, 3:7] = np.stack(
+        [0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], axis=1
+    )
     viewer.play(rollout)
     _, quaternions = tracks(viewer)["robot/root_joint", ".quaternion"]
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.2
@@ -143,9 +175,15 @@ def test_facets_that_light_up_become_tracks(go2: Robot) -> None:
     viewer.close()
 
 
-def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer: Viewer, go2: Robot, standing: State) -> None:
+def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(
+    viewer: Viewer, go2: Robot, standing: State
+) -> None:
     viewer.show(standing)
-    before = {key: value for key, value in viewer.window.scene.commands().items() if key[0].startswith("/meshcat")}
+    before = {
+        key: value
+        for key, value in viewer.window.scene.commands().items()
+        if key[0].startswith("/meshcat")
+    }
     viewer.play(record(go2))
     viewer.show(standing)
     after = viewer.window.scene.commands()
@@ -158,13 +196,19 @@ def on_its_feet(robot: Robot) -> Contacts:
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
-def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(tmp_path: Path) -> None:
+def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(
+    tmp_path: Path,
+) -> None:
     sizes, outside = {}, []
     for name in catalogue():
         robot = load(name)
         viewer, contacts = Viewer(robot), on_its_feet(robot)
-        forces = np.tile([0.0, 0.0, robot.weight / max(contacts.n_points, 1)], (contacts.n_points, 1))
-        viewer.show(robot.standing(), contacts, forces, forces, support=contacts.n_points > 2, title=name)
+        forces = np.tile(
+            [0.0, 0.0, robot.weight / max(contacts.n_points, 1)], (contacts.n_points, 1)
+        )
+        viewer.show(
+            robot.standing(), contacts, forces, forces, support=contacts.n_points > 2, title=name
+        )
         saved = viewer.save(tmp_path / "still.html")
         sizes[name, "still"] = saved.stat().st_size / 1e6
         outside += re.findall(r"(?:src|href)=\"(?!data:).*?\"", saved.read_text())
@@ -172,11 +216,15 @@ def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less
             viewer.play(record(robot, duration=10.0), support=True)
             sizes[name, "moving"] = viewer.save(tmp_path / "moving.html").stat().st_size / 1e6
         viewer.close()
-    assert {what: size for what, size in sizes.items() if size > (1.0 if what[1] == "still" else 2.0)} == {}
+    assert {
+        what: size for what, size in sizes.items() if size > (1.0 if what[1] == "still" else 2.0)
+    } == {}
     assert outside == []
 
 
-def test_wrong_records_and_file_names_are_refused(viewer: Viewer, go2: Robot, standing: State, tmp_path: Path) -> None:
+def test_wrong_records_and_file_names_are_refused(
+    viewer: Viewer, go2: Robot, standing: State, tmp_path: Path
+) -> None:
     refused(lambda: viewer.play(record(load("solo12"))), InputError, "go2", "solo12")
     refused(lambda: viewer.play(record(go2, duration=0.0)), InputError)
     refused(lambda: viewer.play(record(go2), speed=0), InputError, "speed", 0)
@@ -187,7 +235,9 @@ def test_wrong_records_and_file_names_are_refused(viewer: Viewer, go2: Robot, st
     refused(lambda: viewer.save(tmp_path / "nowhere" / "x.html"), ViewerError, "nowhere/x.html")
 
 
-def test_a_saved_animation_plays_from_disk_without_network(page, viewer: Viewer, go2: Robot, tmp_path: Path) -> None:
+def test_a_saved_animation_plays_from_disk_without_network(
+    page, viewer: Viewer, go2: Robot, tmp_path: Path
+) -> None:
     rollout = record(go2)
     viewer.play(rollout, paused=True, title="saved")
     viewer.close()
@@ -201,10 +251,14 @@ def test_a_saved_animation_plays_from_disk_without_network(page, viewer: Viewer,
         page.goto(address.as_uri())
         inside = page.frames[-1]
         inside.wait_for_function("window.viewer && viewer.num_messages_received > 0")
-        assert inside.evaluate("viewer.animator.duration") == pytest.approx(rollout.time[-1], abs=1e-3)
+        assert inside.evaluate("viewer.animator.duration") == pytest.approx(
+            rollout.time[-1], abs=1e-3
+        )
         slider = inside.locator("#player input")
         slider.evaluate("(node) => { node.value = 0.25; node.dispatchEvent(new Event('input')); }")
-        where = inside.evaluate("viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.toArray()")
+        where = inside.evaluate(
+            "viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.toArray()"
+        )
         np.testing.assert_allclose(where, rollout.q[250, :3], atol=1e-3)
     page.context.set_offline(False)
     inside.wait_for_function("!viewer.needs_render")
@@ -243,7 +297,9 @@ def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot, standi
     assert after[0] - before[0] == pytest.approx(0.4, abs=STEP)
 
 
-def leaning(viewer: Viewer, state: State, contacts: Contacts, tangents: list[float]) -> list[Picture]:
+def leaning(
+    viewer: Viewer, state: State, contacts: Contacts, tangents: list[float]
+) -> list[Picture]:
     """Pictures of forces that lean forwards by so much of their normal part."""
     quarter = viewer.robot.weight / 4
     forces = [np.tile([tangent * quarter, 0.0, quarter], (4, 1)) for tangent in tangents]
@@ -251,7 +307,9 @@ def leaning(viewer: Viewer, state: State, contacts: Contacts, tangents: list[flo
 
 
 @pytest.mark.front_end
-def test_a_paused_record_hides_what_comes_later(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_a_paused_record_hides_what_comes_later(
+    page, viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     page.set_viewport_size(SMALL)
     first, second = leaning(viewer, standing, contacts, [0.0, 0.6])
     del first["measured/FL_foot"]
@@ -272,14 +330,20 @@ WITHHOLD = """() => {
 
 
 @pytest.mark.front_end
-def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_a_busy_page_shows_the_second_record_as_it_is(
+    page, viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     page.set_viewport_size(SMALL)
-    viewer.play_pictures([0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True)
+    viewer.play_pictures(
+        [0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True
+    )
     page.goto(viewer.url)
     settle(page)
     page.evaluate("viewer.animator.seek(1.0)")
     page.evaluate(WITHHOLD)
-    viewer.window.put([protocol.set_property("/Grid", "visible", True)])  # the page is busy with this one
+    viewer.window.put(
+        [protocol.set_property("/Grid", "visible", True)]
+    )  # the page is busy with this one
     page.wait_for_function("Boolean(window.release)")
     viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.9, 0.9]), title="second")
     page.evaluate("release()")
@@ -295,13 +359,19 @@ def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer: Viewer, stan
 
 
 @pytest.mark.front_end
-def test_every_record_has_one_clock_and_its_speed(page, viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_every_record_has_one_clock_and_its_speed(
+    page, viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     page.set_viewport_size(SMALL)
     page.goto(viewer.url)
     for speed in (0.3, 0.4, 0.6):
         viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.1, speed]), speed=speed)
-        page.wait_for_function("scale => window.viewer && viewer.animator.mixer.timeScale == scale", arg=speed)
-    assert page.evaluate("document.querySelector('#player select').selectedOptions[0].text") == "0.6×"
+        page.wait_for_function(
+            "scale => window.viewer && viewer.animator.mixer.timeScale == scale", arg=speed
+        )
+    assert (
+        page.evaluate("document.querySelector('#player select').selectedOptions[0].text") == "0.6×"
+    )
     ticks = page.evaluate(
         """() => new Promise((resolve) => {
           const ask = window.requestAnimationFrame.bind(window);
@@ -336,7 +406,8 @@ def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     assert np.isnan(used[3, -1])
     figure = rollout.plot()
     assert [axis.get_ylabel() for axis in figure.axes] == [
-        "centre of mass moved [mm]", "normal forces [N]", "friction used, of μ · normal force", "torques, of their limits"
+        "centre of mass moved [mm]", "normal forces [N]", "friction used, of μ · normal force",
+        "torques, of their limits"
     ]  # fmt: skip
     assert all(MEASURED in [line.get_color() for line in axis.lines] for axis in figure.axes[1:3])
     forces = plots.plot_forces(rollout)

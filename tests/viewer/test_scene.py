@@ -1,4 +1,6 @@
-"""The picture of a state, read from the scene's own commands rather than from the code that drew them."""
+"""The picture of a state, read from the scene's own commands rather than from the code that drew
+them.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,16 @@ from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
-from floatbase.viewer.scene.colours import ALARM, BACKGROUNDS, CALM, IDLE, MEASURED, PLANNED, WARNING, hex_code
+from floatbase.viewer.scene.colours import (
+    ALARM,
+    BACKGROUNDS,
+    CALM,
+    IDLE,
+    MEASURED,
+    PLANNED,
+    WARNING,
+    hex_code,
+)
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -33,7 +44,9 @@ def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
 def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
     """Colours set in the scene, without the alpha."""
     return {
-        path.removeprefix(start).removesuffix("/surface").removesuffix("/sides"): tuple(command["value"][:3])
+        path.removeprefix(start).removesuffix("/surface").removesuffix("/sides"): tuple(
+            command["value"][:3]
+        )
         for (path, _, name), command in viewer.window.scene.commands().items()
         if name == "color" and path.startswith(start)
     }
@@ -53,7 +66,9 @@ def test_every_joint_stands_where_the_state_says(viewer: Viewer, go2: Robot) -> 
     placed = matrices(viewer, "/meshcat/robot/")
     assert len(placed) == go2.model.njoints - 1
     for name, matrix in placed.items():
-        np.testing.assert_allclose(matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6)
+        np.testing.assert_allclose(
+            matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6
+        )
 
 
 @pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
@@ -64,12 +79,18 @@ def test_arrows_start_at_contacts(
     for kind, share in (("measured", 1.0), ("planned", 0.5)):
         arrows = matrices(viewer, f"/meshcat/{kind}/")
         assert tuple(arrows) == contacts.point_names
-        for matrix, force, position in zip(arrows.values(), forces, contacts.positions(standing), strict=True):
-            np.testing.assert_allclose(matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6)
+        for matrix, force, position in zip(
+            arrows.values(), forces, contacts.positions(standing), strict=True
+        ):
+            np.testing.assert_allclose(
+                matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6
+            )
             np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_arrows_are_neither_thin_nor_stout(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_arrows_are_neither_thin_nor_stout(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     for factor in (0.01, 0.1, 1.0, 10.0):
         viewer.show(standing, contacts, forces=factor * forces)
         for matrix in matrices(viewer, "/meshcat/measured/").values():
@@ -89,26 +110,39 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
     for matrix, position in zip(cones.values(), contacts.positions(standing), strict=True):
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across / along == pytest.approx(mu, rel=1e-5)
-        np.testing.assert_allclose(matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6)
+        np.testing.assert_allclose(
+            matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6
+        )
         np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_the_unit_cone_and_arrow_are_of_unit_size(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_the_unit_cone_and_arrow_are_of_unit_size(
+    viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     viewer.show(standing, contacts, forces=np.tile([0, 0, 40.0], 4))
     scene = viewer.window.scene.commands()
     for path, radius in (("cone/FL_foot/surface", 1.0), ("measured/FL_foot", None)):
         lowered = scene[f"/meshcat/{path}", "set_object", ""]["object"]
         position = lowered["geometries"][0]["data"]["attributes"]["position"]
-        points = np.frombuffer(position["array"].data, "<i2").reshape(-1, 3) * lowered["object"]["matrix"][0]
+        points = (
+            np.frombuffer(position["array"].data, "<i2").reshape(-1, 3)
+            * lowered["object"]["matrix"][0]
+        )
         assert points[:, 2].min() == pytest.approx(0.0, abs=1e-4)
         assert points[:, 2].max() == pytest.approx(1.0, abs=1e-4)
         if radius is not None:
             assert np.linalg.norm(points[:, :2], axis=1).max() == pytest.approx(radius, abs=1e-3)
 
 
-def test_a_cone_says_where_its_force_is(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_a_cone_says_where_its_force_is(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
-    for shown in ({"forces": forces}, {"planned": forces}, {"forces": forces, "planned": np.tile([0, 0, 30.0], 4)}):
+    for shown in (
+        {"forces": forces},
+        {"planned": forces},
+        {"forces": forces, "planned": np.tile([0, 0, 30.0], 4)},
+    ):
         viewer.show(standing, contacts, **shown)
         assert colours(viewer, "/meshcat/cone/") == expected, shown
     viewer.show(standing, contacts, forces=-forces)
@@ -124,12 +158,18 @@ def test_a_cone_without_a_force_is_grey_and_faint(
 
     def looks() -> dict[str, list[float]]:
         commands = viewer.window.scene.commands().items()
-        return {p.split("/")[3]: c["value"] for (p, _, name), c in commands if name == "color" and "/cone/" in p}
+        return {
+            p.split("/")[3]: c["value"]
+            for (p, _, name), c in commands
+            if name == "color" and "/cone/" in p
+        }
 
     viewer.show(standing, contacts)
     assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
     up = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
-    viewer.show(standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]])  # the second in the air, the third all but
+    viewer.show(
+        standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]]
+    )  # the second in the air, the third all but
     assert [looks()[name][:3] for name in names] == [list(CALM), list(IDLE), list(IDLE), list(CALM)]
     assert looks()[names[1]][3] < 0.5 * looks()[names[0]][3]
     viewer.show(standing, contacts, forces=0 * up, planned=up)  # what is measured counts
@@ -144,7 +184,9 @@ def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3])
-def test_the_ground_lies_under_the_contacts_of_a_slope(viewer: Viewer, go2: Robot, height: float) -> None:
+def test_the_ground_lies_under_the_contacts_of_a_slope(
+    viewer: Viewer, go2: Robot, height: float
+) -> None:
     slope = np.array([0.3, -0.15, 1.0]) / np.linalg.norm([0.3, -0.15, 1.0])
     state = Simulation(go2, Ground(normal=slope)).state
     q = state.q.copy()
@@ -153,22 +195,36 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(viewer: Viewer, go2: Robo
     viewer.show(state, contacts, support=True)
     normal, point = normal_and_point(viewer)
     np.testing.assert_allclose(normal, slope, atol=1e-6)
-    for position in (*contacts.positions(state), matrices(viewer, "/meshcat/com/")["projection"][:3, 3]):
+    for position in (
+        *contacts.positions(state),
+        matrices(viewer, "/meshcat/com/")["projection"][:3, 3],
+    ):
         assert normal @ (position - point) == pytest.approx(0.0, abs=0.006)
     lowered = viewer.window.scene.commands()["/meshcat/support", "set_object", ""]["object"]
-    corners = np.frombuffer(lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<i2").reshape(-1, 3)
+    corners = np.frombuffer(
+        lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<i2"
+    ).reshape(-1, 3)
     for corner in corners * lowered["object"]["matrix"][0]:
         assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
 
 
-def test_the_ground_is_level_where_contacts_do_not_say_otherwise(go2: Robot, standing: State) -> None:
+def test_the_ground_is_level_where_contacts_do_not_say_otherwise(
+    go2: Robot, standing: State
+) -> None:
     slope = np.array([0.6, 0.0, 0.8])
     ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
     viewer = Viewer(go2)
-    for contacts in (None, Contacts.points(go2), Contacts.points(go2, normals=ditch), Contacts.points(go2, normals=[1, 0, 0])):
+    for contacts in (
+        None,
+        Contacts.points(go2),
+        Contacts.points(go2, normals=ditch),
+        Contacts.points(go2, normals=[1, 0, 0]),
+    ):
         viewer.show(standing, contacts)
         np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
-    viewer.show(standing, Contacts.points(go2, normals=slope))  # a slope that the feet do not stand on
+    viewer.show(
+        standing, Contacts.points(go2, normals=slope)
+    )  # a slope that the feet do not stand on
     np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
     viewer.close()
     viewer = Viewer(go2, ground=slope)
@@ -203,7 +259,9 @@ def test_the_feet_fill_the_picture_of_the_feet() -> None:
         viewer.show(robot.standing()).camera("feet")
         camera = viewer.window.scene.commands()["/", "set_camera", ""]
         viewer.close()
-        eye, target = (np.array([c[0], -c[2], c[1]]) for c in (camera["position"], camera["target"]))
+        eye, target = (
+            np.array([c[0], -c[2], c[1]]) for c in (camera["position"], camera["target"])
+        )
         contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
         ways = contacts.positions(robot.standing()) - eye
         ahead = (target - eye) / np.linalg.norm(target - eye)
@@ -212,7 +270,9 @@ def test_the_feet_fill_the_picture_of_the_feet() -> None:
     assert {name: part for name, part in filled.items() if not 0.25 < part < 1.0} == {}
 
 
-def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_polyhedra_light_the_facets_that_are_reached(
+    go2: Robot, standing: State, contacts: Contacts
+) -> None:
     viewer = Viewer(go2, facets=4)
     force = np.tile([0.0, 0.0, 40.0], (4, 1))
     force[0, 0] = 40 * 0.6 * np.cos(np.pi / 4)  # facet 0 looks along x
@@ -229,7 +289,9 @@ def test_polyhedra_light_the_facets_that_are_reached(go2: Robot, standing: State
     viewer.close()
 
 
-def test_what_is_not_passed_is_not_drawn(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_what_is_not_passed_is_not_drawn(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     viewer.show(standing, com=False)
     bare = paths(viewer)
     viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
@@ -249,22 +311,32 @@ def test_what_is_not_passed_is_not_drawn(viewer: Viewer, standing: State, contac
     assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""
 
 
-def test_showing_twice_sends_nothing(viewer: Viewer, go2: Robot, contacts: Contacts, forces: np.ndarray) -> None:
+def test_showing_twice_sends_nothing(
+    viewer: Viewer, go2: Robot, contacts: Contacts, forces: np.ndarray
+) -> None:
     viewer.show(go2.standing(), contacts, forces=forces, title="twice")
     newest = viewer.window.scene.newest
     viewer.show(go2.standing(), contacts, forces=forces.ravel(), title="twice")
     assert viewer.window.scene.newest == newest
 
 
-def test_a_change_sends_only_what_changed(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_a_change_sends_only_what_changed(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     viewer.show(standing, contacts, forces=forces)
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
-    assert viewer.window.scene.newest - newest == 4 + 1  # four arrows, and a cone that is no longer on its surface
+    assert (
+        viewer.window.scene.newest - newest == 4 + 1
+    )  # four arrows, and a cone that is no longer on its surface
 
 
 # the same few paths in many spellings, some below others
-PATHS = st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4).map("/".join).filter(lambda path: path.strip("/"))
+PATHS = (
+    st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4)
+    .map("/".join)
+    .filter(lambda path: path.strip("/"))
+)
 ITEMS = st.builds(
     Item,
     st.sampled_from([shapes.label([0.0, 0.0, 0.0], text, 0.1).shape for text in "xy"]),
@@ -281,7 +353,9 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
 
 
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
-def test_a_scene_is_that_of_the_last_picture_however_paths_are_spelt(pictures: list[Picture]) -> None:
+def test_a_scene_is_that_of_the_last_picture_however_paths_are_spelt(
+    pictures: list[Picture],
+) -> None:
     assert scene_after(pictures) == scene_after(pictures[-1:])
 
 
@@ -294,9 +368,14 @@ def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> No
     assert viewer.window.scene.commands() == before
 
 
-def test_an_interrupted_picture_is_drawn_afresh(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_an_interrupted_picture_is_drawn_afresh(
+    viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     viewer.show(standing)
-    put, viewer.window.put = viewer.window.put, lambda updates: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore
+    put, viewer.window.put = (
+        viewer.window.put,
+        lambda updates: (_ for _ in ()).throw(KeyboardInterrupt),
+    )  # type: ignore
     with pytest.raises(KeyboardInterrupt):
         viewer.show(standing, contacts)
     viewer.window.put = put  # type: ignore[method-assign]
@@ -305,22 +384,41 @@ def test_an_interrupted_picture_is_drawn_afresh(viewer: Viewer, standing: State,
     assert "/meshcat/robot/root_joint" in paths(viewer)
 
 
-def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_the_scale_bar_is_as_long_as_the_force_on_its_label(
+    viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     viewer.show(standing, contacts)
     label = viewer.painter.picture(standing, contacts)["scale/label"].shape.name
     force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
-    assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(viewer.scale * force, rel=1e-5)
+    assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(
+        viewer.scale * force, rel=1e-5
+    )
 
 
 def legend(viewer: Viewer) -> list[str]:
     return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
-def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
-    viewer.show(standing, contacts, forces, planned=forces, support=True, push=("base", [0, 30.0, 0]), ghost=standing)
-    cone = ["friction cone: force inside", "friction cone: surface reached", "friction cone: outside (rim)"]
+def test_the_legend_names_what_is_shown(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
+    viewer.show(
+        standing,
+        contacts,
+        forces,
+        planned=forces,
+        support=True,
+        push=("base", [0, 30.0, 0]),
+        ghost=standing,
+    )
+    cone = [
+        "friction cone: force inside",
+        "friction cone: surface reached",
+        "friction cone: outside (rim)",
+    ]
     assert legend(viewer) == [
-        "measured force", "planned force", "centre of mass", "push", *cone, "support region", "desired posture",
+        "measured force", "planned force", "centre of mass", "push", *cone, "support region",
+        "desired posture",
     ]  # fmt: skip
     viewer.show(standing, contacts, planned=forces)
     assert legend(viewer) == ["planned force", "centre of mass", *cone]
@@ -337,7 +435,9 @@ def test_the_legend_names_what_is_shown(viewer: Viewer, standing: State, contact
     assert legend(viewer) == []
 
 
-def test_the_legend_explains_items_of_ones_own_while_they_are_shown(viewer: Viewer, standing: State) -> None:
+def test_the_legend_explains_items_of_ones_own_while_they_are_shown(
+    viewer: Viewer, standing: State
+) -> None:
     viewer.add_legend_entry("wish", MEASURED, "force wished for")
     viewer.show(standing, com=False, extra={"wish": shapes.arrow([0, 0, 1], [0, 0, 1], MEASURED)})
     assert legend(viewer) == ["force wished for"]
@@ -349,26 +449,36 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     def cones() -> dict:
-        return {path: item.colour for path, item in viewer.renderer.picture.items() if path.startswith("cone/")}
+        return {
+            path: item.colour
+            for path, item in viewer.renderer.picture.items()
+            if path.startswith("cone/")
+        }
 
     viewer.show(standing, contacts, forces)
     seen = cones()
     viewer.show(standing, contacts, forces, arrows=False)
     assert cones() == seen and len(set(seen.values())) > 1
-    assert not [path for path in viewer.renderer.picture if path.startswith(("measured", "planned"))]
+    assert not [
+        path for path in viewer.renderer.picture if path.startswith(("measured", "planned"))
+    ]
 
 
 def test_a_flat_foot_has_one_name_and_a_number_at_each_corner() -> None:
     talos = load("talos")
     view = Viewer(talos)
     view.show(talos.standing(), Contacts.feet(talos), labels=True)
-    words = [item.shape.name for path, item in view.renderer.picture.items() if path.startswith("label/")]
+    words = [
+        item.shape.name for path, item in view.renderer.picture.items() if path.startswith("label/")
+    ]
     view.close()
     assert sorted(words) == sorted(["left_sole_link", "right_sole_link", *2 * "0123"])
 
 
 @pytest.mark.parametrize("background", ["light", "dark"])
-def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing: State, background: str) -> None:
+def test_a_push_is_seen_through_the_robot_on_any_background(
+    go2: Robot, standing: State, background: str
+) -> None:
     view = Viewer(go2, background=background)
     view.show(standing, push=("base", [0.0, 30.0, 0.0]))
     assert material(view, "/meshcat/push")["depthTest"] is False
@@ -380,7 +490,9 @@ def test_a_push_is_seen_through_the_robot_on_any_background(go2: Robot, standing
     view.close()
 
 
-def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(viewer: Viewer, go2: Robot, standing: State) -> None:
+def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(
+    viewer: Viewer, go2: Robot, standing: State
+) -> None:
     def looked() -> int:
         return viewer.window.scene.since(0)[0]
 
@@ -411,7 +523,9 @@ def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(viewer: Viewer,
         ("around", ((0.0, 0.0, 0.3), 0.0), 0),
     ],
 )
-def test_what_no_camera_can_do_is_refused_by_name(name: str, value: Any, number: str | float) -> None:
+def test_what_no_camera_can_do_is_refused_by_name(
+    name: str, value: Any, number: str | float
+) -> None:
     refused(lambda: View(**{name: value}), InputError, name, "View", number)
 
 
@@ -429,13 +543,17 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     view.close()
 
 
-def test_the_colours_are_those_of_the_code(viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray) -> None:
+def test_the_colours_are_those_of_the_code(
+    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
+) -> None:
     viewer.show(standing, contacts, forces=forces, planned=forces)
     for kind, colour in (("measured", MEASURED), ("planned", PLANNED)):
         assert f"#{material(viewer, f'/meshcat/{kind}/FL_foot')['color']:06X}" == hex_code(colour)
 
 
-def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer: Viewer, go2: Robot) -> None:
+def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(
+    viewer: Viewer, go2: Robot
+) -> None:
     state = go2.random_state(1)
     viewer.show(state)
     drawn = matrices(viewer, "/meshcat/com/")
@@ -447,14 +565,18 @@ def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> N
     for robot in map(load, catalogue()):
         viewer = Viewer(robot)
         viewer.show(robot.standing())
-        assert 1 <= len([path for path in paths(viewer) if "/robot/" in path]) <= robot.model.njoints, robot.name
+        assert (
+            1 <= len([path for path in paths(viewer) if "/robot/" in path]) <= robot.model.njoints
+        ), robot.name
         eyes = set()
         for view in PRESETS:
             viewer.camera(view)
             eyes.add(tuple(viewer.window.scene.commands()["/", "set_camera", ""]["position"]))
         viewer.close()
         assert len(eyes) == len(PRESETS), robot.name
-        assert f"{viewer.scale:.6e}"[0] in "125" and float(f"{viewer.scale:.0e}") == pytest.approx(viewer.scale), robot.name
+        assert f"{viewer.scale:.6e}"[0] in "125" and float(f"{viewer.scale:.0e}") == pytest.approx(
+            viewer.scale
+        ), robot.name
 
 
 def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
@@ -464,7 +586,9 @@ def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
     assert 'title="a &quot;&lt;b&gt;&quot;"' in view._repr_mimebundle_()["text/html"]
 
 
-def test_wrong_input_is_refused_by_name(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_wrong_input_is_refused_by_name(
+    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
+) -> None:
     other, locked = load("solo12").standing(), load("go2", locked=["FL_hip_joint"]).standing()
     for wrong, *named in (
         (lambda: viewer.show(other), "go2", "solo12"),

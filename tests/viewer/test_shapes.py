@@ -22,7 +22,15 @@ from floatbase.robots import Robot, State
 from floatbase.viewer import View, Viewer, markers, prefixed, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene import geometry
-from floatbase.viewer.scene.colours import BACKGROUNDS, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
+from floatbase.viewer.scene.colours import (
+    BACKGROUNDS,
+    CONE,
+    GREYS,
+    LEGEND,
+    MEASURED,
+    PLANNED,
+    hex_code,
+)
 
 from .looks import SMALL, Screen, picture, settle
 
@@ -37,13 +45,17 @@ from .looks import SMALL, Screen, picture, settle
     ],
     ids=["ball", "rod", "cylinder", "cone"],
 )
-def test_closed_meshes_face_outwards_and_hold_their_volume(mesh: geometry.Mesh, volume: float) -> None:
+def test_closed_meshes_face_outwards_and_hold_their_volume(
+    mesh: geometry.Mesh, volume: float
+) -> None:
     vertices, faces = mesh
     a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=0.06)
 
 
-@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)])
+@pytest.mark.parametrize(
+    "direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)]
+)
 def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
     turned = geometry.rotation_with_z_axis(direction)
     np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
@@ -60,11 +72,17 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
 
 
 def test_a_curled_arrow_has_heads_all_round_so_that_its_sense_is_seen_from_anywhere() -> None:
-    data = markers.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.data["geometries"][0]["data"]["attributes"]["position"]
+    data = markers.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.data["geometries"][0][
+        "data"
+    ]["attributes"]["position"]
     points = np.frombuffer(data["array"].data, "<i2").reshape(-1, 3).astype(float)
     points *= 1.0 / np.median(np.linalg.norm(points[:, :2], axis=1))
-    beside = np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1  # what is wider than the ring
-    angles = np.unique(np.round(np.arctan2(points[beside, 1], points[beside, 0]), 1)) % (2.0 * np.pi)
+    beside = (
+        np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1
+    )  # what is wider than the ring
+    angles = np.unique(np.round(np.arctan2(points[beside, 1], points[beside, 0]), 1)) % (
+        2.0 * np.pi
+    )
     gaps = np.diff(np.sort(angles), append=np.sort(angles)[0] + 2.0 * np.pi)
     assert np.sum(gaps > 1.0) == 3 and gaps.max() < np.radians(200.0)
 
@@ -120,7 +138,9 @@ def test_two_points_have_no_support_region() -> None:
 
 def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
     # about +y, a quarter turn takes the mark from the top to the front
-    start, quarter = (props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2))
+    start, quarter = (
+        props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2)
+    )
     np.testing.assert_allclose(start, [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
 
@@ -136,15 +156,23 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
         items = props.hydraulic_cylinder([0, 0, 0], [0, 0, length], (0.3, 0.5))
         rod = items["/rod"].matrix
         assert rod[2, 3] + rod[2, 2] == pytest.approx(length)
-        assert items["/base chamber"].matrix[2, 2] + items["/rod chamber"].matrix[2, 2] == pytest.approx(0.92 * 0.3)
+        assert items["/base chamber"].matrix[2, 2] + items["/rod chamber"].matrix[
+            2, 2
+        ] == pytest.approx(0.92 * 0.3)
         return float(items["/piston"].matrix[2, 3])
 
     assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
 
 
 def test_braces_lower_a_part_of_a_label() -> None:
-    images = [shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"] for text in ("fc", "f{c}")]
-    plain, lowered = (np.frombuffer(i["data"].data, np.uint8).reshape(i["height"], i["width"], 2)[::-1] for i in images)
+    images = [
+        shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"]
+        for text in ("fc", "f{c}")
+    ]
+    plain, lowered = (
+        np.frombuffer(i["data"].data, np.uint8).reshape(i["height"], i["width"], 2)[::-1]
+        for i in images
+    )
     assert lowered.shape[1] < plain.shape[1]
     rows = [np.flatnonzero(image[:, :, 1].any(axis=1)).max() for image in (plain, lowered)]
     assert rows[1] > rows[0]
@@ -156,23 +184,35 @@ def _simulated(colour: tuple[float, ...], matrix: np.ndarray) -> np.ndarray:
 
 # Machado, Oliveira, Fernandes (2009), severity 1
 DEFICIENCIES = {
-    "protanopia": np.array([[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]]),
-    "deuteranopia": np.array([[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]),
-    "tritanopia": np.array([[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]]),
+    "protanopia": np.array(
+        [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]]
+    ),
+    "deuteranopia": np.array(
+        [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]
+    ),
+    "tritanopia": np.array(
+        [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]]
+    ),
 }
 
 
 def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
     for name, deficiency in DEFICIENCIES.items():
         for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
-                           (CONE["active"], CONE["outside"]), (GREYS[1], PLANNED), *pairwise(GREYS)]:  # fmt: skip
-            assert np.linalg.norm(_simulated(one, deficiency) - _simulated(other, deficiency)) > 0.2, name
+                           (CONE["active"], CONE["outside"]), (GREYS[1], PLANNED),
+                           *pairwise(GREYS)]:  # fmt: skip
+            assert (
+                np.linalg.norm(_simulated(one, deficiency) - _simulated(other, deficiency)) > 0.2
+            ), name
 
 
 def test_the_middle_grey_shows_on_every_background() -> None:
     def luminance(colour: tuple[float, ...]) -> float:
         c = np.array(colour)
-        return float(np.array([0.2126, 0.7152, 0.0722]) @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4))
+        return float(
+            np.array([0.2126, 0.7152, 0.0722])
+            @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+        )
 
     papers = [colour for top, bottom, _, _ in BACKGROUNDS.values() for colour in (top, bottom)]
     for paper in [*papers, (17 / 255,) * 3]:  # the last is a dark JupyterLab's
@@ -184,11 +224,18 @@ def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_
     for paper, _, _, text in BACKGROUNDS.values():
         outlined = markers.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.data
         data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
-        first, *_, last = np.frombuffer(data, np.uint8).reshape(-1, 3) / 255  # painted in this order
+        first, *_, last = (
+            np.frombuffer(data, np.uint8).reshape(-1, 3) / 255
+        )  # painted in this order
         for painted, colour in ((first, paper), (last, text)):
             np.testing.assert_allclose(painted, colour, atol=1e-2)
         for name, deficiency in DEFICIENCIES.items():
-            assert np.linalg.norm(_simulated(tuple(first), deficiency) - _simulated(tuple(last), deficiency)) > 0.8, name
+            assert (
+                np.linalg.norm(
+                    _simulated(tuple(first), deficiency) - _simulated(tuple(last), deficiency)
+                )
+                > 0.8
+            ), name
 
 
 def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
@@ -196,7 +243,9 @@ def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
         item = markers.push([0.0, 0.0, 0.0], vector, 1.0)
         attributes = item.shape.data["geometries"][0]["data"]["attributes"]
         unit = np.frombuffer(attributes["position"]["array"].data, "<i2").reshape(-1, 3)
-        points = unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T  # m, seen from where it begins
+        points = (
+            unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T
+        )  # m, seen from where it begins
         colours = np.frombuffer(attributes["color"]["array"].data, np.uint8).reshape(-1, 3)
         outline, arrow = points[colours[:, 0] == 255], points[colours[:, 0] < 255]
         radius = np.linalg.norm(item.matrix[:3, 0])
@@ -222,26 +271,42 @@ def test_figures(screen: Screen) -> None:
         assert (np.abs(image - image[150, 2]).sum(axis=2) > 60).mean() > 0.03, name
 
 
-def test_the_compass_is_plotted_and_drawn_to_scale(viewer: Viewer, standing: State, contacts: Contacts) -> None:
+def test_the_compass_is_plotted_and_drawn_to_scale(
+    viewer: Viewer, standing: State, contacts: Contacts
+) -> None:
     wrenches = wrench_set(standing, contacts)
     forces = wrenches.max_horizontal_forces(8)[1]
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
     np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["reachable horizontal force"]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        "reachable horizontal force"
+    ]
     plt.close(axis.figure)
-    near, far = (push_recovery_plots.horizontal_force_limits(wrenches, scale, n=8) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {"horizontal_force"} and near.keys() == far.keys()
+    near, far = (
+        push_recovery_plots.horizontal_force_limits(wrenches, scale, n=8)
+        for scale in (0.001, 0.002)
+    )
+    assert {path.split("/")[0] for path in near} == {
+        "horizontal_force"
+    } and near.keys() == far.keys()
     ring = next(path for path in near if "label" in path)
     ends = [picture[ring].matrix[:2, 3] - standing.com[:2] for picture in (near, far)]
-    np.testing.assert_allclose(np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002]))
+    np.testing.assert_allclose(
+        np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002])
+    )
     np.testing.assert_allclose(near["horizontal_force/line"].matrix[:2, 3], standing.com[:2])
     viewer.show(standing, contacts, extra=near)
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
     with raises(InputError, "max_normal_force"):
-        push_recovery_plots.plot_horizontal_force_limits(wrench_set(standing, walls, inner_approximation=False, facets=8), n=8)
+        push_recovery_plots.plot_horizontal_force_limits(
+            wrench_set(standing, walls, inner_approximation=False, facets=8), n=8
+        )
     refused(
-        lambda: push_recovery_plots.horizontal_force_limits(wrench_set(standing, contacts.only("FL_foot"))), InfeasibleError
+        lambda: push_recovery_plots.horizontal_force_limits(
+            wrench_set(standing, contacts.only("FL_foot"))
+        ),
+        InfeasibleError,
     )
 
 
@@ -254,7 +319,13 @@ def test_prices_stand_at_the_middle_of_their_facets(
     task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
     tasks = [task, *standing_tasks(standing)[1:]]
     controller = WholeBodyController(
-        go2, contacts, tasks, facets=facets, facet_rotation=turn, min_normal_force=20.0, backend="reference"
+        go2,
+        contacts,
+        tasks,
+        facets=facets,
+        facet_rotation=turn,
+        min_normal_force=20.0,
+        backend="reference",
     )
     answer = controller(standing.q, standing.v).solution
     picture = viewer.multiplier_labels(standing, contacts, answer)
@@ -268,23 +339,33 @@ def test_prices_stand_at_the_middle_of_their_facets(
         arm = picture[f"multiplier/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
             rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
-            np.testing.assert_allclose(arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9)
+            np.testing.assert_allclose(
+                arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9
+            )
         else:
             np.testing.assert_allclose(arm, height * normal, atol=1e-9)
         assert float(picture[f"multiplier/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [hex_code(viewer.painter.text_colour), "price of a limit: its multiplier", "patch"] in legend
+    assert [
+        hex_code(viewer.painter.text_colour),
+        "price of a limit: its multiplier",
+        "patch",
+    ] in legend
     with raises(InputError, "contacts", "solution"):
         viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
 
-def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(viewer: Viewer, standing: State) -> None:
+def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(
+    viewer: Viewer, standing: State
+) -> None:
     contacts = Contacts.points(standing.robot)
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
     mu[[0, 1, 2]] = 1e4, 9.0, 11.0  # of FL's facets
-    picture = viewer.multiplier_labels(standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up"))
+    picture = viewer.multiplier_labels(
+        standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up")
+    )
     assert set(picture) == {"multiplier/FL_foot facet 0", "multiplier/FL_foot facet 2"}
 
 
@@ -296,14 +377,21 @@ def test_figure_1_adds_up() -> None:
     np.testing.assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
     force, ring = left.renderer.picture["f/wall"].matrix, left.renderer.picture["f/base"].matrix
     balance = -np.cross(force[:3, 3], force[:3, 2])
-    np.testing.assert_allclose(ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9)
+    np.testing.assert_allclose(
+        ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9
+    )
     right.close(), left.close()
 
 
 @pytest.mark.front_end
-def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_every_mark_and_prop_is_in_the_page(
+    page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
+) -> None:
     extra = prefixed("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
-    extra |= prefixed("cylinder", props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)))
+    extra |= prefixed(
+        "cylinder",
+        props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)),
+    )
     extra |= prefixed("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
     extra |= prefixed("table", {"": props.turntable([-0.7, -0.6, 0.2], 0.3, 0.4)})
     extra |= prefixed("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
@@ -311,24 +399,30 @@ def test_every_mark_and_prop_is_in_the_page(page, viewer: Viewer, go2: Robot, st
     q = standing.q.copy()
     q[2] += 0.08
     viewer.show(
-        standing, contacts, forces, planned=1.2 * forces, support=True, wrench=[10, 0, go2.weight, 0, 20, 10],
-        push=("base", [0, 40.0, 0]), frames=["base"], labels=True, ghost=State(go2, q), extra=extra, title="shapes",
+        standing, contacts, forces, planned=1.2 * forces, support=True,
+        wrench=[10, 0, go2.weight, 0, 20, 10],
+        push=("base", [0, 40.0, 0]), frames=["base"], labels=True, ghost=State(go2, q), extra=extra,
+        title="shapes",
     )  # fmt: skip
     viewer.camera(View(40.0, 25.0, 1.7))
     page.goto(viewer.url)
     settle(page)
     drawn = page.evaluate(
-        "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += o.name == 'shape'; });"
+        "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += "
+        "o.name == 'shape'; });"
         " return n; })()"
     )
     assert drawn == len(viewer.renderer.picture)
     picture(page, "shapes")
 
 
-def test_no_path_of_a_picture_lies_below_another(viewer: Viewer, go2: Robot, standing: State, contacts: Contacts) -> None:
+def test_no_path_of_a_picture_lies_below_another(
+    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
+) -> None:
     forces = np.tile([20.0, 0.0, 30.0], (4, 1))
     drawn = viewer.painter.picture(
-        standing, contacts, forces, forces, support=True, wrench=np.ones(6), push=("base", [0, 9.0, 0]), ghost=standing,
+        standing, contacts, forces, forces, support=True, wrench=np.ones(6),
+        push=("base", [0, 9.0, 0]), ghost=standing,
         frames=["base"], labels=True,
     )  # fmt: skip
     paths = sorted(drawn)
@@ -336,8 +430,15 @@ def test_no_path_of_a_picture_lies_below_another(viewer: Viewer, go2: Robot, sta
 
 
 def test_a_drawing_redraws_what_has_another_shape(viewer: Viewer) -> None:
-    one, other = (shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4)) for c in (MEASURED, PLANNED))
-    for picture_of, kinds in (({"a": one}, ["set_object", "set_transform"]), ({"a": other}, ["set_object"]), ({}, ["delete"])):
+    one, other = (
+        shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4))
+        for c in (MEASURED, PLANNED)
+    )
+    for picture_of, kinds in (
+        ({"a": one}, ["set_object", "set_transform"]),
+        ({"a": other}, ["set_object"]),
+        ({}, ["delete"]),
+    ):
         newest = viewer.window.scene.newest
         viewer.draw(picture_of)
         sent = [umsgpack.unpackb(command) for command in viewer.window.scene.since(newest)[1]]

@@ -10,7 +10,15 @@ import pytest
 from floatbase import Contacts
 from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
-from floatbase.viewer.scene.colours import BACKGROUNDS, COM, DARK_SHADES, GREYS, LEGEND, MEASURED, hex_code
+from floatbase.viewer.scene.colours import (
+    BACKGROUNDS,
+    COM,
+    DARK_SHADES,
+    GREYS,
+    LEGEND,
+    MEASURED,
+    hex_code,
+)
 
 from .looks import picture
 
@@ -44,7 +52,10 @@ def test_text_is_read_and_what_hides_in_the_dark_has_another_shade_there(backgro
         assert contrast(text, paper) > READ
         assert contrast(text, paper) > 3.0 * contrast(lines, paper)  # the ground keeps behind
     if background == "dark":
-        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {*GREYS, *DARK_SHADES}
+        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {
+            *GREYS,
+            *DARK_SHADES,
+        }
         shades = [DARK_SHADES.get(colour, colour) for colour in drawn]
         assert min(contrast(shade, paper) for shade in shades for paper in (top, bottom)) > SEEN
         assert contrast(MEASURED, bottom) < SEEN  # so that the shades are there for something
@@ -62,19 +73,30 @@ def saved(go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> It
 def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path) -> None:
     inside = saved.read_text(encoding="utf-8").replace("&", "&amp;").replace('"', "&quot;")
     frame = f'<iframe srcdoc="{inside}" style="width: 100%; height: 560px; border: 0"></iframe>'
-    (saved.parent / "outer.html").write_text(f'<body style="color: #222">{frame}</body>', encoding="utf-8")
+    (saved.parent / "outer.html").write_text(
+        f'<body style="color: #222">{frame}</body>', encoding="utf-8"
+    )
     page.goto((saved.parent / "outer.html").as_uri())
     inner = page.frames[-1]
     inner.wait_for_function(DRAWN)
     assert not inner.evaluate(DARK)
-    seen = {part: inner.evaluate(*part) for part in ((COLOUR, "meshcat/measured/FL_foot"), (COLOUR, "meshcat/ground"), (GREY,))}
+    seen = {
+        part: inner.evaluate(*part)
+        for part in ((COLOUR, "meshcat/measured/FL_foot"), (COLOUR, "meshcat/ground"), (GREY,))
+    }
     assert f"#{seen[COLOUR, 'meshcat/measured/FL_foot']}" == hex_code(MEASURED).lower()
     page.evaluate("document.body.style.color = '#eee'")
     inner.wait_for_function(f"{DARK} && !viewer.needs_render")
-    assert f"#{inner.evaluate(COLOUR, 'meshcat/measured/FL_foot')}" == hex_code(DARK_SHADES[MEASURED]).lower()
-    assert f"#{inner.evaluate(COLOUR, 'meshcat/ground')}" == hex_code(BACKGROUNDS["dark"][2]).lower()
+    assert (
+        f"#{inner.evaluate(COLOUR, 'meshcat/measured/FL_foot')}"
+        == hex_code(DARK_SHADES[MEASURED]).lower()
+    )
+    assert (
+        f"#{inner.evaluate(COLOUR, 'meshcat/ground')}" == hex_code(BACKGROUNDS["dark"][2]).lower()
+    )
     assert hex_code(DARK_SHADES[COM]).lower() in inner.evaluate(
-        "[...document.querySelectorAll('#lines i')].map((one) => one.style.color.match(/\\d+/g).map("
+        "[...document.querySelectorAll('#lines i')].map((one) => "
+        "one.style.color.match(/\\d+/g).map("
         "(x) => Number(x).toString(16).padStart(2, '0')).join(''))"
         ".map((code) => '#' + code)"
     )
@@ -90,8 +112,12 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
 
 
 @pytest.mark.front_end
-def test_a_page_of_its_own_is_as_the_browser_is_and_as_wide_as_a_phone(browser, saved: Path) -> None:
-    context = browser.new_context(color_scheme="dark", viewport={"width": 390, "height": 800}, is_mobile=True, has_touch=True)
+def test_a_page_of_its_own_is_as_the_browser_is_and_as_wide_as_a_phone(
+    browser, saved: Path
+) -> None:
+    context = browser.new_context(
+        color_scheme="dark", viewport={"width": 390, "height": 800}, is_mobile=True, has_touch=True
+    )
     page = context.new_page()
     page.goto(saved.as_uri())
     page.wait_for_function(DRAWN)

@@ -1,4 +1,6 @@
-"""The image of a picture that a notebook keeps: drawn without a browser, it shows what the page shows."""
+"""The image of a picture that a notebook keeps: drawn without a browser, it shows what the page
+shows.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ KB = 1000
 def image(viewer: Viewer) -> np.ndarray:
     """The image of a display, (height, width, 3)."""
     data, _ = viewer._repr_mimebundle_()
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")).astype(int)
+    return np.asarray(
+        Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")
+    ).astype(int)
 
 
 def differing(one: np.ndarray, other: np.ndarray) -> int:
@@ -39,7 +43,9 @@ def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
     empty = image(viewer)
     robot = image(viewer.show(standing, com=False))
     assert differing(empty, robot) > 0.05 * robot[..., 0].size
-    full = image(viewer.show(standing, contacts, forces, support=True, labels=True, title="a title"))
+    full = image(
+        viewer.show(standing, contacts, forces, support=True, labels=True, title="a title")
+    )
     for colour in (COM, MEASURED, CALM, ALARM):
         assert hue_pixels(full, colour) > hue_pixels(robot, colour) + 50
     lower_left = np.s_[full.shape[0] // 2 :, : full.shape[1] // 4]
@@ -72,11 +78,15 @@ def test_the_image_of_any_robot_is_small(name: str) -> None:
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.4])
-def test_the_image_goes_with_a_robot_that_is_followed(go2: Robot, standing: State, slope: float) -> None:
+def test_the_image_goes_with_a_robot_that_is_followed(
+    go2: Robot, standing: State, slope: float
+) -> None:
     viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
     at_home = image(viewer.show(standing))
     q = standing.q.copy()
-    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])  # a whole jump of the grid, down the slope
+    q[:3] += 2.5 * np.array(
+        [np.cos(slope), 0.0, -np.sin(slope)]
+    )  # a whole jump of the grid, down the slope
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
     viewer.close()
@@ -90,7 +100,9 @@ def test_on_high_ground_the_image_is_the_same(go2: Robot, standing: State) -> No
     high.close()
 
 
-def test_the_image_goes_on_with_the_robot_after_pictures_of_ones_own(go2: Robot, standing: State) -> None:
+def test_the_image_goes_on_with_the_robot_after_pictures_of_ones_own(
+    go2: Robot, standing: State
+) -> None:
     viewer = Viewer(go2, follow=True)
     at_home = image(viewer.show(standing))
     q = standing.q.copy()
@@ -102,7 +114,9 @@ def test_the_image_goes_on_with_the_robot_after_pictures_of_ones_own(go2: Robot,
     viewer.close()
 
 
-def test_another_ground_moves_the_camera_with_the_next_picture_only(go2: Robot, standing: State) -> None:
+def test_another_ground_moves_the_camera_with_the_next_picture_only(
+    go2: Robot, standing: State
+) -> None:
     viewer = Viewer(go2, follow=True)
     q = standing.q.copy()
     q[0] += 2.5
@@ -131,4 +145,7 @@ def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     copy = viewer.show(standing).widget()
     assert "<iframe" in copy.value
-    assert with_thumbnail({"text/plain": "x"}, copy) == ({"text/plain": "x", "text/html": copy.value}, {})
+    assert with_thumbnail({"text/plain": "x"}, copy) == (
+        {"text/plain": "x", "text/html": copy.value},
+        {},
+    )

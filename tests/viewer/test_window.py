@@ -39,7 +39,9 @@ UPDATES = [protocol.set_transform(f"/meshcat/{i}", np.eye(4)) for i in range(100
 
 
 def window_threads() -> list[threading.Thread]:
-    return [thread for thread in threading.enumerate() if thread.name.startswith("floatbase-window")]
+    return [
+        thread for thread in threading.enumerate() if thread.name.startswith("floatbase-window")
+    ]
 
 
 def commands_in(frame: bytes) -> list[dict]:
@@ -58,10 +60,14 @@ def in_a_loop(coroutine: Coroutine[Any, Any, Any]) -> Any:
         return pool.submit(asyncio.run, coroutine).result()
 
 
-async def connect(window: Window, origin: str | None = None) -> tornado.websocket.WebSocketClientConnection:
+async def connect(
+    window: Window, origin: str | None = None
+) -> tornado.websocket.WebSocketClientConnection:
     headers = {} if origin is None else {"Origin": origin}
     url = window.web_url.replace("http", "ws") + "socket"
-    return await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(url, headers=headers))
+    return await tornado.websocket.websocket_connect(
+        tornado.httpclient.HTTPRequest(url, headers=headers)
+    )
 
 
 def test_meshcat_draws_into_the_window(window: Window) -> None:
@@ -114,8 +120,14 @@ def test_the_window_listens_on_loopback_only(window: Window) -> None:
     found = [line.split()[1] for line in lines if line.split()[3] == "0A"]
     assert f"0100007F:{place}" in found
     assert f"00000000:{place}" not in found
-    # another address of this machine's loopback network is already too far away, and so are its addresses in other networks
-    others = {a.address for found in psutil.net_if_addrs().values() for a in found if a.family == socket.AF_INET}
+    # another address of this machine's loopback network is already too far away, and so are its
+    # addresses in other networks
+    others = {
+        a.address
+        for found in psutil.net_if_addrs().values()
+        for a in found
+        if a.family == socket.AF_INET
+    }
     for address in ("127.0.0.2", *(others - {"127.0.0.1"})):
         with pytest.raises(OSError):
             socket.create_connection((address, window.port), timeout=2)
@@ -124,10 +136,16 @@ def test_the_window_listens_on_loopback_only(window: Window) -> None:
 
 def listening() -> set[int]:
     """The ports that this process listens on."""
-    return {found.laddr.port for found in psutil.Process().net_connections("inet") if found.status == psutil.CONN_LISTEN}
+    return {
+        found.laddr.port
+        for found in psutil.Process().net_connections("inet")
+        if found.status == psutil.CONN_LISTEN
+    }
 
 
-def test_a_picture_has_a_port_only_once_its_address_is_asked_for(viewer: Viewer, standing: State, tmp_path: Path) -> None:
+def test_a_picture_has_a_port_only_once_its_address_is_asked_for(
+    viewer: Viewer, standing: State, tmp_path: Path
+) -> None:
     before = listening()
     viewer.show(standing)
     viewer.widget()
@@ -278,7 +296,10 @@ def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window: 
             window.put([protocol.set_object("/meshcat/a", umsgpack.packb({"n": n}))])
         await asyncio.sleep(0.1)
         await client.write_message(json.dumps({"type": "done"}))
-        return [command["type"] for command in commands_in(await asyncio.wait_for(client.read_message(), PATIENCE))]
+        return [
+            command["type"]
+            for command in commands_in(await asyncio.wait_for(client.read_message(), PATIENCE))
+        ]
 
     assert in_a_loop(sleepy()) == ["delete", "set_object"]
 
@@ -299,12 +320,16 @@ def test_threads_draw_at_the_same_time(window: Window) -> None:
 
 @contextmanager
 def interrupting() -> Iterator[Callable[[Callable[[], object], float], bool]]:
-    """A function that repeats another until it is interrupted, some time of this process (s) later, and says whether it was.
+    """A function that repeats another until it is interrupted, some time of this process (s) later,
+    and says whether it was.
 
-    The timer of the wall clock is pytest-timeout's. Python drops an interrupt that falls into a destructor.
+    The timer of the wall clock is pytest-timeout's. Python drops an interrupt that falls into a
+    destructor.
     """
 
-    def repeat(use: Callable[[], object]) -> None:  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
+    def repeat(
+        use: Callable[[], object],
+    ) -> None:  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
         stop = time.monotonic() + 1.0
         while time.monotonic() < stop:
             use()
@@ -326,15 +351,21 @@ def interrupting() -> Iterator[Callable[[Callable[[], object], float], bool]]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-@pytest.mark.parametrize("use", [lambda scene: scene.put(UPDATES), lambda scene: scene.since(0)], ids=["put", "since"])
-def test_an_interrupt_never_leaves_a_scene_locked(window: Window, use: Callable[[Any], Any]) -> None:
+@pytest.mark.parametrize(
+    "use", [lambda scene: scene.put(UPDATES), lambda scene: scene.since(0)], ids=["put", "since"]
+)
+def test_an_interrupt_never_leaves_a_scene_locked(
+    window: Window, use: Callable[[Any], Any]
+) -> None:
     scene, count = window.scene, 0
     scene.put(UPDATES)
     stop = time.monotonic() + PATIENCE
     with interrupting() as interrupted:
         while count < 200 and time.monotonic() < stop:
             count += interrupted(lambda: use(scene), 1e-4)
-            reader = threading.Thread(target=scene.copy, daemon=True)  # waits for ever where the lock is held
+            reader = threading.Thread(
+                target=scene.copy, daemon=True
+            )  # waits for ever where the lock is held
             reader.start()
             reader.join(PATIENCE)
             assert not reader.is_alive(), f"locked after {count} interrupts"
@@ -371,7 +402,8 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window: Window) ->
 
 
 STRANGE = [
-    "", "hello", '{"type":', "null", "3", "[]", '"x"', "{}", "[" * 200_000, "9" * 6000, b"\x00\xff", b"\xff\xfe{}",
+    "", "hello", '{"type":', "null", "3", "[]", '"x"', "{}", "[" * 200_000, "9" * 6000, b"\x00\xff",
+    b"\xff\xfe{}",
     *(json.dumps({"type": kind}) for kind in (3, [], {}, "nonsense", "image", "control")),
     *(json.dumps({"type": "image", "id": number, "data": "x"}) for number in ([], {}, "7", 7, None)),
     *(json.dumps({"type": "control", "name": name, "value": 1}) for name in (None, [], {}, 3, "unknown", "\ud800")),
@@ -391,7 +423,10 @@ def test_what_no_page_says_is_ignored(window: Window, caplog: pytest.LogCaptureF
             raise ZeroDivisionError("of the callback")
 
     window.put(
-        [protocol.set_control("slider", value=0.0, min=-1.0, max=1.0, step=0.1), protocol.set_control("box", value=True)]
+        [
+            protocol.set_control("slider", value=0.0, min=-1.0, max=1.0, step=0.1),
+            protocol.set_control("box", value=True),
+        ]
     )
     window.put([protocol.set_control("broken")])
     window.on_control(hear)
@@ -399,12 +434,20 @@ def test_what_no_page_says_is_ignored(window: Window, caplog: pytest.LogCaptureF
 
     async def say() -> None:
         client = await connect(window)
-        for message in [*STRANGE, *(json.dumps({"type": "control", "name": name, "value": value}) for name, value in ours)]:
+        for message in [
+            *STRANGE,
+            *(
+                json.dumps({"type": "control", "name": name, "value": value})
+                for name, value in ours
+            ),
+        ]:
             await client.write_message(message, binary=isinstance(message, bytes))
         while len(heard) < len(ours):
             await asyncio.sleep(0.01)
         huge = await connect(window)
-        with pytest.raises(tornado.websocket.WebSocketClosedError):  # refused, so the connection ends while it is sent
+        with pytest.raises(
+            tornado.websocket.WebSocketClosedError
+        ):  # refused, so the connection ends while it is sent
             for _ in range(3):
                 await huge.write_message("x" * (40 << 20))
                 await asyncio.sleep(0.1)

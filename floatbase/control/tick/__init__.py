@@ -1,6 +1,11 @@
 """The compiled tick: the quadratic program of (26)(27) solved by numba over plain arrays."""
 
-from floatbase.control.tick.compiled import CompiledTick, announce_if_slow, cache_warning, unsupported_reason
+from floatbase.control.tick.compiled import (
+    CompiledTick,
+    announce_if_slow,
+    cache_warning,
+    unsupported_reason,
+)
 from floatbase.control.tick.user_terms import TickInputs
 
 __all__ = ["CompiledTick", "TickInputs", "announce_if_slow", "cache_warning", "unsupported_reason"]

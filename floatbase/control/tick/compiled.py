@@ -1,6 +1,8 @@
-"""The compiled tick as the controller calls it: whether it can run a problem, and the class that runs it.
+"""The compiled tick as the controller calls it: whether it can run a problem, and the class that
+runs it.
 
-numba takes a while to load, so the files that need it are imported when the first problem is compiled.
+numba takes a while to load, so the files that need it are imported when the first problem is
+compiled.
 """
 
 from __future__ import annotations
@@ -25,7 +27,14 @@ from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
 # joints whose axes stand still in their own frame
-_JOINTS = ("JointModelR", "JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismatic", "JointModelFreeFlyer")
+_JOINTS = (
+    "JointModelR",
+    "JointModelPX",
+    "JointModelPY",
+    "JointModelPZ",
+    "JointModelPrismatic",
+    "JointModelFreeFlyer",
+)
 
 
 @contextmanager
@@ -45,11 +54,17 @@ def cache_warning() -> str:
     from floatbase.control.tick import jit
 
     remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
-    return f"; what is compiled cannot be kept ({jit.cache_error}): {remedy}" if jit.cache_error else ""
+    return (
+        f"; what is compiled cannot be kept ({jit.cache_error}): {remedy}"
+        if jit.cache_error
+        else ""
+    )
 
 
 def unsupported_reason(problem: Problem, solver: str) -> str:
-    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP solver."""
+    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP
+    solver.
+    """
     if solver != "daqp":
         return f"solver {solver!r} was requested, and the compiled tick has its own"
     try:
@@ -66,27 +81,41 @@ def _unsupported_robot_reason(robot: Robot) -> str:
     if robot.d == 0:
         return f"{robot.name} has no joints to drive"
     if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
-        return f"{robot.name} has a single joint and no base: the compiled tick takes two velocities or more"
+        return (
+            f"{robot.name} has a single joint and no base: the compiled tick takes two "
+            f"velocities or more"
+        )
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
-            return f"joint {robot.model.names[i]!r} is a {kind}; the compiled tick takes revolute and prismatic joints"
-    return "" if dynamics_of(robot).layout_supported else "this Pinocchio lays its results out in another way in memory"
+            return (
+                f"joint {robot.model.names[i]!r} is a {kind}; the compiled tick takes revolute "
+                f"and prismatic joints"
+            )
+    return (
+        ""
+        if dynamics_of(robot).layout_supported
+        else "this Pinocchio lays its results out in another way in memory"
+    )
 
 
 class CompiledTick:
     """The compiled tick of one problem, for which `unsupported_reason` is "".
 
-    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the reference backend must decide, else
-    the array of numbers that `tick.tick` fills, how many rows are active, and what else the tick was given.
+    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the
+    reference backend must decide, else the array of numbers that `tick.tick` fills, how many rows
+    are active, and what else the tick was given.
 
     qdd, tau, forces: where these are among the numbers.
-    unchecked_tasks: tasks of which the tables cannot tell whether they fit: user-defined ones, and moving ones.
-    arguments: what `tick.tick` takes after q, v and `TickInputs.packed`, but for the answer and the stages to run.
+    unchecked_tasks: tasks of which the tables cannot tell whether they fit: user-defined ones, and
+        moving ones.
+    arguments: what `tick.tick` takes after q, v and `TickInputs.packed`, but for the answer and the
+        stages to run.
     default_inputs: as they are without a state, zeros for what moves and nothing user-defined.
     workspace: real and whole numbers, memory of the tick.
 
-    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
+    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of
+    the wrong shape.
     """
 
     def __init__(self, problem: Problem):
@@ -100,20 +129,35 @@ class CompiledTick:
             {each.task_index for each in self._time_varying_tasks},
         )
         self.unchecked_tasks = [
-            task for i, task in enumerate(problem.tasks) if i in time_varying or type(task) not in TASK_KINDS
+            task
+            for i, task in enumerate(problem.tasks)
+            if i in time_varying or type(task) not in TASK_KINDS
         ]
         self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._workspace_sizes, self._tables, self._tick, self._n_stages = tick.workspace_sizes, tables, tick.tick, tick.N_STAGES
-        self._varies, self._n_user_rows = bool(self._time_varying_tasks) or self.user_terms.varies, -1
+        self._workspace_sizes, self._tables, self._tick, self._n_stages = (
+            tick.workspace_sizes,
+            tables,
+            tick.tick,
+            tick.N_STAGES,
+        )
+        self._varies, self._n_user_rows = (
+            bool(self._time_varying_tasks) or self.user_terms.varies,
+            -1,
+        )
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
-        """Memory for one tick at a time, the dynamics' lock sees to it, whose user-defined tasks have so many rows."""
+        """Memory for one tick at a time, the dynamics' lock sees to it, whose user-defined tasks
+        have so many rows.
+        """
         if n_user_rows > self._n_user_rows:
             n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
-            self.workspace, self._n_user_rows = (np.empty(n_floats), np.empty(n_ints, np.int64)), n_user_rows
+            self.workspace, self._n_user_rows = (
+                (np.empty(n_floats), np.empty(n_ints, np.int64)),
+                n_user_rows,
+            )
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
@@ -129,18 +173,30 @@ class CompiledTick:
         return (result, n_active, inputs) if n_active >= 0 else None
 
     def warm_up(self) -> str:
-        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not wait for it.
+        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not
+        wait for it.
 
         Returns why that is not possible, or "".
         """
         standing = self._problem.robot.standing()
         q, v = np.array(standing.q), np.array(standing.v)
-        with announce_if_slow(f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."):
+        with announce_if_slow(
+            f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."
+        ):
             try:
                 with self.dynamics.lock:
                     self.dynamics.update(q, v)
-                    self._tick(q, v, self.default_inputs.packed, *self.arguments, self.empty_result(), self._n_stages)
-            except Exception as error:  # whatever numba raises, the reference backend does without; no code of the user's runs
+                    self._tick(
+                        q,
+                        v,
+                        self.default_inputs.packed,
+                        *self.arguments,
+                        self.empty_result(),
+                        self._n_stages,
+                    )
+            except Exception as error:
+                # whatever numba raises, the reference backend does without; no code of the user's
+                # runs
                 return f"numba could not compile the tick ({type(error).__name__}: {error})"
         return ""
 
@@ -149,40 +205,62 @@ class CompiledTick:
         return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:
-        """The reference QP of a tick, with what its functions returned then: called again, they may return something else."""
+        """The reference QP of a tick, with what its functions returned then: called again, they may
+        return something else.
+        """
         values: dict[int, dict[str, Any]] = {}
         for index, task, first in self._time_varying_tasks:
             values[index] = {}
-            for name, shape in target_shapes(task, self._problem.robot, self._problem.contacts.k).items():
+            for name, shape in target_shapes(
+                task, self._problem.robot, self._problem.contacts.k
+            ).items():
                 values[index][name] = inputs.packed[first : first + prod(shape)].reshape(shape)
                 first += prod(shape)
         eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
         for i, task in enumerate(self._problem.tasks):
             fixed = replace(cast(Any, task), **values[i]) if i in values else task
             costs.append(
-                (task.block, *(inputs.residuals[i] if i in inputs.residuals else (task.weight, residual_of(fixed, eom, t))))
+                (
+                    task.block,
+                    *(
+                        inputs.residuals[i]
+                        if i in inputs.residuals
+                        else (task.weight, residual_of(fixed, eom, t))
+                    ),
+                )
             )
-        return assemble_qp(eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities)
+        return assemble_qp(
+            eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities
+        )
 
     def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
         """Multipliers of all inequality rows of the reference QP, from what a call returned."""
         limits, contacts = self._problem.limits, self._problem.contacts
-        limited = np.isfinite(limits.torque_limits)  # the reference QP has rows for these joints only
+        limited = np.isfinite(
+            limits.torque_limits
+        )  # the reference QP has rows for these joints only
         friction = np.full(contacts.n_points * (limits.facets + 1), True)
         user_rows = np.full(sum(len(G) for G, _ in inputs.inequalities), True)
-        has_row = np.concatenate([friction, limits.bounded_points(contacts), limited, limited, user_rows])
+        has_row = np.concatenate(
+            [friction, limits.bounded_points(contacts), limited, limited, user_rows]
+        )
         mu, active = result[self.forces.stop :].reshape(2, -1)[:, :n_active]
         multipliers = np.zeros(has_row.size)
         multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
         return multipliers[has_row]
 
     def inputs_at(self, q: Array, v: Array, t: float) -> TickInputs | None:
-        """What the tick is given at time t, in arrays of its own, as other threads may run ticks too.
+        """What the tick is given at time t, in arrays of its own, as other threads may run ticks
+        too.
 
         None where something is wrong with it: the reference backend finds the same, and says so.
         """
         try:
-            targets = self._targets_at(t) if self._time_varying_tasks else self.default_inputs.packed[: self.n_targets]
+            targets = (
+                self._targets_at(t)
+                if self._time_varying_tasks
+                else self.default_inputs.packed[: self.n_targets]
+            )
             inputs = self.user_terms.inputs(targets, q, v, t)
         except Exception:  # code of the user's, which may raise anything
             return None
@@ -193,7 +271,11 @@ class CompiledTick:
 
     def _targets_at(self, t: float) -> Array:
         """All targets at time t. Raises `InputError` for a bad one."""
-        targets, robot, k = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot, self._problem.contacts.k
+        targets, robot, k = (
+            self.default_inputs.packed[: self.n_targets].copy(),
+            self._problem.robot,
+            self._problem.contacts.k,
+        )
         for _, task, first in self._time_varying_tasks:
             for value in targets_at(task, robot, k, t):
                 targets[first : first + value.size] = value.ravel()

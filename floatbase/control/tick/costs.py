@@ -8,8 +8,24 @@ import numpy as np
 
 from floatbase.control.tick.elimination import Parametrisation, add_entry, add_product
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.kinematics import Bodies, body_jacobian, centre_of_mass, frame_pose, point_velocity
-from floatbase.control.tick.problem_arrays import COM, FORCE, FORCES, FRAME, ORIENTATION, POSTURE, QDD, TAU, TORQUE
+from floatbase.control.tick.kinematics import (
+    Bodies,
+    body_jacobian,
+    centre_of_mass,
+    frame_pose,
+    point_velocity,
+)
+from floatbase.control.tick.problem_arrays import (
+    COM,
+    FORCE,
+    FORCES,
+    FRAME,
+    ORIENTATION,
+    POSTURE,
+    QDD,
+    TAU,
+    TORQUE,
+)
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
 from floatbase.control.tick.workspace import clear, take_matrix, take_vector
 
@@ -20,8 +36,12 @@ class TaskTable(NamedTuple):
     table: Any  # (N, 3), kind, joint, first number in targets
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
-    targets: Any  # of all tasks, one after the other: position, rotation row by row or q, then velocity and acceleration
-    user_start: Any  # where user-defined tasks start among them, one after the other: block, m, weight, A (m, n), b (m,)
+    # of all tasks, one after the other: position, rotation row by row or q, then velocity and
+    # acceleration
+    targets: Any
+    # where user-defined tasks start among them, one after the other: block, m, weight, A (m, n), b
+    # (m,)
+    user_start: Any
     n_user: Any  # how many these are
     n_user_rows: Any  # the sum of their m
 
@@ -37,7 +57,9 @@ class Cost(NamedTuple):
 @jit
 def rotation_error(R, target):
     """e = log(R targetᵀ), world, for two rotations; and False where the angle is too large."""
-    e = times(0.5, plus(plus(cross(target[0], R[0]), cross(target[1], R[1])), cross(target[2], R[2])))
+    e = times(
+        0.5, plus(plus(cross(target[0], R[0]), cross(target[1], R[1])), cross(target[2], R[2]))
+    )
     sine = np.sqrt(dot(e, e))
     cosine = 0.5 * (dot(target[0], R[0]) + dot(target[1], R[1]) + dot(target[2], R[2]) - 1.0)
     scale = 1.0 + sine * sine / 6.0 if sine < 1e-4 else np.arctan2(sine, cosine) / sine
@@ -46,13 +68,18 @@ def rotation_error(R, target):
 
 @jit
 def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
-    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and False for an angle too
-    large.
+    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and
+    False for an angle too large.
 
     rows: (3, nv) receives the Jacobian.
     """
     clear(rows)
-    kind, joint, first, targets = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2], tasks.targets
+    kind, joint, first, targets = (
+        tasks.table[i, 0],
+        tasks.table[i, 1],
+        tasks.table[i, 2],
+        tasks.targets,
+    )
     target = targets.reshape(1, targets.size)
     after, valid = first + (9 if kind == ORIENTATION else 3), True
     if kind == COM:
@@ -67,12 +94,24 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
             body_jacobian(bodies, joint, False, p, rows, 0)
             e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
             columns = targets[first:after].reshape(3, 3)
-            e, valid = rotation_error(R, (column_part(columns, 0, 0), column_part(columns, 0, 1), column_part(columns, 0, 2)))
+            e, valid = rotation_error(
+                R,
+                (
+                    column_part(columns, 0, 0),
+                    column_part(columns, 0, 1),
+                    column_part(columns, 0, 2),
+                ),
+            )
         else:
             body_jacobian(bodies, joint, True, p, rows, 0)
             e_dot, drift = point_velocity(bodies, joint, p)
             e = minus(p, row_part(target, 0, first))
-    return e, minus(e_dot, row_part(target, 0, after)), minus(drift, row_part(target, 0, after + 3)), valid
+    return (
+        e,
+        minus(e_dot, row_part(target, 0, after)),
+        minus(drift, row_part(target, 0, after + 3)),
+        valid,
+    )
 
 
 @jit
@@ -94,8 +133,11 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 
 @jit
-def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, base, workspace, cost: Cost):
-    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns its number of rows, -1 for an angle too large.
+def task_costs(
+    q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, base, workspace, cost: Cost
+):
+    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns its number of rows, -1
+    for an angle too large.
 
     q, v: (nq,), (nv,), the state.
     base: number of rows of (7) without a motor, 6 or 0.
@@ -103,13 +145,25 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, b
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
     clear(R)
-    used, rows, e_joint, e_dot_joint = 0, take_matrix(workspace, 3, nv), take_vector(workspace, d), take_vector(workspace, d)
-    # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight × desired
+    used, rows, e_joint, e_dot_joint = (
+        0,
+        take_matrix(workspace, 3, nv),
+        take_vector(workspace, d),
+        take_vector(workspace, d),
+    )
+    # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight ×
+    # desired
     weights, weighted = take_vector(workspace, nv + k + d), take_vector(workspace, nv + k + d)
     clear(weights)
     clear(weighted)
     for i in range(tasks.table.shape[0]):
-        kind, at, w, kp, kd = tasks.table[i, 0], tasks.table[i, 2], tasks.gains[i, 0], tasks.gains[i, 1], tasks.gains[i, 2]
+        kind, at, w, kp, kd = (
+            tasks.table[i, 0],
+            tasks.table[i, 2],
+            tasks.gains[i, 0],
+            tasks.gains[i, 1],
+            tasks.gains[i, 2],
+        )
         if kind <= FRAME:
             e, e_dot, bias, valid = motion_task(i, tasks, bodies, rows)
             if not valid:
@@ -140,17 +194,24 @@ def task_costs(q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, b
 
 @jit
 def count_user_rows(inputs, at, n_user, nv, k, d):
-    """How many rows the `n_user` user-defined tasks have that start at `at` in `inputs`, and where they end."""
+    """How many rows the `n_user` user-defined tasks have that start at `at` in `inputs`, and where
+    they end.
+    """
     rows = 0
     for _ in range(n_user):
         block, m = int(inputs[at]), int(inputs[at + 1])
-        at, rows = at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d))), rows + m
+        at, rows = (
+            at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d))),
+            rows + m,
+        )
     return rows, at
 
 
 @jit
 def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
-    """Add (weight / 2) ‖A x + b‖² of all user-defined tasks to R. Returns how many rows are in use then."""
+    """Add (weight / 2) ‖A x + b‖² of all user-defined tasks to R. Returns how many rows are in use
+    then.
+    """
     inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
     for _ in range(tasks.n_user):
@@ -172,9 +233,11 @@ def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
 
 @jit
 def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Cost):
-    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost. Returns how many rows of R are in use then.
+    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost. Returns how
+    many rows of R are in use then.
 
-    weights, weighted: (n + d,), weight and weight × desired of each entry; those that are a β take no row of R.
+    weights, weighted: (n + d,), weight and weight × desired of each entry; those that are a β take
+        no row of R.
     """
     V, beta_index, T = space
     R, diagonal, linear = cost
@@ -196,11 +259,15 @@ def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Co
 
 @jit
 def hessian(cost: Cost, H, grad):
-    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,) at β = 0."""
+    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,)
+    at β = 0.
+    """
     R, diagonal, linear = cost
     nb = diagonal.size
     clear(H)
-    for i in range(0, R.shape[0], 4):  # four rows at a time: each sum is loaded and stored once for all of them
+    for i in range(
+        0, R.shape[0], 4
+    ):  # four rows at a time: each sum is loaded and stored once for all of them
         for r in range(nb + 1):
             a, b, c, d = R[i, r], R[i + 1, r], R[i + 2, r], R[i + 3, r]
             for s in range(r + 1):

@@ -1,7 +1,9 @@
-"""The optimum of (27) by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983), and its last digits.
+"""The optimum of (27) by the dual active-set method of Goldfarb and Idnani (Math. Programming 27,
+1983), and its last digits.
 
-It starts at the optimum without inequalities and brings one violated row after the other to its bound; a row that is never
-violated is only looked at. Symbols: nb entries of β, H the Hessian, q the number of active rows, mu their multipliers.
+It starts at the optimum without inequalities and brings one violated row after the other to its
+bound; a row that is never violated is only looked at. Symbols: nb entries of β, H the Hessian, q
+the number of active rows, mu their multipliers.
 """
 
 from __future__ import annotations
@@ -17,13 +19,21 @@ from floatbase.control.tick.jit import jit
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
-INACCURATE, INFEASIBLE = -2, -3  # why there is no answer: it lacks digits, or there seems to be none
-PIVOT_TOLERANCE = 1e-13  # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
-DEPENDENCE_TOLERANCE = 1e-12  # part of a row, squared, outside the active rows: with less it depends on them
+INACCURATE, INFEASIBLE = (
+    -2,
+    -3,
+)  # why there is no answer: it lacks digits, or there seems to be none
+# least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
+PIVOT_TOLERANCE = 1e-13
+DEPENDENCE_TOLERANCE = (
+    1e-12  # part of a row, squared, outside the active rows: with less it depends on them
+)
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 STEP_TOLERANCE = 1e-6  # part of β: what a step this small leaves is rounding
 MAX_FINAL_STEP = 1e-4  # part of β that the last step may still move
-SIGN_TOLERANCE = 1e-9  # part of the largest multiplier by which one may be negative through rounding
+SIGN_TOLERANCE = (
+    1e-9  # part of the largest multiplier by which one may be negative through rounding
+)
 
 
 class ActiveSet(NamedTuple):
@@ -39,7 +49,9 @@ class ActiveSet(NamedTuple):
 
 @jit
 def cholesky(H, L):
-    """L (nb, nb) with L Lᵀ = H, whose lower triangle is read. Returns False where a direction costs nothing."""
+    """L (nb, nb) with L Lᵀ = H, whose lower triangle is read. Returns False where a direction costs
+    nothing.
+    """
     n = L.shape[0]
     clear(L)
     for j in range(n):
@@ -87,7 +99,9 @@ def invert_lower(L, W):
 
 @jit
 def add_row(W, U, d, z, q):
-    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as from `step_directions`."""
+    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as
+    from `step_directions`.
+    """
     n, length = d.size, 0.0
     for j in range(q, n):
         length += d[j] * d[j]
@@ -106,7 +120,9 @@ def add_row(W, U, d, z, q):
 
 @jit
 def drop_row(active: ActiveSet, at, q):
-    """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper triangular."""
+    """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper
+    triangular.
+    """
     indices, mu, bounds, rows, W, U = active
     for j in range(at, q - 1):
         indices[j], mu[j], bounds[j] = indices[j + 1], mu[j + 1], bounds[j + 1]
@@ -129,7 +145,9 @@ def drop_row(active: ActiveSet, at, q):
 
 @jit
 def multiply_by_row(W, row, d):
-    """d (nb,) = W row; most rows have three entries or fewer, those of one force whose components are β."""
+    """d (nb,) = W row; most rows have three entries or fewer, those of one force whose components
+    are β.
+    """
     n, count, i, j, k = row.size, 0, 0, 0, 0
     for c in range(n):
         if row[c] != 0.0:
@@ -148,7 +166,8 @@ def multiply_by_row(W, row, d):
 
 @jit
 def step_directions(W, U, d, q, z, r):
-    """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W times that row.
+    """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W
+    times that row.
 
     z, r: (nb,) receive the step of β and the decrease of the q multipliers.
     """
@@ -171,7 +190,8 @@ def step_directions(W, U, d, q, z, r):
 
 @jit
 def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
-    """Bring one violated row to its bound, dropping active rows whose multiplier would turn negative.
+    """Bring one violated row to its bound, dropping active rows whose multiplier would turn
+    negative.
 
     number, row, bound: of that row, as in `ActiveSet`.
     d, z, r: (nb,), memory for `step_directions`.
@@ -192,7 +212,9 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
         for j in range(q):
             if r[j] > 0.0 and mu[j] < partial_step * r[j]:
                 partial_step, blocking = mu[j] / r[j], j
-        full_step = excess / curvature if q < n and curvature > DEPENDENCE_TOLERANCE * size else np.inf
+        full_step = (
+            excess / curvature if q < n and curvature > DEPENDENCE_TOLERANCE * size else np.inf
+        )
         step = min(partial_step, full_step)
         if step == np.inf:
             return INFEASIBLE
@@ -215,7 +237,8 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
 
 @jit
 def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
-    """One step of Newton's method on the optimality conditions from (β, mu) that are right but for rounding.
+    """One step of Newton's method on the optimality conditions from (β, mu) that are right but for
+    rounding.
 
     grad: (nb,), the cost's slope at β; overwritten.
     L: Cholesky factor of the Hessian.
@@ -250,7 +273,9 @@ def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
             delta_beta[i] += along * W[j, i]
     for i in range(nb):
         beta[i] += delta_beta[i]
-    for a in range(q - 1, -1, -1):  # the multipliers balance the slope that is left after the way to the bounds
+    for a in range(
+        q - 1, -1, -1
+    ):  # the multipliers balance the slope that is left after the way to the bounds
         step[a] -= y[a]
         for j in range(a + 1, q):
             step[a] -= U[a, j] * step[j]
@@ -261,7 +286,9 @@ def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
 
 @jit
 def wrong_signed_row(mu, q):
-    """The place, among q active rows, of the most negative multiplier in mu; -1 where none is negative beyond rounding."""
+    """The place, among q active rows, of the most negative multiplier in mu; -1 where none is
+    negative beyond rounding.
+    """
     least, size, found = 0.0, 0.0, -1
     for a in range(q):
         size = max(size, abs(mu[a]))
@@ -271,20 +298,36 @@ def wrong_signed_row(mu, q):
 
 
 @jit
-def dual_search(cost: Cost, limits: Inequalities, space: Parametrisation, nv, workspace, indices, mu, beta):
-    """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why there is no answer.
+def dual_search(
+    cost: Cost, limits: Inequalities, space: Parametrisation, nv, workspace, indices, mu, beta
+):
+    """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why
+    there is no answer.
 
-    indices, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the optimum.
+    indices, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the
+        optimum.
 
-    Newton's method refines the end of the search. Where that shows that it was not the optimum, as a multiplier has the wrong
-    sign or a row is violated, the search goes on.
+    Newton's method refines the end of the search. Where that shows that it was not the optimum, as
+    a multiplier has the wrong sign or a row is violated, the search goes on.
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
-    H, grad, L = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb), take_matrix(workspace, nb, nb)
-    W, U, rows = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
+    H, grad, L = (
+        take_matrix(workspace, nb + 1, nb + 1),
+        take_vector(workspace, nb),
+        take_matrix(workspace, nb, nb),
+    )
+    W, U, rows = (
+        take_matrix(workspace, nb, nb),
+        take_matrix(workspace, nb, nb),
+        take_matrix(workspace, nb, nb),
+    )
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
-    forces, tau, qdd = take_vector(workspace, k), take_vector(workspace, d), take_vector(workspace, nv)
+    forces, tau, qdd = (
+        take_vector(workspace, k),
+        take_vector(workspace, d),
+        take_vector(workspace, nv),
+    )
     active = ActiveSet(indices, mu, bounds, rows, W, U)
     hessian(cost, H, grad)
     if not cholesky(H, L):
@@ -298,7 +341,9 @@ def dual_search(cost: Cost, limits: Inequalities, space: Parametrisation, nv, wo
                 break
             gradient(cost, beta, grad)
             moved = newton_step(q, grad, L, step, z, r, active, beta)
-            refined = refined + 1 if moved > STEP_TOLERANCE * (1.0 + largest(beta)) else NEWTON_STEPS
+            refined = (
+                refined + 1 if moved > STEP_TOLERANCE * (1.0 + largest(beta)) else NEWTON_STEPS
+            )
             wrong = wrong_signed_row(mu, q)
             if wrong >= 0:
                 drop_row(active, wrong, q)

@@ -1,8 +1,9 @@
-"""The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by Gauss-Jordan elimination (13)(16)(17).
+"""The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by
+Gauss-Jordan elimination (13)(16)(17).
 
-The reference backend takes an SVD for the space of motions (13). Here variables are eliminated one by one, and each β is an entry
-of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv, d, k as everywhere, n = nv + k entries of (q̈, λ), nb of
-β.
+The reference backend takes an SVD for the space of motions (13). Here variables are eliminated one
+by one, and each β is an entry of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv,
+d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from floatbase.control.tick.jit import jit, jit_allocating, jit_forceinline
 from floatbase.control.tick.workspace import clear, take_vector
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 
-DEPENDENT_ROW = 2e-2  # a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
+# a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
+DEPENDENT_ROW = 2e-2
 ZERO_ROW = 1e-11  # less than this part of a row is rounding
 ZERO_PIVOT = 1e-14  # relative to the row: no variable is left to solve it for
 
@@ -31,9 +33,11 @@ class Parametrisation(NamedTuple):
 
 @jit
 def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivots):
-    """Reduce rows first:last of B in place, each to one pivot that is 1. Returns the least part of a row left at its turn.
+    """Reduce rows first:last of B in place, each to one pivot that is 1. Returns the least part of
+    a row left at its turn.
 
-    B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the first `columns` only.
+    B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the
+        first `columns` only.
     first_cleared: rows from there on are cleared of the pivots.
     weights: (n,), each row takes the pivot of the largest weight × |entry|.
     lengths: of each row of B, before the elimination.
@@ -66,7 +70,9 @@ def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivot
 
 @jit
 def equalities(A, b, M, h, J, base, lengths, B):
-    """(7) without its joint rows: B = [A 0 | b] above [M_b -J_bᵀ | -h_b], and the `lengths` of its rows left of the bar."""
+    """(7) without its joint rows: B = [A 0 | b] above [M_b -J_bᵀ | -h_b], and the `lengths` of its
+    rows left of the bar.
+    """
     m, nv, k = A.shape[0], A.shape[1], J.shape[0]
     for i in range(m):
         for c in range(nv):
@@ -89,9 +95,11 @@ def equalities(A, b, M, h, J, base, lengths, B):
 
 @jit_allocating
 def independent_rows(A, b, v, rows, right):
-    """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A resolves, as in `build_qp`.
+    """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A
+    resolves, as in `build_qp`.
 
-    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where rows of A q̈ = b disagree
+    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where
+        rows of A q̈ = b disagree
     by more than the contacts' motion A v explains.
     """
     U, s, Vt = np.linalg.svd(A, False)
@@ -101,12 +109,17 @@ def independent_rows(A, b, v, rows, right):
     U = np.ascontiguousarray(U[:, :r])
     rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
-    return -1 if np.max(np.abs(gap)) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion)) else r
+    return (
+        -1
+        if np.max(np.abs(gap)) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion))
+        else r
+    )
 
 
 @jit
 def eliminate(A, b, M, h, J, base, workspace, B, pivots):
-    """(13)(17) Solve the equalities for as many entries of (q̈, λ). Returns the least part left of a motion row, of any row.
+    """(13)(17) Solve the equalities for as many entries of (q̈, λ). Returns the least part left of
+    a motion row, of any row.
 
     A, b: (m, nv), (m,), the motion rows (5).
     M, h, J: (nv, nv), (nv,), (k, nv), of (7).
@@ -114,8 +127,8 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     B: (m + base, n + 1) receives the reduced rows.
     pivots: (m + base,) receives the entry of (q̈, λ) that each is solved for.
 
-    Motion rows are solved for joints where that is possible, and for the base where knees are straight; base rows for the base,
-    and for λ where the contacts already hold it.
+    Motion rows are solved for joints where that is possible, and for the base where knees are
+    straight; base rows for the base, and for λ where the contacts already hold it.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
     lengths, motion_weights, base_weights = (
@@ -124,19 +137,25 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
         take_vector(workspace, n),
     )
     for c in range(n):
-        motion_weights[c], base_weights[c] = (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)
+        motion_weights[c], base_weights[c] = (
+            (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)
+        )
     equalities(A, b, M, h, J, base, lengths, B)
     smallest_pivot = gauss_jordan(B, 0, m, 0, nv, motion_weights, lengths, pivots)
     if smallest_pivot <= ZERO_ROW:
         return smallest_pivot, smallest_pivot
-    return smallest_pivot, min(smallest_pivot, gauss_jordan(B, m, m + base, m, n, base_weights, lengths, pivots))
+    return smallest_pivot, min(
+        smallest_pivot, gauss_jordan(B, m, m + base, m, n, base_weights, lengths, pivots)
+    )
 
 
 @jit
 def parametrise(B, pivots, m, free_columns, V, beta_index):
-    """(13)(17) V and beta_index of `Parametrisation` from the reduced rows of `eliminate`, the first m of them for motions.
+    """(13)(17) V and beta_index of `Parametrisation` from the reduced rows of `eliminate`, the
+    first m of them for motions.
 
-    The pivots of the later rows still stand in those of motions, and are substituted here. free_columns: (nb,), memory.
+    The pivots of the later rows still stand in those of motions, and are substituted here.
+    free_columns: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):
@@ -166,7 +185,9 @@ def parametrise(B, pivots, m, free_columns, V, beta_index):
 
 @jit_forceinline
 def add_entry(factor, V, beta_index, entry, out, row):
-    """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is one number."""
+    """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is
+    one number.
+    """
     if beta_index[entry] >= 0:
         out[row, beta_index[entry]] += factor
     else:
@@ -176,7 +197,9 @@ def add_entry(factor, V, beta_index, entry, out, row):
 
 @jit
 def add_product(rows, V, beta_index, out, first):
-    """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1); most entries of `rows` are zero."""
+    """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1); most entries
+    of `rows` are zero.
+    """
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             if rows[i, j] != 0.0:
@@ -185,7 +208,9 @@ def add_product(rows, V, beta_index, out, first):
 
 @jit
 def torques(V, beta_index, M, h, J, base, T):
-    """(16) T of `Parametrisation` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first `base`; V, beta_index: of `Parametrisation`."""
+    """(16) T of `Parametrisation` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first
+    `base`; V, beta_index: of `Parametrisation`.
+    """
     nv, k, nb = M.shape[0], J.shape[0], V.shape[1] - 1
     clear(T)
     add_product(M[base:], V, beta_index, T, 0)

@@ -1,8 +1,9 @@
 """The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
 
-Rows are numbered: F facets and the least normal force of each of P points, then their P largest normal forces, d upper torque
-limits, d lower ones, and the user-defined rows. What every problem needs is compiled into the search (`jit_forceinline`), what few
-need is not: left to itself, the compiler takes in neither, and a tick with many active rows takes 6 % longer.
+Rows are numbered: F facets and the least normal force of each of P points, then their P largest
+normal forces, d upper torque limits, d lower ones, and the user-defined rows. What every problem
+needs is compiled into the search (`jit_forceinline`), what few need is not: left to itself, the
+compiler takes in neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations
@@ -22,15 +23,17 @@ from floatbase.qp import FEASIBILITY_TOLERANCE
 class Inequalities(NamedTuple):
     """The inequalities on accelerations, forces and torques."""
 
-    cones: (
-        Any  # (P (F + 1), 5), F facets, then -normal of each point: row of G for its force, length, where in λ its force starts
-    )
+    # (P (F + 1), 5), F facets, then -normal of each point: row of G for its force, length, where in
+    # λ its force starts
+    cones: Any
     facets: Any  # F
     points: Any  # P
     torque_limits: Any  # (d,), N·m
     inputs: Any  # what `user_terms.UserTerms` packed
     bounds: Any  # where in it P least and P largest normal forces start, N
-    user_start: Any  # where user-defined rows start, one group after the other: block, number m of rows, G (m, n), h (m,)
+    # where user-defined rows start, one group after the other: block, number m of rows, G (m, n), h
+    # (m,)
+    user_start: Any
     n_user_groups: Any  # how many groups there are
     has_optional: Any  # whether there are any of these, or a largest normal force
 
@@ -59,14 +62,18 @@ def forces_of(space: Parametrisation, beta, forces):
 
 @jit_forceinline
 def worst_facet(limits: Inequalities, first, f):
-    """(28) The row of a point's facets, of which `first` is the first, that the force f violates most, and by how much; or -1.
+    """(28) The row of a point's facets, of which `first` is the first, that the force f violates
+    most, and by how much; or -1.
 
     Forces in the circle that the facets touch violate none.
     """
     normal = times(-1.0, row_part(limits.cones, first + limits.facets, 0))
     mu, normal_force = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)
     tangential_force = minus(f, times(normal_force, normal))
-    if normal_force >= 0.0 and dot(tangential_force, tangential_force) <= mu * mu * normal_force * normal_force:
+    if (
+        normal_force >= 0.0
+        and dot(tangential_force, tangential_force) <= mu * mu * normal_force * normal_force
+    ):
         return -1, 0.0
     worst, found = 0.0, -1
     for row in range(first, first + limits.facets):
@@ -78,7 +85,9 @@ def worst_facet(limits: Inequalities, first, f):
 
 @jit_forceinline
 def violated_force_row(limits: Inequalities, forces):
-    """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they violate none."""
+    """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they
+    violate none.
+    """
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
     n_rows = limits.facets + 1
     for i in range(limits.points):
@@ -102,7 +111,8 @@ def force_rows_of(limits: Inequalities):
 
 @jit
 def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """`violated_row` for largest normal forces and user-defined rows, measured on rows of unit length.
+    """`violated_row` for largest normal forces and user-defined rows, measured on rows of unit
+    length.
 
     forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
     """
@@ -110,7 +120,9 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
     for i in range(limits.points):
         row = i * (limits.facets + 1) + limits.facets
         start = int(cones[row, 4])
-        normal_force = -dot(row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2]))
+        normal_force = -dot(
+            row_part(cones, row, 0), (forces[start], forces[start + 1], forces[start + 2])
+        )
         excess = normal_force - limits.inputs[limits.bounds + limits.points + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], cones.shape[0] + i
@@ -136,9 +148,11 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
 
 @jit_forceinline
 def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,), qdd (nv,): memory.
+    """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,),
+    qdd (nv,): memory.
 
-    Torques are computed only where all forces are feasible, since they cost more; what few problems have comes last.
+    Torques are computed only where all forces are feasible, since they cost more; what few problems
+    have comes last.
     """
     forces_of(space, beta, forces)
     found = violated_force_row(limits, forces)
@@ -182,13 +196,20 @@ def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, o
 def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
-    nb, d, cone_face_matrix, force_rows = V.shape[1] - 1, T.shape[0], cones.shape[0], force_rows_of(limits)
+    nb, d, cone_face_matrix, force_rows = (
+        V.shape[1] - 1,
+        T.shape[0],
+        cones.shape[0],
+        force_rows_of(limits),
+    )
     if number >= force_rows + 2 * d:
         return user_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
     clear(out)
     if number < force_rows:
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
-        if number >= cone_face_matrix:  # the largest normal force: the row of the least one, turned round
+        if (
+            number >= cone_face_matrix
+        ):  # the largest normal force: the row of the least one, turned round
             row, sign = (number - cone_face_matrix) * n_rows + limits.facets, -1.0
             bound = limits.inputs[limits.bounds + limits.points + number - cone_face_matrix]
         elif number % n_rows == limits.facets:

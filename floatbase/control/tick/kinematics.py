@@ -1,6 +1,8 @@
-"""Velocities, drifts and Jacobians of all bodies and contacts from Pinocchio's world Jacobian: (1)(4)(5).
+"""Velocities, drifts and Jacobians of all bodies and contacts from Pinocchio's world Jacobian:
+(1)(4)(5).
 
-All quantities are in the world frame. A drift is the acceleration at q̈ = 0, that is J̇ v. Joint 0 is the world itself.
+All quantities are in the world frame. A drift is the acceleration at q̈ = 0, that is J̇ v. Joint 0
+is the world itself.
 """
 
 from __future__ import annotations
@@ -9,7 +11,16 @@ from typing import Any, NamedTuple
 
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.problem_arrays import POINT, USER_DEFINED
-from floatbase.control.tick.vectors import column_part, cross, minus, plus, rotate, rotation_in, row_part, times
+from floatbase.control.tick.vectors import (
+    column_part,
+    cross,
+    minus,
+    plus,
+    rotate,
+    rotation_in,
+    row_part,
+    times,
+)
 from floatbase.control.tick.workspace import clear
 
 
@@ -19,8 +30,10 @@ class Bodies(NamedTuple):
     tree: Any  # (n, 5), parent, first index in v, count in v, first index in q, count in q
     links: Any  # (n, 4), mass of each link and its position in the joint
     poses: Any  # (n, 12), rotation column by column, then position
-    J: Any  # (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular
-    Ag: Any  # (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows
+    # (6, nv), spatial velocity about the world's origin for each entry of v: linear, then angular
+    J: Any
+    # (6, nv), centroidal momentum matrix: mass × the Jacobian of the CoM in its first three rows
+    Ag: Any
     velocity: Any  # (n, 6), J v of each joint
     drift: Any  # (n, 6), its derivative at q̈ = 0
 
@@ -28,11 +41,15 @@ class Bodies(NamedTuple):
 class ContactTable(NamedTuple):
     """C contacts with P points."""
 
-    table: Any  # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
+    table: (
+        Any  # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
+    )
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
     inputs: Any  # what `user_terms.UserTerms` packed
-    user_start: Any  # where the user-defined contacts' A, b and J start in it, one contact after the other
+    user_start: (
+        Any  # where the user-defined contacts' A, b and J start in it, one contact after the other
+    )
     points_only: Any  # whether all are point contacts, whose A and J are the same
 
 
@@ -40,7 +57,8 @@ class ContactTable(NamedTuple):
 def forward_velocities(bodies: Bodies, v):
     """Fill velocity and drift of `bodies` from the root to the leaves, for v (nv,).
 
-    A joint's columns of J move with it, so its drift is that of its parent + velocity × (J v of the joint alone).
+    A joint's columns of J move with it, so its drift is that of its parent + velocity × (J v of the
+    joint alone).
     """
     tree, J, velocity, drift = bodies.tree, bodies.J, bodies.velocity, bodies.drift
     for r in range(6):
@@ -51,11 +69,22 @@ def forward_velocities(bodies: Bodies, v):
         for c in range(first, first + count):
             joint_linear = plus(joint_linear, times(v[c], column_part(J, 0, c)))
             joint_angular = plus(joint_angular, times(v[c], column_part(J, 3, c)))
-        linear, angular = plus(row_part(velocity, parent, 0), joint_linear), plus(row_part(velocity, parent, 3), joint_angular)
-        a = plus(row_part(drift, parent, 0), plus(cross(angular, joint_linear), cross(linear, joint_angular)))
+        linear, angular = (
+            plus(row_part(velocity, parent, 0), joint_linear),
+            plus(row_part(velocity, parent, 3), joint_angular),
+        )
+        a = plus(
+            row_part(drift, parent, 0),
+            plus(cross(angular, joint_linear), cross(linear, joint_angular)),
+        )
         alpha = plus(row_part(drift, parent, 3), cross(angular, joint_angular))
         for r in range(3):
-            velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = linear[r], angular[r], a[r], alpha[r]
+            velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = (
+                linear[r],
+                angular[r],
+                a[r],
+                alpha[r],
+            )
 
 
 @jit
@@ -72,7 +101,9 @@ def frame_pose(bodies: Bodies, joint, frames, i):
     """Rotation and position, world, of the frame whose pose in the joint is row i of `frames`."""
     R = rotation_in(bodies.poses, joint)
     x, y, z = rotation_in(frames, i)
-    return (rotate(R, x), rotate(R, y), rotate(R, z)), plus(row_part(bodies.poses, joint, 9), rotate(R, row_part(frames, i, 9)))
+    return (rotate(R, x), rotate(R, y), rotate(R, z)), plus(
+        row_part(bodies.poses, joint, 9), rotate(R, row_part(frames, i, 9))
+    )
 
 
 @jit
@@ -97,16 +128,29 @@ def centre_of_mass(bodies: Bodies):
     com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for i in range(1, bodies.links.shape[0]):
         link_mass = bodies.links[i, 0]
-        p = plus(row_part(bodies.poses, i, 9), rotate(rotation_in(bodies.poses, i), row_part(bodies.links, i, 1)))
+        p = plus(
+            row_part(bodies.poses, i, 9),
+            rotate(rotation_in(bodies.poses, i), row_part(bodies.links, i, 1)),
+        )
         velocity, drift = point_velocity(bodies, i, p)
         com, mass = plus(com, times(link_mass, p)), mass + link_mass
-        com_velocity, com_drift = plus(com_velocity, times(link_mass, velocity)), plus(com_drift, times(link_mass, drift))
-    return times(1.0 / mass, com), times(1.0 / mass, com_velocity), times(1.0 / mass, com_drift), mass
+        com_velocity, com_drift = (
+            plus(com_velocity, times(link_mass, velocity)),
+            plus(com_drift, times(link_mass, drift)),
+        )
+    return (
+        times(1.0 / mass, com),
+        times(1.0 / mass, com_velocity),
+        times(1.0 / mass, com_drift),
+        mass,
+    )
 
 
 @jit
 def copy_rows(numbers, first, rows, columns, out, row):
-    """Copy a table (rows, columns) that starts at `first` in `numbers` into rows of out (·, columns). Returns where it ends."""
+    """Copy a table (rows, columns) that starts at `first` in `numbers` into rows of out (·,
+    columns). Returns where it ends.
+    """
     for i in range(rows):
         for c in range(columns):
             out[row + i, c] = numbers[first + i * columns + c]
@@ -115,12 +159,19 @@ def copy_rows(numbers, first, rows, columns, out, row):
 
 @jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
-    """(4)(5) A (m, nv) and b (m,) of all contacts, and J (k, nv) of (4), the same array where `points_only`."""
+    """(4)(5) A (m, nv) and b (m,) of all contacts, and J (k, nv) of (4), the same array where
+    `points_only`.
+    """
     row, force, nv, inputs, start = 0, 0, A.shape[1], contacts.inputs, contacts.user_start
     clear(A)
     clear(J)
     for i in range(contacts.table.shape[0]):
-        joint, kind, first, count = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2], contacts.table[i, 3]
+        joint, kind, first, count = (
+            contacts.table[i, 0],
+            contacts.table[i, 1],
+            contacts.table[i, 2],
+            contacts.table[i, 3],
+        )
         m, k = contacts.table[i, 4], contacts.table[i, 5]
         if kind == USER_DEFINED:
             start = copy_rows(inputs, start, m, nv, A, row)
@@ -132,7 +183,9 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
         R, p = frame_pose(bodies, joint, contacts.frames, i)
         normal, radius = row_part(contacts.frames, i, 12), contacts.frames[i, 15]
         for j in range(first, first + count):
-            point = minus(plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal))
+            point = minus(
+                plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal)
+            )
             body_jacobian(bodies, joint, True, point, J, force + 3 * (j - first))
             if kind == POINT:
                 p = point

@@ -1,4 +1,6 @@
-"""One moment of the compiled tick, as tasks, constraints and user-defined rows see it: only what they ask for is computed."""
+"""One moment of the compiled tick, as tasks, constraints and user-defined rows see it: only what
+they ask for is computed.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ class TickState(State):
 
 
 class TickEquations(EquationsOfMotion):
-    """(7) in a tick: `equations_of_motion(state, contacts, t)`, of which M, h, J, A and b are made when they are asked for."""
+    """(7) in a tick: `equations_of_motion(state, contacts, t)`, of which M, h, J, A and b are made
+    when they are asked for.
+    """
 
     def __init__(self, state: TickState, contacts: Contacts, t: float):
         self.__dict__.update(state=state, contacts=contacts, S=state.robot.S, _t=t)
@@ -36,7 +40,9 @@ class TickEquations(EquationsOfMotion):
         if name == "J":
             self.__dict__["J"] = self.contacts.jacobian(self.state, self.__dict__["_t"])
         elif name in ("A", "b"):
-            self.__dict__["A"], self.__dict__["b"] = self.contacts.constraint(self.state, self.__dict__["_t"])
+            self.__dict__["A"], self.__dict__["b"] = self.contacts.constraint(
+                self.state, self.__dict__["_t"]
+            )
         else:
             raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
         return self.__dict__[name]
@@ -57,4 +63,13 @@ class TickEquations(EquationsOfMotion):
         return self.contacts.k
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return EquationsOfMotion, (self.state, self.contacts, self.M, self.h, self.S, self.J, self.A, self.b)
+        return EquationsOfMotion, (
+            self.state,
+            self.contacts,
+            self.M,
+            self.h,
+            self.S,
+            self.J,
+            self.A,
+            self.b,
+        )

@@ -1,6 +1,8 @@
-"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays that it overwrites in place.
+"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays that it
+overwrites in place.
 
-What belongs to one robot or one contact is made once, so that a controller with other contacts is cheap.
+What belongs to one robot or one contact is made once, so that a controller with other contacts is
+cheap.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ if TYPE_CHECKING:
 
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
 TASK_KINDS: dict[type, int] = {
-    CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE, ForceTask: FORCE, TorqueTask: TORQUE
+    CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE,
+    ForceTask: FORCE, TorqueTask: TORQUE
 }  # fmt: skip
 POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
@@ -52,7 +55,8 @@ PolyhedronOptions: TypeAlias = tuple[
 class Dynamics:
     """Pinocchio's results for one robot.
 
-    views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by every `update`.
+    views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by
+        every `update`.
     tree, links: as in `kinematics.Bodies`.
     lock: held from `update` until the views have been read.
     """
@@ -63,10 +67,18 @@ class Dynamics:
         self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
-        poses = np.lib.stride_tricks.as_strided(data.oMi[0].rotation.T, (n, _POSE_SIZE), (8 * _POSE_SIZE, 8))
+        poses = np.lib.stride_tricks.as_strided(
+            data.oMi[0].rotation.T, (n, _POSE_SIZE), (8 * _POSE_SIZE, 8)
+        )
         self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
-        tree = [(model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i]) for i in range(n)]
-        self.tree, self.links = np.array(tree, np.int64), np.array([(link.mass, *link.lever) for link in model.inertias])
+        tree = [
+            (model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
+            for i in range(n)
+        ]
+        self.tree, self.links = (
+            np.array(tree, np.int64),
+            np.array([(link.mass, *link.lever) for link in model.inertias]),
+        )
 
     def update(self, q: Array, v: Array) -> None:
         """Fill the views for a configuration q (nq,) and a velocity v (nv,)."""
@@ -83,7 +95,9 @@ class Dynamics:
 
     @classmethod
     def unlock_all(cls) -> None:
-        """Give all of them new locks: in a forked process nobody is left to release one that another thread held."""
+        """Give all of them new locks: in a forked process nobody is left to release one that
+        another thread held.
+        """
         for dynamics in cls._all:
             dynamics.lock = Lock()
 
@@ -103,14 +117,20 @@ class TimeVaryingTask(NamedTuple):
 
 
 def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[TimeVaryingTask]]:
-    """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the moving ones.
+    """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the
+    moving ones.
 
-    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of the wrong shape.
+    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of
+    the wrong shape.
     """
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses, targets, time_varying = _pack_tasks(problem)
-    dynamics, limits, problem_contacts = dynamics_of(problem.robot), problem.limits, problem.contacts
+    dynamics, limits, problem_contacts = (
+        dynamics_of(problem.robot),
+        problem.limits,
+        problem.contacts,
+    )
     sizes = (
         len(dynamics.tree),
         len(contacts),
@@ -120,8 +140,13 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         len(tasks),
         problem.robot.d,
     )
-    user_contacts, points_only = contacts[contacts[:, 1] == USER_DEFINED], np.all(contacts[:, 1] == POINT)
-    n_user_contact_numbers = sum(m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:])
+    user_contacts, points_only = (
+        contacts[contacts[:, 1] == USER_DEFINED],
+        np.all(contacts[:, 1] == POINT),
+    )
+    n_user_contact_numbers = sum(
+        m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:]
+    )
     has_optional = bool(limits.inequalities) or np.any(limits.bounded_points(problem_contacts))
     counts = (
         problem_contacts.k,
@@ -145,18 +170,26 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
 
 
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
-    """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P (F + 1), 5)."""
+    """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P
+    (F + 1), 5).
+    """
     limits = problem.limits
-    found = [_pack_contact(problem.robot, contact, limits.polyhedron_options) for contact in problem.contacts]
+    found = [
+        _pack_contact(problem.robot, contact, limits.polyhedron_options)
+        for contact in problem.contacts
+    ]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
     tables = np.array(table, np.int64).reshape(-1, 6)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
-        np.concatenate([np.zeros((0, width)), *parts]) for width, parts in ((_POSE_SIZE + 4, frames), (3, points), (5, cones))
+        np.concatenate([np.zeros((0, width)), *parts])
+        for width, parts in ((_POSE_SIZE + 4, frames), (3, points), (5, cones))
     )
 
 
-def _pack_contact(robot: Robot, contact: Contact, options: PolyhedronOptions) -> tuple[tuple[int, ...], Array, Array, Array]:
+def _pack_contact(
+    robot: Robot, contact: Contact, options: PolyhedronOptions
+) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
@@ -170,10 +203,19 @@ def _pack_builtin_contact(
     robot: Robot, contact: PointContact | FlatFootContact, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     joint, pose = _frame_placement(robot, contact.frame)
-    radius, points = (contact.radius, contact.centre) if isinstance(contact, PointContact) else (0.0, contact.corners)
+    radius, points = (
+        (contact.radius, contact.centre)
+        if isinstance(contact, PointContact)
+        else (0.0, contact.corners)
+    )
     points = np.array(points).reshape(-1, 3)
     row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
-    return row, np.concatenate([pose, contact.normal, [radius]])[None], points, _cones(contact, options)
+    return (
+        row,
+        np.concatenate([pose, contact.normal, [radius]])[None],
+        points,
+        _cones(contact, options),
+    )
 
 
 def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
@@ -187,7 +229,8 @@ def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
 
 
 def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
-    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those that move.
+    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those
+    that move.
 
     Those of the package: where one of another kind stands among them does not matter.
     """
@@ -199,7 +242,9 @@ def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
     for i, index in enumerate(known):
         task = problem.tasks[index]
         joint, poses[i] = (
-            _frame_placement(robot, task.frame) if isinstance(task, OrientationTask | FrameTask) else (0, np.zeros(_POSE_SIZE))
+            _frame_placement(robot, task.frame)
+            if isinstance(task, OrientationTask | FrameTask)
+            else (0, np.zeros(_POSE_SIZE))
         )
         table[i] = TASK_KINDS[type(task)], joint, first
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)

@@ -3,13 +3,18 @@
 The same problem as `build_qp` makes, solved in another way that costs a fraction:
 
     kinematics    velocities and drifts of all joints; A, b, J of the contacts                (1)(4)(5)
-    elimination   q̈, λ and τ as functions of β: Gauss-Jordan on the equalities                 (13)(16)(17)
-    costs         the tasks as one quadratic cost in β                                         (18)(26)
-    inequalities  rows that β violates                                                         (27)(28)
-    dual_search   the optimum without inequalities, then one violated row after the other      App. C
+    elimination   q̈, λ and τ as functions of β: Gauss-Jordan on the equalities
+                  (13)(16)(17)
+    costs         the tasks as one quadratic cost in β
+                  (18)(26)
+    inequalities  rows that β violates
+                                                                                               (27)(28)
+    dual_search   the optimum without inequalities, then one violated row after the other      App.
+                  C
 
-A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an orientation is too far off),
-INACCURATE (its last digits are lost), INFEASIBLE. Then the reference backend decides.
+A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an
+orientation is too far off), INACCURATE (its last digits are lost), INFEASIBLE. Then the reference
+backend decides.
 """
 
 from __future__ import annotations
@@ -35,36 +40,69 @@ from floatbase.robots import UNIT_NORM_TOLERANCE
 
 INVALID, STOPPED = -1, -4
 N_STAGES = 4  # of a tick: contact rows, elimination, costs, optimum
-MAX_ENTRY = 1e8  # m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
+# m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
+MAX_ENTRY = 1e8
 
 
 @jit_inline
 def unpack(nv, sizes, int_tables, float_tables, inputs):
-    """Tree, links, contacts, tasks and limits as `problem_arrays.pack_problem` and `user_terms.UserTerms` laid them out.
+    """Tree, links, contacts, tasks and limits as `problem_arrays.pack_problem` and
+    `user_terms.UserTerms` laid them out.
 
-    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets, numbers of
-        user-defined contacts, user-defined tasks, groups of user-defined rows; 1 or 0: whether all contacts are points, and
-        `Inequalities.has_optional`.
-    int_tables, float_tables: whole and real numbers of all tables, one table after the other, as in a workspace.
+    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints,
+        entries of λ, targets, numbers of user-defined contacts, user-defined tasks, groups of
+        user-defined rows; 1 or 0: whether all contacts are points, and `Inequalities.has_optional`.
+    int_tables, float_tables: whole and real numbers of all tables, one table after the other, as in
+        a workspace.
     inputs: as for `tick`.
     """
-    n, n_contacts, n_points, n_rows, n_tasks, d, k = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5], sizes[6], sizes[7]
+    n, n_contacts, n_points, n_rows, n_tasks, d, k = (
+        sizes[0],
+        sizes[1],
+        sizes[2],
+        sizes[4],
+        sizes[5],
+        sizes[6],
+        sizes[7],
+    )
     int_tables[0], float_tables[0] = 1, 1
     tree, links, contact_table = (
         take_matrix(int_tables, n, 5),
         take_matrix(float_tables, n, 4),
         take_matrix(int_tables, n_contacts, 6),
     )
-    frames, points = take_matrix(float_tables, n_contacts, 16), take_matrix(float_tables, n_points, 3)
+    frames, points = (
+        take_matrix(float_tables, n_contacts, 16),
+        take_matrix(float_tables, n_points, 3),
+    )
     bounds, user_start = sizes[8], sizes[8] + 2 * n_points
     contacts = ContactTable(contact_table, frames, points, inputs, user_start, sizes[12] == 1)
     task_table, gains = take_matrix(int_tables, n_tasks, 3), take_matrix(float_tables, n_tasks, 3)
     user_tasks = user_start + sizes[9]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, sizes[10], nv, k, d)
-    tasks = TaskTable(task_table, gains, take_matrix(float_tables, n_tasks, 12), inputs, user_tasks, sizes[10], n_user_rows)
-    cones, torque_limits = take_matrix(float_tables, n_points * n_rows, 5), take_vector(float_tables, d)
+    tasks = TaskTable(
+        task_table,
+        gains,
+        take_matrix(float_tables, n_tasks, 12),
+        inputs,
+        user_tasks,
+        sizes[10],
+        n_user_rows,
+    )
+    cones, torque_limits = (
+        take_matrix(float_tables, n_points * n_rows, 5),
+        take_vector(float_tables, d),
+    )
     limits = Inequalities(
-        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11], sizes[13] == 1
+        cones,
+        n_rows - 1,
+        n_points,
+        torque_limits,
+        inputs,
+        bounds,
+        user_inequalities,
+        sizes[11],
+        sizes[13] == 1,
     )
     return tree, links, contacts, tasks, limits
 
@@ -88,7 +126,9 @@ def workspace_sizes(sizes, n_user_rows):
 
 @jit
 def inputs_valid(q, v, inputs, tree):
-    """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as in `Bodies`."""
+    """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as
+    in `Bodies`.
+    """
     if not (all_finite(q) and all_finite(v) and all_finite(inputs)):
         return False
     for i in range(1, tree.shape[0]):
@@ -103,7 +143,9 @@ def inputs_valid(q, v, inputs, tree):
 
 @jit
 def write_result(space: Parametrisation, beta, active, n_active, nv, result):
-    """Write (q̈, τ, λ) at β and the numbers of the active rows into `result`. Returns False where one has no digits."""
+    """Write (q̈, τ, λ) at β and the numbers of the active rows into `result`. Returns False where
+    one has no digits.
+    """
     n, d = space.V.shape[0], space.T.shape[0]
     affine_value(space.V, beta, 0, nv, result[:nv])
     affine_value(space.T, beta, 0, d, result[nv : nv + d])
@@ -119,16 +161,34 @@ def write_result(space: Parametrisation, beta, active, n_active, nv, result):
 def make_tick(digest):
     """The function `tick`, to be compiled; digest: of this folder."""
 
-    def tick(q, v, inputs, M, h, J, Ag, oMi, sizes, int_tables, float_tables, float_workspace, int_workspace, result, stages):
-        """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are active, or why there is no answer.
+    def tick(
+        q,
+        v,
+        inputs,
+        M,
+        h,
+        J,
+        Ag,
+        oMi,
+        sizes,
+        int_tables,
+        float_tables,
+        float_workspace,
+        int_workspace,
+        result,
+        stages,
+    ):
+        """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are
+        active, or why there is no answer.
 
         q, v: (nq,), (nv,), the state.
-        inputs: what changes from tick to tick, as `user_terms.UserTerms` packs it: targets, least and largest normal force of each point,
-            then contacts, tasks and user-defined rows.
+        inputs: what changes from tick to tick, as `user_terms.UserTerms` packs it: targets, least
+            and largest normal force of each point, then contacts, tasks and user-defined rows.
         sizes, int_tables, float_tables: as for `unpack`; few arrays, since each costs.
         M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
         float_workspace, int_workspace: workspaces of `workspace_sizes` numbers.
-        result: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each.
+        result: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv +
+            k,) each.
         stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
@@ -154,34 +214,53 @@ def make_tick(digest):
         if stages == 1:
             return STOPPED
         M_rows = M.T  # symmetric, and Pinocchio stores it by columns
-        B, pivots = take_matrix(float_workspace, m + base, n + 1), take_vector(int_workspace, m + base)
-        motion_pivot, smallest_pivot = eliminate(A, b, M_rows, h, J_points, base, float_workspace, B, pivots)
+        B, pivots = (
+            take_matrix(float_workspace, m + base, n + 1),
+            take_vector(int_workspace, m + base),
+        )
+        motion_pivot, smallest_pivot = eliminate(
+            A, b, M_rows, h, J_points, base, float_workspace, B, pivots
+        )
         if motion_pivot <= DEPENDENT_ROW:
             rows, right = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
             m = independent_rows(A, b, v, rows, right)
             if m < 0:
                 return INACCURATE
             B, pivots = B[: m + base], pivots[: m + base]
-            _, smallest_pivot = eliminate(rows[:m], right[:m], M_rows, h, J_points, base, float_workspace, B, pivots)
+            _, smallest_pivot = eliminate(
+                rows[:m], right[:m], M_rows, h, J_points, base, float_workspace, B, pivots
+            )
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE
         nb = n - m - base
         space = Parametrisation(
-            take_matrix(float_workspace, n, nb + 1), take_vector(int_workspace, n), take_matrix(float_workspace, d, nb + 1)
+            take_matrix(float_workspace, n, nb + 1),
+            take_vector(int_workspace, n),
+            take_matrix(float_workspace, d, nb + 1),
         )
         parametrise(B, pivots, m, take_vector(int_workspace, nb), space.V, space.beta_index)
         torques(space.V, space.beta_index, M_rows, h, J_points, base, space.T)
         if stages == 2:
             return STOPPED
-        R = take_matrix(float_workspace, 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3, nb + 1)
+        R = take_matrix(
+            float_workspace, 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3, nb + 1
+        )
         diagonal, linear = take_vector(float_workspace, nb), take_vector(float_workspace, nb)
-        used = task_costs(q, v, bodies, tasks, space, base, float_workspace, Cost(R, diagonal, linear))
+        used = task_costs(
+            q, v, bodies, tasks, space, base, float_workspace, Cost(R, diagonal, linear)
+        )
         if used < 0:
             return INVALID
         if stages == 3:
             return STOPPED
-        beta, active, mu = take_vector(float_workspace, nb), take_vector(int_workspace, nb), result[n + d : n + d + nb]
-        n_active = dual_search(Cost(R[:used], diagonal, linear), limits, space, nv, float_workspace, active, mu, beta)
+        beta, active, mu = (
+            take_vector(float_workspace, nb),
+            take_vector(int_workspace, nb),
+            result[n + d : n + d + nb],
+        )
+        n_active = dual_search(
+            Cost(R[:used], diagonal, linear), limits, space, nv, float_workspace, active, mu, beta
+        )
         if n_active < 0:
             return n_active
         return n_active if write_result(space, beta, active, n_active, nv, result) else INACCURATE

@@ -1,4 +1,6 @@
-"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and user-defined rows."""
+"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and
+user-defined rows.
+"""
 
 from __future__ import annotations
 
@@ -24,46 +26,73 @@ UNBOUNDED = 1e300  # N, for inf among numbers that must be finite
 class TickInputs(NamedTuple):
     """What one tick is given."""
 
-    packed: Array  # targets, least and largest normal force of each point, then own contacts, tasks and rows
+    # targets, least and largest normal force of each point, then own contacts, tasks and rows
+    packed: Array
     n_user_rows: int = 0  # of all user-defined tasks
     contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each own contact
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
         {}
     )  # weight and residual of user-defined tasks, by their number
-    normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))  # least and largest of each point, (P,)
+    normal_forces: tuple[Array, Array] = (
+        np.zeros(0),
+        np.zeros(0),
+    )  # least and largest of each point, (P,)
     inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of user-defined rows
 
 
 class UserTerms:
     """What a problem has of its owner's making: objects that the tables of the tick do not know.
 
-    any: whether there is something. varies: whether it, or a bound of a normal force, must be asked for at every tick.
+    any: whether there is something. varies: whether it, or a bound of a normal force, must be asked
+        for at every tick.
     """
 
     def __init__(self, problem: Problem, dynamics: Dynamics):
         self._problem, self._dynamics, self._limits = problem, dynamics, problem.limits
-        self._tasks = [(i, task, BLOCKS[task.block]) for i, task in enumerate(problem.tasks) if type(task) not in TASK_KINDS]
-        self._contacts = [contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS]
+        self._tasks = [
+            (i, task, BLOCKS[task.block])
+            for i, task in enumerate(problem.tasks)
+            if type(task) not in TASK_KINDS
+        ]
+        self._contacts = [
+            contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS
+        ]
         self.any = bool(self._tasks or self._contacts or self._limits.inequalities)
         self.varies = self.any or self._limits.time_varying
-        bounds = np.zeros((2, problem.contacts.n_points))  # of those that move: they are asked at a time
+        bounds = np.zeros(
+            (2, problem.contacts.n_points)
+        )  # of those that move: they are asked at a time
         self._constant_bounds = (
-            (bounds[0], bounds[1]) if self._limits.time_varying else self._limits.normal_forces(problem.contacts)
+            (bounds[0], bounds[1])
+            if self._limits.time_varying
+            else self._limits.normal_forces(problem.contacts)
         )
         self._finite_bounds = _finite(self._constant_bounds)
 
     def zero_inputs(self, targets: Array) -> TickInputs:
-        """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick without a state needs."""
+        """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick
+        without a state needs.
+        """
         nv = self._problem.robot.nv
-        contact_size = sum(len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts)
+        contact_size = sum(
+            len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts
+        )
         zeros = np.zeros(contact_size + 3 * len(self._tasks) + 2 * len(self._limits.inequalities))
-        return TickInputs(np.concatenate([targets, *self._finite_bounds, zeros]), normal_forces=self._constant_bounds)
+        return TickInputs(
+            np.concatenate([targets, *self._finite_bounds, zeros]),
+            normal_forces=self._constant_bounds,
+        )
 
     def inputs(self, targets: Array, q: Array, v: Array, t: float) -> TickInputs:
-        """What a tick is given at a state. Raises `InputError`, or what functions of the owner's raise."""
+        """What a tick is given at a state. Raises `InputError`, or what functions of the owner's
+        raise.
+        """
         problem, limits = self._problem, self._limits
         bounds = limits.normal_forces(problem.contacts, t)
-        packed: list[npt.ArrayLike] = [targets, *(_finite(bounds) if limits.time_varying else self._finite_bounds)]
+        packed: list[npt.ArrayLike] = [
+            targets,
+            *(_finite(bounds) if limits.time_varying else self._finite_bounds),
+        ]
         if not self.any:
             return TickInputs(np.concatenate(packed), normal_forces=bounds)
         eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
@@ -85,7 +114,9 @@ class UserTerms:
                 each.labels(len(h))  # raises where there is another number of them
             inequalities.append((G, h))
             packed += (BLOCKS[each.block], len(h)), G.ravel(), h
-        return TickInputs(np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities)
+        return TickInputs(
+            np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
+        )
 
     def equations(self, state: State, t: float, inputs: TickInputs) -> EquationsOfMotion:
         """(7) with what the own contacts said in a tick."""
@@ -94,7 +125,9 @@ class UserTerms:
             return equations_of_motion(state, contacts, t)
         user_contacts = iter(inputs.contacts)
         rows = [
-            constraint_and_jacobian(contact, state, t) if type(contact) in CONTACT_KINDS else next(user_contacts)
+            constraint_and_jacobian(contact, state, t)
+            if type(contact) in CONTACT_KINDS
+            else next(user_contacts)
             for contact in contacts
         ]
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))

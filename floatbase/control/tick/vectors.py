@@ -1,4 +1,6 @@
-"""Vectors in space as tuples of three numbers, which need no memory; a rotation is the tuple of its three columns."""
+"""Vectors in space as tuples of three numbers, which need no memory; a rotation is the tuple of its
+three columns.
+"""
 
 from __future__ import annotations
 
@@ -55,5 +57,7 @@ def rotate(R, a):
 
 @jit
 def rotation_in(poses, i):
-    """The rotation of pose i; poses: (n, 12 or more), the rotation column by column, then the position."""
+    """The rotation of pose i; poses: (n, 12 or more), the rotation column by column, then the
+    position.
+    """
     return row_part(poses, i, 0), row_part(poses, i, 3), row_part(poses, i, 6)

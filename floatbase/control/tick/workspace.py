@@ -12,7 +12,9 @@ from floatbase.control.tick.jit import jit, jit_inline
 
 @jit_inline
 def take_vector(workspace, n):
-    """The next n unused numbers of a workspace, not set to anything. Raises `MemoryError` where there are fewer."""
+    """The next n unused numbers of a workspace, not set to anything. Raises `MemoryError` where
+    there are fewer.
+    """
     first = int(workspace[0])
     last = first + n
     if last > workspace.size:

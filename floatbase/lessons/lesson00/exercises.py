@@ -20,7 +20,9 @@ def _go2() -> Robot:
 
 @cache
 def _sum_of_forces() -> float:
-    """The vertical force row of M q̈ + h when all of the robot accelerates upwards: neither by its mass nor by its weight."""
+    """The vertical force row of M q̈ + h when all of the robot accelerates upwards: neither by its
+    mass nor by its weight.
+    """
     state = _go2().standing()  # its base is level, so that the third row is vertical
     qdd = np.zeros(_go2().nv)
     qdd[2] = UP
@@ -34,7 +36,8 @@ def _weight() -> float:
 EXERCISES = (
     Exercise(
         name="00.1",
-        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum of the vertical forces that "
+        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum "
+        "of the vertical forces that "
         "the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
@@ -54,19 +57,26 @@ EXERCISES = (
                 "reaction": lambda: -_sum_of_forces(),
             },
             hints={
-                "weight_alone": "That is the weight alone: with it the robot stays where it is, or goes on as it goes.",
-                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's the only one?",
-                "downwards": "That would let it accelerate downwards: draw both forces, and which one is larger.",
+                "weight_alone": "That is the weight alone: with it the robot stays where it is, or "
+                "goes on as it goes.",
+                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's the "
+                "only one?",
+                "downwards": "That would let it accelerate downwards: draw both forces, and which "
+                "one is larger.",
                 "acceleration": "That is an acceleration, in m/s²; a force needs the mass.",
-                "mass_on_g_alone": "The weight is right; the 2 m/s² must be multiplied by the mass before they are added.",
+                "mass_on_g_alone": "The weight is right; the 2 m/s² must be multiplied by the mass "
+                "before they are added.",
                 "g_without_mass": "m a is right, but g without the mass is no force.",
                 "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
-                "one_foot": "That is the share of one foot, on average; the question is about all feet.",
-                "reaction": "That is what the robot does to the ground; the answer is what the ground does to the robot.",
+                "one_foot": "That is the share of one foot, on average; the question is about all "
+                "feet.",
+                "reaction": "That is what the robot does to the ground; the answer is what the "
+                "ground does to the robot.",
             },
         ),
         examples=lambda: [(_go2().mass * (9.8 + UP), "")],
-        explanation="Newton: the vertical forces of the ground minus the weight give mass times acceleration, so together they "
+        explanation="Newton: the vertical forces of the ground minus the weight give mass times "
+        "acceleration, so together they "
         "are m g + m a.",
     ),
 )

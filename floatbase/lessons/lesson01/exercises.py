@@ -10,7 +10,15 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import fixed_frame
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict, format_vector
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    array_or_verdict,
+    format_vector,
+)
 from floatbase.lessons.lesson01.pictures import PRESSING_POSTURE
 from floatbase.objectives import centroidal_momentum_rate
 from floatbase.robots import PLATE_SIZE, with_floating_base
@@ -24,7 +32,9 @@ def _pressing_arm() -> tuple[fb.State, Array, Array]:
 
 
 def _bolts_moment() -> Array:
-    """From the constraint forces of (7): what the welded base's wrench becomes with the wall, less what it is without."""
+    """From the constraint forces of (7): what the welded base's wrench becomes with the wall, less
+    what it is without.
+    """
     state, _, force = _pressing_arm()
     J = state.frame_jacobian("tool0")[:3]
     eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base_link")]))
@@ -51,16 +61,20 @@ def _actuation_of_solo8() -> Array:
 
 
 def _carried_by_friction() -> float:
-    """Largest horizontal force on a standing go2 that cones of 0.7 allow, from the cone's own number."""
+    """Largest horizontal force on a standing go2 that cones of 0.7 allow, from the cone's own
+    number.
+    """
     robot = fb.load("go2")
     contacts = fb.Contacts.points(robot, mu=0.7)
     return float(contacts.mus.max()) * sum(inertia.mass for inertia in robot.model.inertias) * 9.81
 
 
 def _held_width() -> float:
-    """Width, m, of the plate of the pressing arm whose rear edge is where the floor's force then acts.
+    """Width, m, of the plate of the pressing arm whose rear edge is where the floor's force then
+    acts.
 
-    By the centre of pressure: the base's rows say which force and moment the plate must give at the base for q̈ = 0.
+    By the centre of pressure: the base's rows say which force and moment the plate must give at the
+    base for q̈ = 0.
     """
     state = _on_the_plate()
     wrench = (state.h - state.frame_jacobian("tool0")[:3].T @ np.array([-120.0, 0.0, 0.0]))[:6]
@@ -73,15 +87,25 @@ def _on_the_plate() -> fb.State:
     return with_floating_base(fb.load("ur5", posture=PRESSING_POSTURE), plate=True).standing()
 
 
-def _by_levers(press: float = 120.0, *, weight: float | None = None, below: float = 0.0, ahead: float | None = None) -> float:
-    """The width, m, at which push and weight have the same moment about the rear edge; mistakes change one of them.
+def _by_levers(
+    press: float = 120.0,
+    *,
+    weight: float | None = None,
+    below: float = 0.0,
+    ahead: float | None = None,
+) -> float:
+    """The width, m, at which push and weight have the same moment about the rear edge; mistakes
+    change one of them.
 
     press, weight: N.
     below: what of the tool's height over the floor does not count, m.
     ahead: how far ahead of the middle the weight acts, m.
     """
     state = _on_the_plate()
-    height, weight = state.point("tool0")[2] - below, state.robot.weight if weight is None else weight
+    height, weight = (
+        state.point("tool0")[2] - below,
+        state.robot.weight if weight is None else weight,
+    )
     return float(2 * (press * height / weight - (state.com[0] if ahead is None else ahead)))
 
 
@@ -92,7 +116,9 @@ def _in_proportion() -> float:
 
 
 def _judge_thrust(answer: Any) -> Verdict:
-    """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the centre of mass."""
+    """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the
+    centre of mass.
+    """
     f = array_or_verdict(answer, (4, 3), (12,))
     if isinstance(f, Verdict):
         return f
@@ -100,17 +126,39 @@ def _judge_thrust(answer: Any) -> Verdict:
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     # by the momentum that (4) brings about, not by sums of forces and levers
-    rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0]
+    rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [
+        0.0,
+        0.0,
+        state.robot.weight,
+        0.0,
+        0.0,
+        0.0,
+    ]
     if abs(rate[2] + 200.0) < 0.2:
-        return Verdict(False, "The size is right, the sign is not: these thrusters push the robot down.", "sign")
+        return Verdict(
+            False,
+            "The size is right, the sign is not: these thrusters push the robot down.",
+            "sign",
+        )
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
-        return Verdict(False, f"The forces add up to {format_vector(rate[:3])} N; they should be (0, 0, 200) N.", "force")
+        return Verdict(
+            False,
+            f"The forces add up to {format_vector(rate[:3])} N; they should be (0, 0, 200) N.",
+            "force",
+        )
     if abs(rate[3:]).max() > 0.02:
         where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
         return Verdict(
-            False, f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of mass.", "moment"
+            False,
+            f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of "
+            f"mass.",
+            "moment",
         )
-    return Verdict(True, "Straight up without turning. Six conditions on twelve numbers: there are many other answers.")
+    return Verdict(
+        True,
+        "Straight up without turning. Six conditions on twelve numbers: there are many other "
+        "answers.",
+    )
 
 
 def _thrusts() -> list[Example]:
@@ -126,13 +174,15 @@ def _thrusts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="01.1",
-        statement="The moment, shape (3,), N·m, by which the bolts answer the wall. The wall pushes with f_r at `tool`, both "
+        statement="The moment, shape (3,), N·m, by which the bolts answer the wall. The wall "
+        "pushes with f_r at `tool`, both "
         "seen from the base. The weight, which the bolts carry anyway, does not count.",
         stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
         solution="bolts_moment = -np.cross(tool, f_r)",
         judge=NumericJudge(
             right=_bolts_moment,
-            praise="The bolts undo what the wall does: force and moment, each with the opposite sign.",
+            praise="The bolts undo what the wall does: force and moment, each with the opposite "
+            "sign.",
             mistakes={
                 "walls_moment": lambda: -_bolts_moment(),
                 "about_com": _about_the_centre_of_mass,
@@ -144,33 +194,54 @@ EXERCISES = (
                 "force_itself": lambda: _pressing_arm()[2],
             },
             hints={
-                "walls_moment": "This is the wall's own moment about the base. The bolts answer it: look at the sign, or at "
+                "walls_moment": "This is the wall's own moment about the base. The bolts answer "
+                "it: look at the sign, or at "
                 "the order of the "
                 "cross product.",
-                "about_com": "The moment is taken about the centre of mass; the bolts sit at the base.",
-                "weight_too": "This holds the weight's moment as well; the bolts should answer the wall alone.",
-                "zero": "Zero would mean that nobody answers the wall. Which lever, and which force?",
-                "height_alone": "This takes the height of the tool alone; it is also 11 cm to the side, and that is a lever "
+                "about_com": "The moment is taken about the centre of mass; the bolts sit at the "
+                "base.",
+                "weight_too": "This holds the weight's moment as well; the bolts should answer the "
+                "wall alone.",
+                "zero": "Zero would mean that nobody answers the wall. Which lever, and which "
+                "force?",
+                "height_alone": "This takes the height of the tool alone; it is also 11 cm to the "
+                "side, and that is a lever "
                 "too.",
-                "elementwise": "* multiplies number by number; a moment is the cross product of lever and force.",
-                "minus_force": "This is a force; a moment needs a lever: how far from the base does the force act?",
-                "force_itself": "This is f_r itself; a moment needs a lever, and the bolts answer the other way round.",
+                "elementwise": "* multiplies number by number; a moment is the cross product of "
+                "lever and force.",
+                "minus_force": "This is a force; a moment needs a lever: how far from the base "
+                "does the force act?",
+                "force_itself": "This is f_r itself; a moment needs a lever, and the bolts answer "
+                "the other way round.",
             },
         ),
         explanation="At rest the moments about the base add up to zero: tool × f_r + τ_b = 0.",
     ),
     Exercise(
         name="01.2",
-        statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of (3).",
+        statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of "
+        "(3).",
         stub="S_solo8 = np.eye(8)  # replace this: stack what is missing",
         solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])",
         judge=ShapeJudge(
             shapes={
-                (8, 8): "S maps 8 torques into all rows of the equations of motion. How many rows does a base add, and where?",
+                (
+                    8,
+                    8,
+                ): "S maps 8 torques into all rows of the equations of motion. How many rows does "
+                "a base add, and where?",
                 (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
-                (9, 8): "A base adds more than one row: three for its position, three for its orientation.",
+                (
+                    9,
+                    8,
+                ): "A base adds more than one row: three for its position, three for its "
+                "orientation.",
                 (18, 12): "That is the S of go2, with three joints in each leg; solo8 has two.",
-                (15, 8): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a rotation has three.",
+                (
+                    15,
+                    8,
+                ): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a "
+                "rotation has three.",
             },
             judge=NumericJudge(
                 right=_actuation_of_solo8,
@@ -181,24 +252,29 @@ EXERCISES = (
                     "sign": lambda: -_actuation_of_solo8(),
                 },
                 hints={
-                    "base_last": "The base comes first in q, as (2) has it; here its rows stand last.",
-                    "zeros": "Zeros everywhere: no motor drives anything. Where does each torque act?",
+                    "base_last": "The base comes first in q, as (2) has it; here its rows stand "
+                    "last.",
+                    "zeros": "Zeros everywhere: no motor drives anything. Where does each torque "
+                    "act?",
                     "sign": "Is there a torque that pushes a joint backwards? One sign too many.",
                 },
             ),
         ),
-        explanation="(2) puts the six numbers of the base before the joints, so (3) puts six zeros before the torques.",
+        explanation="(2) puts the six numbers of the base before the joints, so (3) puts six zeros "
+        "before the torques.",
     ),
     Exercise(
         name="01.3",
-        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough not to tip. What is the largest "
+        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough not "
+        "to tip. What is the largest "
         "horizontal force, in N, that the floor can answer while the robot stays at rest?",
         stub="most = 1000.0  # N: replace this number by an expression",
         solution="most = 0.7 * go2.mass * 9.81",
         judge=NumericJudge(
             right=_carried_by_friction,
             tolerance=2e-3,  # g may be 9.8
-            praise="The bolts' answer had no bound. This one is friction times weight, as long as no jump adds to it.",
+            praise="The bolts' answer had no bound. This one is friction times weight, as long as "
+            "no jump adds to it.",
             mistakes={
                 "g_is_10": lambda: 10 * _carried_by_friction() / 9.81,
                 "weight": lambda: _carried_by_friction() / 0.7,
@@ -216,36 +292,50 @@ EXERCISES = (
                 "four_weights": "All four feet together carry one weight, not four.",
                 "mass": "That is friction times mass, in kg; a force needs one more factor.",
                 "divided": "μ multiplies the normal force; it does not divide it.",
-                "pyramid": "That is what the controller's four-sided pyramid allows. The floor can do more: the round cone.",
-                "mu_twice": "Friction answers along the floor only as far as the normal force goes: multiply by μ, once.",
+                "pyramid": "That is what the controller's four-sided pyramid allows. The floor can "
+                "do more: the round cone.",
+                "mu_twice": "Friction answers along the floor only as far as the normal force "
+                "goes: multiply by μ, once.",
             },
         ),
         examples=lambda: [(0.7 * fb.load("go2").mass * 9.8, "")],
-        explanation="Each foot gives at most μ times its normal force, and the normal forces add up to the weight.",
+        explanation="Each foot gives at most μ times its normal force, and the normal forces add "
+        "up to the weight.",
     ),
     Exercise(
         name="01.4",
-        statement="A design: go2 floats in its standing posture with a thruster at every foot. Choose the forces, shape "
-        "(4, 3), N, world, in the order of `contacts.names`, so that they add up to 200 N straight up and turn nothing. "
+        statement="A design: go2 floats in its standing posture with a thruster at every foot. "
+        "Choose the forces, shape "
+        "(4, 3), N, world, in the order of `contacts.names`, so that they add up to 200 N straight "
+        "up and turn nothing. "
         "Row i of `levers` is x_i - x_c.",
-        stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first guess",
+        stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first "
+        "guess",
         solution="moments = [np.cross(np.eye(3), -lever).T for lever in levers]\n"
         "G = np.vstack([np.tile(np.eye(3), 4), np.hstack(moments)])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
-        judge=ShapeJudge(_judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}),
+        judge=ShapeJudge(
+            _judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}
+        ),
         examples=_thrusts,
-        explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; least squares gives the "
-        "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, (20) and (21).",
+        explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; "
+        "least squares gives the "
+        "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, "
+        "(20) and (21).",
     ),
     Exercise(
         name="01.5",
-        statement="The arm on its plate is to press with 120 N. How wide, in m, must the square plate be, at least? `at_rest` "
-        'has .com and .point("tool0"), `standing.weight` is the weight. The plate has no weight; all else stays as it was.',
+        statement="The arm on its plate is to press with 120 N. How wide, in m, must the square "
+        "plate be, at least? `at_rest` "
+        'has .com and .point("tool0"), `standing.weight` is the weight. The plate has no weight; '
+        "all else stays as it was.",
         stub="width = 0.4  # m: replace this number by an expression",
-        solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - at_rest.com[0])',
+        solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - '
+        "at_rest.com[0])",
         judge=NumericJudge(
             right=_held_width,
-            praise="A harder push needs a wider plate. A robot that walks has no wider plate; it puts a foot there in time.",
+            praise="A harder push needs a wider plate. A robot that walks has no wider plate; it "
+            "puts a foot there in time.",
             mistakes={
                 "half": lambda: _held_width() / 2,
                 "height_from_base": lambda: _by_levers(below=PLATE_SIZE[1]),
@@ -258,21 +348,28 @@ EXERCISES = (
                 "exchanged": lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0),
             },
             hints={
-                "half": "That is the distance from the middle to the rear edge. The plate goes as far to the front.",
-                "height_from_base": "The plate tips about an edge on the floor; the tool's height counts from there, not from "
+                "half": "That is the distance from the middle to the rear edge. The plate goes as "
+                "far to the front.",
+                "height_from_base": "The plate tips about an edge on the floor; the tool's height "
+                "counts from there, not from "
                 "the base.",
-                "com_in_middle": "Where does the weight act? The centre of mass is not above the middle of the plate.",
-                "com_sign": "The centre of mass is ahead of the middle, and the plate tips about its rear edge: is that good "
+                "com_in_middle": "Where does the weight act? The centre of mass is not above the "
+                "middle of the plate.",
+                "com_sign": "The centre of mass is ahead of the middle, and the plate tips about "
+                "its rear edge: is that good "
                 "or bad?",
                 "plate_as_is": "That is the plate as it is, and with 120 N it tips.",
-                "in_proportion": "What a plate holds does not grow in proportion to its width: part of the lever is there "
+                "in_proportion": "What a plate holds does not grow in proportion to its width: "
+                "part of the lever is there "
                 "without a plate.",
                 "half_press": "That holds 60 N. The arm is to press with 120 N.",
                 "mass": "That takes the mass for the weight: a force needs one more factor.",
-                "exchanged": "Height and distance from the edge are exchanged: which lever belongs to the push, which to the "
+                "exchanged": "Height and distance from the edge are exchanged: which lever belongs "
+                "to the push, which to the "
                 "weight?",
             },
         ),
-        explanation="About the rear edge: 120 N × height = weight × (half the width + how far the centre of mass is ahead).",
+        explanation="About the rear edge: 120 N × height = weight × (half the width + how far the "
+        "centre of mass is ahead).",
     ),
 )

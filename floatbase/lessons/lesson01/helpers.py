@@ -1,4 +1,6 @@
-"""Lesson 01: the smallest robot; the arm without bolts: paths of its joints, no gravity, how far its base turned."""
+"""Lesson 01: the smallest robot; the arm without bolts: paths of its joints, no gravity, how far
+its base turned.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ LIFT_URDF = """
 
 
 def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
-    """A path t -> joint offsets, (6,) rad, for `joint_servo`: one joint of six turns by `angle`, rad, in `duration`, s.
+    """A path t -> joint offsets, (6,) rad, for `joint_servo`: one joint of six turns by `angle`,
+    rad, in `duration`, s.
 
     It starts and ends at rest.
     """
@@ -35,9 +38,11 @@ def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], A
 
 
 def joint_circle(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
-    """A path t -> joint offsets, (6,) rad, for `joint_servo`: two joints of six go once around a circle, back to 0.
+    """A path t -> joint offsets, (6,) rad, for `joint_servo`: two joints of six go once around a
+    circle, back to 0.
 
-    first, second: numbers of the joints, from 0. size: radius, rad. duration: s. It starts and ends at rest.
+    first, second: numbers of the joints, from 0. size: radius, rad. duration: s. It starts and ends
+        at rest.
     """
 
     def path(t: float) -> Array:
@@ -61,6 +66,8 @@ def weightless_simulation(robot: Robot) -> fb.Simulation:
 
 
 def base_rotation(record: Rollout) -> Array:
-    """How the base turned from the first row of a record to the last: axis times angle, shape (3,), degrees, world."""
+    """How the base turned from the first row of a record to the last: axis times angle, shape (3,),
+    degrees, world.
+    """
     first, last = (record.state(i).frame_pose("base_link").rotation for i in (0, -1))
     return read_only(np.degrees(pin.log3(last @ first.T)))

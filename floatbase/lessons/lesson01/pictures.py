@@ -1,4 +1,6 @@
-"""Lesson 01, What is a floating base: an arm with its bolts cut, and the pictures of Figure 1 as experiments."""
+"""Lesson 01, What is a floating base: an arm with its bolts cut, and the pictures of Figure 1 as
+experiments.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,14 @@ from floatbase.viewer import Item, Picture, View, Viewer, markers, prefixed, sha
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene.colours import MEASURED
 
-PRESSING_POSTURE = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
+PRESSING_POSTURE = (
+    0.0,
+    -1.7,
+    1.2,
+    0.5,
+    np.pi / 2,
+    0.0,
+)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
 PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 
 
@@ -41,7 +50,8 @@ def show_arm(view: Viewer, state: fb.State) -> Viewer:
 
 
 def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """Figure 1, left: a slider for how hard the arm presses; the wall answers with f_r, the bolts with a force and τ_b.
+    """Figure 1, left: a slider for how hard the arm presses; the wall answers with f_r, the bolts
+    with a force and τ_b.
 
     state: the bolted arm at rest, its tool at the wall.
     """
@@ -67,11 +77,16 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06)
         view.show(state, com=False, extra=extra)
-        tau, limits = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force), state.robot.torque_limits
+        tau, limits = (
+            abs(state.h - state.frame_jacobian("tool0")[:3].T @ force),
+            state.robot.torque_limits,
+        )
         busiest = int(np.argmax(tau / limits))
         return (
-            f"wall on tool <b>{rounded(-press, 'N', 3)}</b>, bolts on base <b>{rounded(press, 'N', 3)}</b> and "
-            f"<b>{np.linalg.norm(moment):.0f} N·m</b>; busiest motor: {state.robot.joint_names[busiest]}, "
+            f"wall on tool <b>{rounded(-press, 'N', 3)}</b>, bolts on base "
+            f"<b>{rounded(press, 'N', 3)}</b> and "
+            f"<b>{np.linalg.norm(moment):.0f} N·m</b>; busiest motor: "
+            f"{state.robot.joint_names[busiest]}, "
             f"{tau[busiest]:.0f} of {limits[busiest]:.0f} N·m"
         )
 
@@ -79,7 +94,9 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
 
 def play_pressing(view: Viewer, record: Rollout) -> Viewer:
-    """The arm on its plate in front of the wall, as the record has it, with the wall's force on the tool."""
+    """The arm on its plate in front of the wall, as the record has it, with the wall's force on the
+    tool.
+    """
     scene = _wall(record.state(0).point("tool0"))
     view.add_legend_entry("f", MEASURED, "force of the wall")
 
@@ -93,11 +110,15 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
                 drawn["label/wall"] = shapes.label(tool + vector + [0.0, 0.0, 0.07], "f{r}", 0.06)
         return drawn
 
-    return _play_record(view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5)
+    return _play_record(
+        view, record, picture, View(100.0, 14.0, 1.0, around=((-0.12, 0.0, 0.35), 0.7)), speed=0.5
+    )
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:
-    """The arm without bolts, gravity and ground, with axes on its base; a veil stays where it was first."""
+    """The arm without bolts, gravity and ground, with axes on its base; a veil stays where it was
+    first.
+    """
 
     def picture(state: fb.State, i: int) -> Picture:
         return _without_ground(_draw_arm(view, state, first=record.state(0)))
@@ -107,7 +128,9 @@ def play_floating(view: Viewer, record: Rollout) -> Viewer:
 
 
 def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """go2 in the air: a slider swings its legs. The base, with its axes, stays, and the centre of mass does not (note 3)."""
+    """go2 in the air: a slider swings its legs. The base, with its axes, stays, and the centre of
+    mass does not (note 3).
+    """
     first = state.robot.nv - state.robot.d
     swing = np.zeros(state.robot.nv)
     swing[[first + i for i, name in enumerate(state.robot.joint_names) if "thigh" in name]] = -1.0
@@ -117,7 +140,10 @@ def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
     def draw(swing_forwards: float) -> str:
         now = state.replace(q=state.integrate(swing_forwards * swing))
         view.draw(_without_ground(view.painter.picture(now, extra=axes)))
-        return f"x<sub>c</sub> seen from the base: {format_vector(1e3 * (pose.rotation.T @ (now.com - pose.translation)))} mm"
+        return (
+            f"x<sub>c</sub> seen from the base: "
+            f"{format_vector(1e3 * (pose.rotation.T @ (now.com - pose.translation)))} mm"
+        )
 
     panel = slider_panel(view, draw, swing_forwards=(-1.0, 0.0, 1.0, "rad"))
     view.camera(View(78.0, 8.0, 1.0, around=((0.0, 0.0, 0.24), 0.36)))
@@ -125,7 +151,9 @@ def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
 
 def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """Figure 1, right: sliders for how the body should accelerate; the feet answer with f_i, which add up to f_c and τ_c."""
+    """Figure 1, right: sliders for how the body should accelerate; the feet answer with f_i, which
+    add up to f_c and τ_c.
+    """
 
     def draw(forwards: float, up: float, turn: float) -> str:
         tasks: list[Task] = [
@@ -139,7 +167,8 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
         view.show(state, contacts, planned=f, wrench=np.concatenate([f.sum(axis=0), moment]))
         newton = state.robot.mass * (state.com_jacobian @ command.qdd - [0, 0, -9.81])
         return (
-            f"f<sub>c</sub> = {format_vector(f.sum(axis=0))} N, m (ẍ<sub>c</sub> - g) = {format_vector(newton)} N, "
+            f"f<sub>c</sub> = {format_vector(f.sum(axis=0))} N, m (ẍ<sub>c</sub> - g) = "
+            f"{format_vector(newton)} N, "
             f"τ<sub>c</sub> = {format_vector(moment)} N·m"
         )
 
@@ -150,8 +179,10 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
 
 
 def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """go2 in space with a thruster at every foot, (4): sliders for the vertical thrust of each left and each right foot and
-    for a horizontal one, forwards at the left feet and backwards at the right ones."""
+    """go2 in space with a thruster at every foot, (4): sliders for the vertical thrust of each left
+    and each right foot and for a horizontal one, forwards at the left feet and backwards at the
+    right ones.
+    """
     eom = fb.equations_of_motion(state, contacts)
     left = np.array([name[1] == "L" for name in contacts.names])
     gravity, feet = np.array([0.0, 0.0, 9.81]), contacts.positions(state)
@@ -161,16 +192,25 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         f[:, 2] = np.where(left, left_feet, right_feet)
         f[:, 0] = np.where(left, twist, -twist)
         qdd = eom.acceleration(np.zeros(eom.d), f)
-        rate = centroidal_momentum_rate(state, qdd) + np.concatenate([state.robot.mass * gravity, np.zeros(3)])
+        rate = centroidal_momentum_rate(state, qdd) + np.concatenate(
+            [state.robot.mass * gravity, np.zeros(3)]
+        )
         picture = view.painter.picture(state, wrench=rate)
         drawn = _without_ground(picture)
         for name, foot, force in zip(contacts.names, feet, f, strict=True):
             if force.any():
                 vector = view.scale * force
-                start = foot - vector if force[2] > 0 else foot  # below the foot either way, where no leg hides it
-                drawn[f"thrust/{name}"] = shapes.arrow(start, vector, MEASURED, 2 * view.painter.size)
+                start = (
+                    foot - vector if force[2] > 0 else foot
+                )  # below the foot either way, where no leg hides it
+                drawn[f"thrust/{name}"] = shapes.arrow(
+                    start, vector, MEASURED, 2 * view.painter.size
+                )
         view.draw(drawn)
-        return f"f<sub>c</sub> = {format_vector(rate[:3])} N, τ<sub>c</sub> = {format_vector(rate[3:])} N·m"
+        return (
+            f"f<sub>c</sub> = {format_vector(rate[:3])} N, τ<sub>c</sub> = "
+            f"{format_vector(rate[3:])} N·m"
+        )
 
     view.add_legend_entry("thrust", MEASURED, "force of a thruster")
     each = (-40.0, 30.0, 40.0, "N")
@@ -181,13 +221,19 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
 
 def _without_ground(picture: Picture) -> Picture:
     """A picture without its ground, and without the shadow of the centre of mass on it."""
-    return {path: item for path, item in picture.items() if not path.startswith(("ground", "com/line", "com/projection"))}
+    return {
+        path: item
+        for path, item in picture.items()
+        if not path.startswith(("ground", "com/line", "com/projection"))
+    }
 
 
 def _wall(tool: Array) -> Picture:
     """The wall that the tool touches, 0.6 m wide and 0.9 m high. tool: shape (3,), m, world."""
     normal = np.array([-1.0, 0.0, 0.0])
-    return prefixed("wall", {"/slab": props.wall([tool[0] + 0.003, tool[1], 0.45], normal, 0.6, 0.9)})
+    return prefixed(
+        "wall", {"/slab": props.wall([tool[0] + 0.003, tool[1], 0.45], normal, 0.6, 0.9)}
+    )
 
 
 def _plate(state: fb.State) -> Item:
@@ -200,14 +246,24 @@ def _plate(state: fb.State) -> Item:
 
 
 def _draw_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
-    """The arm. first: a state to show as a veil; then axes on the base and the centre of mass are drawn too."""
+    """The arm. first: a state to show as a veil; then axes on the base and the centre of mass are
+    drawn too.
+    """
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
     if first is not None:
-        drawn |= prefixed("axes", markers.frame_axes(state.frame_pose("base_link").homogeneous, 0.25))
+        drawn |= prefixed(
+            "axes", markers.frame_axes(state.frame_pose("base_link").homogeneous, 0.25)
+        )
     return drawn
 
 
-def _play_record(view: Viewer, record: Rollout, picture: Callable[[fb.State, int], Picture], look: View, speed: float = 1.0) -> Viewer:
+def _play_record(
+    view: Viewer,
+    record: Rollout,
+    picture: Callable[[fb.State, int], Picture],
+    look: View,
+    speed: float = 1.0,
+) -> Viewer:
     """Play a record as pictures, 30 a second. picture: (state, row of the record) -> `Picture`."""
     rows = recording.sampled_rows(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]

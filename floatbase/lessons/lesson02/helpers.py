@@ -16,12 +16,21 @@ from floatbase.lessons.controllers import ConstantTorques
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
-MotionSolver = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]  # (eom, τ, b) -> (q̈, λ), by (7)
+MotionSolver = Callable[
+    [EquationsOfMotion, Array, Array], tuple[Array, Array]
+]  # (eom, τ, b) -> (q̈, λ), by (7)
 DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
 
 
-def run_constant_torques(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike, motion: MotionSolver, duration: float = 0.2) -> Rollout:
-    """MuJoCo under constant torques; `planned` holds the λ of (7) at every millisecond, `measured` the engine's.
+def run_constant_torques(
+    robot: Robot,
+    contacts: fb.Contacts,
+    tau: npt.ArrayLike,
+    motion: MotionSolver,
+    duration: float = 0.2,
+) -> Rollout:
+    """MuJoCo under constant torques; `planned` holds the λ of (7) at every millisecond, `measured`
+    the engine's.
 
     contacts: the stance of (7).
     tau: shape (d,), N·m.
@@ -34,17 +43,23 @@ def run_constant_torques(robot: Robot, contacts: fb.Contacts, tau: npt.ArrayLike
         eom = fb.equations_of_motion(fb.State(robot, q, v), contacts)
         return motion(eom, torques, eom.b)[1]
 
-    return fb.rollout(fb.Simulation(robot), ConstantTorques(torques, contacts, by_equation), duration)
+    return fb.rollout(
+        fb.Simulation(robot), ConstantTorques(torques, contacts, by_equation), duration
+    )
 
 
 def foot_displacement(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
-    """Distance of the worst foot from its first position, m, for each state; shape (number of states,)."""
+    """Distance of the worst foot from its first position, m, for each state; shape (number of
+    states,).
+    """
     places = np.array([contacts.positions(state) for state in states])
     return np.asarray(np.linalg.norm(places - places[0], axis=2).max(axis=1))
 
 
 def tool_displacement(record: Rollout) -> Array:
-    """Distance of the arm's tool from its first position, mm, for every row of a record; shape (rows,)."""
+    """Distance of the arm's tool from its first position, mm, for every row of a record; shape
+    (rows,).
+    """
     places = np.array([record.state(i).point("tool0") for i in range(len(record))])
     return 1e3 * np.asarray(np.linalg.norm(places - places[0], axis=1))
 
@@ -78,8 +93,11 @@ def disc_state(
     return fb.State(robot, q, np.concatenate([R.T @ velocity, R.T @ omega]))
 
 
-def parking_states(robot: Robot, distance: float = 0.5, angle: float = 0.7, steps: int = 20) -> list[fb.State]:
-    """The disc parks: it rolls ahead, turns, rolls back, turns back, 1 s each; a list of states with their velocities.
+def parking_states(
+    robot: Robot, distance: float = 0.5, angle: float = 0.7, steps: int = 20
+) -> list[fb.State]:
+    """The disc parks: it rolls ahead, turns, rolls back, turns back, 1 s each; a list of states
+    with their velocities.
 
     distance: how far it rolls, m. angle: how far it turns, rad. steps: states a second.
     """

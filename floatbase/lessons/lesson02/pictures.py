@@ -1,4 +1,6 @@
-"""Lesson 02, Equations of motion and contact: pictures of (4), of contacts with and without b, of a wheel that parks."""
+"""Lesson 02, Equations of motion and contact: pictures of (4), of contacts with and without b, of a
+wheel that parks.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +29,19 @@ MOMENT_SCALE = 0.01  # m drawn for a newton metre
 
 
 def draw_equation(eom: EquationsOfMotion) -> Figure:
-    """(4) drawn to scale for four point feet: which entries of M, h, S and Jᵀ are not zero, the base's rows above the line."""
+    """(4) drawn to scale for four point feet: which entries of M, h, S and Jᵀ are not zero, the
+    base's rows above the line.
+    """
     feet = [str(name).split("_")[0] for name in eom.contacts.names]
-    in_threes = 3.0 * np.arange(len(feet)) + 1.0  # the middle of each leg's joints, and of each foot's force
-    parts = [("M q̈", eom.M, 6.0), ("+ h", eom.h[:, None], None), ("= S τ", eom.S, 0.0), ("+ Jᵀ λ", eom.J.T, 0.0)]
+    in_threes = (
+        3.0 * np.arange(len(feet)) + 1.0
+    )  # the middle of each leg's joints, and of each foot's force
+    parts = [
+        ("M q̈", eom.M, 6.0),
+        ("+ h", eom.h[:, None], None),
+        ("= S τ", eom.S, 0.0),
+        ("+ Jᵀ λ", eom.J.T, 0.0),
+    ]
     widths = [max(part.shape[1], 1.6) for _, part, _ in parts]
     figure, axes = plt.subplots(1, 4, figsize=(9.5, 3.7), width_ratios=widths, layout="constrained")
     for axis, (name, part, first) in zip(axes, parts, strict=True):
@@ -47,9 +58,11 @@ def draw_equation(eom: EquationsOfMotion) -> Figure:
 
 
 def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str) -> SliderPanel:
-    """Sliders for a force at one foot: the picture shows the force and moment on the base that Jᵀ makes of it.
+    """Sliders for a force at one foot: the picture shows the force and moment on the base that Jᵀ
+    makes of it.
 
-    The note has all of Jᵀ λ: the base's rows and the torques of the leg. foot: its name in `contacts`.
+    The note has all of Jᵀ λ: the base's rows and the torques of the leg. foot: its name in
+    `contacts`.
     """
     J = fb.equations_of_motion(state, contacts).J[contacts.force_slice(foot)]
     base = state.frame_pose("base")
@@ -64,18 +77,27 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         forces[where] = force
         size, scale = view.painter.size, view.scale
         drawn = markers.wrench(base.translation, scale * f, MOMENT_SCALE * moment, size)
-        extra = {f"base{path}": item for path, item in drawn.items()} if np.linalg.norm(force) > 1e-6 else {}
+        extra = (
+            {f"base{path}": item for path, item in drawn.items()}
+            if np.linalg.norm(force) > 1e-6
+            else {}
+        )
         if extra:
-            above = base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]  # and above the trunk
+            above = (
+                base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]
+            )  # and above the trunk
             extra["label/base"] = shapes.label(above, "on the base", 0.028)
             ahead = state.point(foot) + [0.14, 0.0, -0.06]  # neither leg nor arrow comes here
             extra["label/foot"] = shapes.label(ahead, "on the foot", 0.028)
-        picture = view.painter.picture(state, contacts, planned=forces, com=False, cones=False, extra=extra)
+        picture = view.painter.picture(
+            state, contacts, planned=forces, com=False, cones=False, extra=extra
+        )
         view.draw({path.replace("planned/", "force/"): item for path, item in picture.items()})
         torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
         rest = np.delete(generalised[6:], leg)
         return (
-            f"base rows: force {format_vector(generalised[:3])} N, moment {format_vector(generalised[3:6], 1)} N·m; "
+            f"base rows: force {format_vector(generalised[:3])} N, moment "
+            f"{format_vector(generalised[3:6], 1)} N·m; "
             f"joints of this leg {torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
@@ -87,14 +109,23 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
 
 
 def plot_vertical_forces(record: Rollout, title: str) -> Axes:
-    """Vertical forces at a front and at a rear foot, by (7) and by the engine; left and right are alike."""
+    """Vertical forces at a front and at a rear foot, by (7) and by the engine; left and right are
+    alike.
+    """
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     names = list(record.contacts.names)
     for foot, where in (("FL_foot", "front"), ("RL_foot", "rear")):
         row = 3 * names.index(foot) + 2
-        (by_equation,) = axis.plot(record.time, record.planned[:, row], color=hex_code(PLANNED), linewidth=4, alpha=0.7)
+        (by_equation,) = axis.plot(
+            record.time, record.planned[:, row], color=hex_code(PLANNED), linewidth=4, alpha=0.7
+        )
         (by_engine,) = axis.plot(record.time, record.measured[:, row], color=hex_code(MEASURED))
-        axis.annotate(f"each {where} foot", (record.time[90], record.measured[90, row]), (0, 8), textcoords="offset points")
+        axis.annotate(
+            f"each {where} foot",
+            (record.time[90], record.measured[90, row]),
+            (0, 8),
+            textcoords="offset points",
+        )
     axis.set(xlabel="time [s]", ylabel="vertical force [N]", title=title)
     axis.grid(alpha=0.25)
     axis.legend([by_equation, by_engine], ["(7)", "MuJoCo"], fontsize="small")
@@ -102,7 +133,9 @@ def plot_vertical_forces(record: Rollout, title: str) -> Axes:
 
 
 def plot_foot_displacement(curves: dict[str, Array], duration: float) -> Axes:
-    """Curves of how far feet stray, name -> distances in mm over `duration` s, on a logarithmic scale."""
+    """Curves of how far feet stray, name -> distances in mm over `duration` s, on a logarithmic
+    scale.
+    """
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         time = np.linspace(0.0, duration, len(curve))
@@ -114,7 +147,8 @@ def plot_foot_displacement(curves: dict[str, Array], duration: float) -> Axes:
 
 
 def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> Viewer:
-    """The arm without b, and as a veil the arm with b. A pin stands where the tool was, a thick line leads from there to it.
+    """The arm without b, and as a veil the arm with b. A pin stands where the tool was, a thick
+    line leads from there to it.
 
     forgotten, kept: records without and with b, equally long.
     """
@@ -138,16 +172,24 @@ def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> V
 
 
 def play_collapse_comparison(
-    view: Viewer, without_b: Sequence[fb.State], with_b: Sequence[fb.State], contacts: fb.Contacts, duration: float
+    view: Viewer,
+    without_b: Sequence[fb.State],
+    with_b: Sequence[fb.State],
+    contacts: fb.Contacts,
+    duration: float,
 ) -> Viewer:
-    """The robot without b, and as a veil the robot with b; marks where the feet belong, lines to where they are.
+    """The robot without b, and as a veil the robot with b; marks where the feet belong, lines to
+    where they are.
 
     without_b, with_b: states without and with b, equally many.
     contacts: the pinned feet.
     duration: from the first state to the last, s.
     """
     places = contacts.positions(without_b[0])
-    home = {f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03) for i, p in enumerate(places)}
+    home = {
+        f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03)
+        for i, p in enumerate(places)
+    }
 
     def picture(ours: fb.State, theirs: fb.State) -> Picture:
         drawn = view.painter.picture(ours, com=False, ghost=theirs) | home
@@ -157,21 +199,29 @@ def play_collapse_comparison(
             if length > 2e-3:  # beside the foot, where it is seen
                 start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
                 drawn[f"way/{i}"] = shapes.rod(
-                    start, geometry.rotation_with_z_axis(offset / length), length, 0.006, view.painter.text_colour
+                    start,
+                    geometry.rotation_with_z_axis(offset / length),
+                    length,
+                    0.006,
+                    view.painter.text_colour,
                 )
         return drawn
 
     rows = np.linspace(0, len(with_b) - 1, 30).astype(int)
-    view.add_legend_entry("way", view.painter.text_colour, "from where a foot belongs to where it is")
+    view.add_legend_entry(
+        "way", view.painter.text_colour, "from where a foot belongs to where it is"
+    )
     pictures = [picture(without_b[i], with_b[i]) for i in rows]
     view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
 
 
 def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
-    """Sliders for how far the disc rolls and turns as it parks, and for the time at which it is shown.
+    """Sliders for how far the disc rolls and turns as it parks, and for the time at which it is
+    shown.
 
-    The picture has the disc at that time, its way on the ground, and marks where it starts and ends.
+    The picture has the disc at that time, its way on the ground, and marks where it starts and
+    ends.
     """
 
     def draw(distance: float, angle: float, time: float) -> str:
@@ -181,30 +231,51 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         for i, (a, b) in enumerate(pairwise(corners)):
             length = float(np.linalg.norm(b - a))
             if length > 1e-6:
-                rod = shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, 0.006, view.painter.text_colour)
+                rod = shapes.rod(
+                    a,
+                    geometry.rotation_with_z_axis((b - a) / length),
+                    length,
+                    0.006,
+                    view.painter.text_colour,
+                )
                 picture[f"way/{i}"] = rod
-        picture["wheel/now"] = _disc_picture(states[min(round(time * 20), len(states) - 1)], distance, time)
+        picture["wheel/now"] = _disc_picture(
+            states[min(round(time * 20), len(states) - 1)], distance, time
+        )
         ends = {"start": corners[0], "end": corners[-1]}
         if np.linalg.norm(corners[-1] - corners[0]) < 0.1:
             ends = {"start and end": corners[0]}
         for name, at in ends.items():
-            picture[f"mark/{name}"] = shapes.contact_patch(at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035)
+            picture[f"mark/{name}"] = shapes.contact_patch(
+                at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035
+            )
             picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(rolling_wheel().slip(state)).max()) for state in states)
         return (
-            f"in the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as before; "
+            f"in the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as "
+            f"before; "
             f"largest slip on the way {abs(slip):.3f} m/s"
         )
 
-    panel = slider_panel(view, draw, distance=(0.0, 0.5, 1.0, "m"), angle=(-1.5, -0.7, 1.5, "rad"), time=(0.0, 1.5, 4.0, "s"))
+    panel = slider_panel(
+        view,
+        draw,
+        distance=(0.0, 0.5, 1.0, "m"),
+        angle=(-1.5, -0.7, 1.5, "rad"),
+        time=(0.0, 1.5, 4.0, "s"),
+    )
     view.camera(View(-115.0, 32.0, 1.0, around=((0.4, -0.1, 0.1), 0.85)))
     return panel
 
 
 def _disc_picture(state: fb.State, distance: float, time: float) -> shapes.Item:
-    """The disc at a time, s, of parking with rolls of `distance` m, with spokes that show how far it has rolled."""
+    """The disc at a time, s, of parking with rolls of `distance` m, with spokes that show how far
+    it has rolled.
+    """
     legs = np.clip(time - np.arange(4), 0.0, 1.0)
     rolled = distance / DISC_RADIUS * (legs[0] - legs[2])
-    return props.wheel(state.q[:3], state.frame_pose("disc").rotation[:, 1], DISC_RADIUS, rolled, width=0.05)
+    return props.wheel(
+        state.q[:3], state.frame_pose("disc").rotation[:, 1], DISC_RADIUS, rolled, width=0.05
+    )

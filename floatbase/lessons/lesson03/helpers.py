@@ -1,4 +1,6 @@
-"""Lesson 03, The space of possible motions: points and directions in β, and the states that the lesson looks at."""
+"""Lesson 03, The space of possible motions: points and directions in β, and the states that the
+lesson looks at.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ def standing_go2_eom() -> EquationsOfMotion:
 
 @cache
 def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
-    """(7) of go2 tilted and moving, and forces, shape (12,), N, world: 10 N push the feet FL and RR apart along their line."""
+    """(7) of go2 tilted and moving, and forces, shape (12,), N, world: 10 N push the feet FL and RR
+    apart along their line.
+    """
     robot = fb.load("go2")
     eom = fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7))
     feet = eom.contacts.positions(eom.state)
@@ -33,26 +37,35 @@ def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
 
 @cache
 def rising_solo8_eom() -> EquationsOfMotion:
-    """(7) of solo8 in its standing posture, moving forwards, upwards and nodding on four feet that stay: b is not zero.
+    """(7) of solo8 in its standing posture, moving forwards, upwards and nodding on four feet that
+    stay: b is not zero.
 
-    J has rank 10 of 12 there. All feet move in planes along the body, so b asks for nothing in the lost directions.
+    J has rank 10 of 12 there. All feet move in planes along the body, so b asks for nothing in the
+    lost directions.
     """
     robot = fb.load("solo8")
     contacts = fb.Contacts.points(robot)
     base = np.array([0.2, 0.0, 0.3, 0.0, 0.5, 0.0])  # m/s, rad/s
     J = contacts.jacobian(robot.standing())
     joints = -np.linalg.lstsq(J[:, 6:], J[:, :6] @ base, rcond=RANK_TOLERANCE)[0]
-    return fb.equations_of_motion(robot.standing().replace(v=np.concatenate([base, joints])), contacts)
+    return fb.equations_of_motion(
+        robot.standing().replace(v=np.concatenate([base, joints])), contacts
+    )
 
 
 def standing_space(robot: Robot, *frames: str) -> FeasibleSpace:
-    """The space of motions (13) of a robot in its standing state on the feet of these frames; on all feet without `frames`."""
+    """The space of motions (13) of a robot in its standing state on the feet of these frames; on
+    all feet without `frames`.
+    """
     contacts = fb.Contacts.points(robot, mu=0.7)
-    return fb.feasible_space(fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts))
+    return fb.feasible_space(
+        fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts)
+    )
 
 
 def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
-    """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the forces as little as possible.
+    """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the
+    forces as little as possible.
 
     base: shape (6,), m/s² and rad/s², base frame.
     """
@@ -71,7 +84,9 @@ def standing_still_beta(space: FeasibleSpace) -> Array:
 
 
 def upright_solo12(robot: Robot, bend: float) -> fb.State:
-    """solo12 at rest on the ground, every foot below its hip, every knee bent by `bend` rad; 0 is a straight leg."""
+    """solo12 at rest on the ground, every foot below its hip, every knee bent by `bend` rad; 0 is a
+    straight leg.
+    """
     q = robot.standing().q.copy()
     for leg in range(4):
         side = 1.0 if leg < 2 else -1.0

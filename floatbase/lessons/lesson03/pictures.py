@@ -1,4 +1,6 @@
-"""Lesson 03, The space of possible motions: all numbers of a motion as bars, where a matrix is not zero, a stiff knee."""
+"""Lesson 03, The space of possible motions: all numbers of a motion as bars, where a matrix is not
+zero, a stiff knee.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,25 @@ from floatbase.viewer.scene.colours import GHOST, GREYS, PLANNED, hex_code
 
 GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
 FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
-BAR, FULL_BAR, ZERO_LINE = 14, 40, 62  # px: width of a bar, length of a full one, and where they begin, below the top
+BAR, FULL_BAR, ZERO_LINE = (
+    14,
+    40,
+    62,
+)  # px: width of a bar, length of a full one, and where they begin, below the top
 LETTER_WIDTH = 7  # px: width of a letter of a title, on average and at most
-BLOCK, GAP = 58, 16  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
+BLOCK, GAP = (
+    58,
+    16,
+)  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
 
-_Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]  # name, marks of its three numbers, unit
+_Blocks: TypeAlias = Sequence[
+    tuple[str, tuple[str, ...], str]
+]  # name, marks of its three numbers, unit
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bool = True) -> str:
-    """Draw (q̈, τ, λ) of a β, shape (dimension,): forces as arrows, where q̈ leads from rest as a veil.
+    """Draw (q̈, τ, λ) of a β, shape (dimension,): forces as arrows, where q̈ leads from rest as a
+    veil.
 
     cones: also the friction cones around the forces.
 
@@ -39,12 +51,25 @@ def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bo
     state = space.eom.state
     ghost = state.replace(q=state.integrate(0.5 * GHOST_TIME**2 * qdd), v=np.zeros(space.eom.nv))
     name = "where q̈ leads in a quarter of a second"
-    view.show(state, contacts=space.eom.contacts, planned=forces, cones=cones, ghost=ghost, ghost_name=name)
+    view.show(
+        state,
+        contacts=space.eom.contacts,
+        planned=forces,
+        cones=cones,
+        ghost=ghost,
+        ghost_name=name,
+    )
     return motion_bars(qdd, tau, forces)
 
 
-def motion_bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, full: tuple[float, float, float] = FULL) -> str:
-    """All numbers of a quadruped's motion as bars, HTML, leg by leg. Under the mouse a bar says its name, number and unit.
+def motion_bars(
+    qdd: npt.ArrayLike,
+    tau: npt.ArrayLike,
+    forces: npt.ArrayLike,
+    full: tuple[float, float, float] = FULL,
+) -> str:
+    """All numbers of a quadruped's motion as bars, HTML, leg by leg. Under the mouse a bar says its
+    name, number and unit.
 
     qdd: shape (18,), m/s² and rad/s².
     tau: shape (12,), N·m.
@@ -55,20 +80,34 @@ def motion_bars(qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike, f
     joints, axes = ("hip", "thigh", "knee"), ("x", "y", "z")
     qdd = np.asarray(qdd)
     groups = (  # two for q̈: a narrow page has no room for 18 numbers in a line
-        ("q̈", "m/s², rad/s²", GHOST, [("base", axes, "m/s²"), ("turning", axes, "rad/s²")], qdd[:6], full[0]),
+        (
+            "q̈",
+            "m/s², rad/s²",
+            GHOST,
+            [("base", axes, "m/s²"), ("turning", axes, "rad/s²")],
+            qdd[:6],
+            full[0],
+        ),
         ("q̈", "rad/s²", GHOST, [(leg, joints, "rad/s²") for leg in legs], qdd[6:], full[0]),
         ("τ", "N·m", GREYS[1], [(leg, joints, "N·m") for leg in legs], tau, full[1]),
         ("λ", "N", PLANNED, [(leg, axes, "N") for leg in legs], forces, full[2]),
     )
     drawn = [
-        _bar_group(f"{name}, ± {most:g} {units}", hex_code(colour), blocks, np.reshape(values, (-1, 3)), most)
+        _bar_group(
+            f"{name}, ± {most:g} {units}",
+            hex_code(colour),
+            blocks,
+            np.reshape(values, (-1, 3)),
+            most,
+        )
         for name, units, colour, blocks, values, most in groups
     ]
     return f'<div style="display: flex; flex-wrap: wrap; gap: 10px 16px">{"".join(drawn)}</div>'
 
 
 def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
-    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the page's own colour.
+    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the
+    page's own colour.
 
     title: what stands above, the symbol first.
     colour: of the bars.
@@ -80,23 +119,47 @@ def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: fl
     parts = [f'<text y="12" font-size="13">{title}</text>']
     parts.append(f'<path d="M0 {ZERO_LINE}H{width}" stroke="currentColor" stroke-opacity="0.5"/>')
     for i, ((block, marks, unit), three) in enumerate(zip(blocks, values, strict=True)):
-        parts.append(f'<text x="{BLOCK * (i + 0.5)}" y="{bottom + 28}" text-anchor="middle">{block}</text>')
+        parts.append(
+            f'<text x="{BLOCK * (i + 0.5)}" y="{bottom + 28}" text-anchor="middle">{block}</text>'
+        )
         for j, (mark, value) in enumerate(zip(marks, three, strict=True)):
-            x, number = BLOCK * i + BAR * j + GAP // 2, f"{value:.4g}" if abs(value) > 1e-6 * most else "0"
+            x, number = (
+                BLOCK * i + BAR * j + GAP // 2,
+                f"{value:.4g}" if abs(value) > 1e-6 * most else "0",
+            )
             parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
             parts.append(_bar(x, value / most, colour))
-            parts.append(f'<text x="{x + BAR / 2}" y="{bottom + 14}" text-anchor="middle">{mark[0]}</text></g>')
-    size = f'width="{max(width, LETTER_WIDTH * len(title))}" height="{bottom + 32}" role="img" aria-label="{title}"'
+            parts.append(
+                f'<text x="{x + BAR / 2}" y="{bottom + 14}" '
+                f'text-anchor="middle">{mark[0]}</text></g>'
+            )
+    size = (
+        f'width="{max(width, LETTER_WIDTH * len(title))}" height="{bottom + 32}" role="img" '
+        f'aria-label="{title}"'
+    )
     return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
 
 
 def _bar(x: float, part: float, colour: str) -> str:
-    """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full length."""
+    """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full
+    length.
+    """
     length = min(abs(part), 1.0) * FULL_BAR
-    top, end = (ZERO_LINE - length, ZERO_LINE - FULL_BAR) if part > 0 else (ZERO_LINE, ZERO_LINE + FULL_BAR - 3)
-    drawn = f'<rect x="{x}" y="{ZERO_LINE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" fill-opacity="0"/>'
-    drawn += f'<rect x="{x + 1}" y="{top:.1f}" width="{BAR - 2}" height="{length:.1f}" fill="{colour}"/>'
-    return drawn + (f'<rect x="{x + 1}" y="{end}" width="{BAR - 2}" height="3"/>' if abs(part) > 1.0 else "")
+    top, end = (
+        (ZERO_LINE - length, ZERO_LINE - FULL_BAR)
+        if part > 0
+        else (ZERO_LINE, ZERO_LINE + FULL_BAR - 3)
+    )
+    drawn = (
+        f'<rect x="{x}" y="{ZERO_LINE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" '
+        f'fill-opacity="0"/>'
+    )
+    drawn += (
+        f'<rect x="{x + 1}" y="{top:.1f}" width="{BAR - 2}" height="{length:.1f}" fill="{colour}"/>'
+    )
+    return drawn + (
+        f'<rect x="{x + 1}" y="{end}" width="{BAR - 2}" height="3"/>' if abs(part) > 1.0 else ""
+    )
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
@@ -105,14 +168,24 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
     rows, columns: the blocks of A in order, name -> size.
     """
     A = np.asarray(A)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained", width_ratios=[3, 2])
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10, 4.2), layout="constrained", width_ratios=[3, 2]
+    )
     size = np.log10(np.maximum(np.abs(A), 1e-12))
-    shown = left.imshow(np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5)
-    figure.colorbar(shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8)
+    shown = left.imshow(
+        np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5
+    )
+    figure.colorbar(
+        shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8
+    )
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)
     right.semilogy(np.arange(1, len(values) + 1), values, "o", color=hex_code(GREYS[0]))
-    right.set(xlabel="number", ylabel="singular value", title=f"{len(values)} singular values, rank {rank(A)}")
+    right.set(
+        xlabel="number",
+        ylabel="singular value",
+        title=f"{len(values)} singular values, rank {rank(A)}",
+    )
     right.grid(alpha=0.3)
     plt.close(figure)
     return figure
@@ -135,7 +208,8 @@ def _name_blocks(axes: Any, rows: Mapping[str, int], columns: Mapping[str, int])
 def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     """Draw solo12 standing still and return what that takes, HTML.
 
-    bend: of every knee, rad. wobble: internal forces to add to those that carry the weight, shape (12,), N, world.
+    bend: of every knee, rad. wobble: internal forces to add to those that carry the weight, shape
+        (12,), N, world.
     """
     contacts = fb.Contacts.points(robot)
     eom = fb.equations_of_motion(upright_solo12(robot, bend), contacts)
@@ -144,7 +218,8 @@ def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
     extra = eom.J[:, 6:].T @ wobble
     view.show(eom.state, contacts=contacts, planned=forces, cones=False)
     return (
-        f"rank J = <b>{rank(eom.J)}</b>, smallest singular value {np.linalg.svd(eom.J)[1][-1]:.3f}; "
+        f"rank J = <b>{rank(eom.J)}</b>, smallest singular value "
+        f"{np.linalg.svd(eom.J)[1][-1]:.3f}; "
         f"torques for the wobble: <b>{np.linalg.norm(extra):.3f} N·m</b>"
         + motion_bars(np.zeros(18), tau, forces, full=(20.0, 2.0, 20.0))
     )

@@ -8,7 +8,12 @@ from floatbase.lessons.lesson04.helpers import (
     rescaled_space,
     tilted_go2_eom,
 )
-from floatbase.lessons.lesson04.pictures import cost_slices, effort_picture, level_curves, show_torques
+from floatbase.lessons.lesson04.pictures import (
+    cost_slices,
+    effort_picture,
+    level_curves,
+    show_torques,
+)
 
 __all__ = [
     "DESIRED_ACCELERATION",

@@ -10,7 +10,14 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, minimiser_or_verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    minimiser_or_verdict,
+)
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, tilted_go2_eom
 from floatbase.linear_algebra import rank
@@ -18,22 +25,31 @@ from floatbase.objectives import tangential_bias
 
 
 def _gradient_by_newton() -> Array:
-    """By the forces, a_c = Σ f / m + g with λ = ζ(τ): no Jacobian of the centre of mass, no drift of it."""
+    """By the forces, a_c = Σ f / m + g with λ = ζ(τ): no Jacobian of the centre of mass, no drift
+    of it.
+    """
     eom = tilted_go2_eom()
     zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
     sums = np.tile(np.eye(3), 4) / mass
-    return (sums @ zeta.A).T @ (sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED_ACCELERATION)
+    return (sums @ zeta.A).T @ (
+        sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED_ACCELERATION
+    )
 
 
 def _gradients() -> dict[str, Callable[[], Any]]:
     def gradient(
-        drift: float = 1.0, offset: float = 1.0, turned: int = 0, back: Callable[[Array], Array] = np.transpose
+        drift: float = 1.0,
+        offset: float = 1.0,
+        turned: int = 0,
+        back: Callable[[Array], Array] = np.transpose,
     ) -> Callable[[], Array]:
         def value() -> Array:
             eom = tilted_go2_eom()
             state, eta = eom.state, fb.accelerations_from_torques(eom)
             R = state.frame_pose("base").rotation
-            desired = (DESIRED_ACCELERATION, R @ DESIRED_ACCELERATION, R.T @ DESIRED_ACCELERATION)[turned]
+            desired = (DESIRED_ACCELERATION, R @ DESIRED_ACCELERATION, R.T @ DESIRED_ACCELERATION)[
+                turned
+            ]
             J = state.com_jacobian
             return back(eta.A) @ J.T @ (offset * J @ eta.b + drift * state.com_drift - desired)
 
@@ -56,14 +72,18 @@ def _gradients() -> dict[str, Callable[[], Any]]:
 
 
 def _gradient_of_standing() -> Array:
-    """The lesson's own cost, made where the robot stands, pulled back through η of the moving robot."""
+    """The lesson's own cost, made where the robot stands, pulled back through η of the moving
+    robot.
+    """
     state = standing_go2_eom().state
     cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED_ACCELERATION - state.com_drift)
     return cost.pullback(fb.accelerations_from_torques(tilted_go2_eom())).g
 
 
 def _flat_on_three_feet() -> int:
-    """Flat directions of com + turn on three feet, counted in τ: β is as long as τ there, since J has full rank."""
+    """Flat directions of com + turn on three feet, counted in τ: β is as long as τ there, since J
+    has full rank.
+    """
     state = standing_go2_eom().state
     return _unseen_by(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]))
 
@@ -88,12 +108,16 @@ def _three_feet_eom() -> EquationsOfMotion:
 
 
 def _lesson_costs() -> dict[str, Any]:
-    """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ the effort."""
+    """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ
+    the effort.
+    """
     eom = standing_go2_eom()
     J, drift = eom.state.frame_jacobian("base")[3:], eom.state.frame_drift("base")[3:]
     return {
         "eta": fb.accelerations_from_torques(eom),
-        "com": fb.Quadratic.from_residual(eom.state.com_jacobian, DESIRED_ACCELERATION - eom.state.com_drift),
+        "com": fb.Quadratic.from_residual(
+            eom.state.com_jacobian, DESIRED_ACCELERATION - eom.state.com_drift
+        ),
         "turn": fb.Quadratic.from_residual(J, -drift),
         "effort": fb.Quadratic.from_residual(np.eye(12), np.zeros(12)),
     }
@@ -112,18 +136,31 @@ def _judge_design(answer: Any) -> Verdict:
     if np.linalg.norm(a + DESIRED_ACCELERATION) < 0.05:
         return Verdict(False, "The sign: this accelerates to the right.", "sign")
     if np.linalg.norm(a - DESIRED_ACCELERATION) > 0.01:
-        moves = f"The centre of mass accelerates by {_rounded(a)} m/s², not {_rounded(DESIRED_ACCELERATION)}"
+        moves = (
+            f"The centre of mass accelerates by {_rounded(a)} m/s², not "
+            f"{_rounded(DESIRED_ACCELERATION)}"
+        )
         return Verdict(False, f"{moves}: weigh that more.", "com")
     if turning > 0.05:
         return Verdict(
-            False, f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost is missing?", "turning"
+            False,
+            f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost "
+            f"is missing?",
+            "turning",
         )
     if friction > 6.0:
         most = f"one foot leans on friction with {friction:.1f} N"
         return Verdict(
-            False, f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back to τ.", "friction"
+            False,
+            f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back "
+            f"to τ.",
+            "friction",
         )
-    return Verdict(True, "Three costs, each in the space where it is easy to say, added in the space where the motors are.")
+    return Verdict(
+        True,
+        "Three costs, each in the space where it is easy to say, added in the space where the "
+        "motors are.",
+    )
 
 
 def _rounded(a: Array) -> list[float]:
@@ -135,11 +172,17 @@ def _designs() -> list[Example]:
     eta, com, turn, effort = _lesson_costs().values()
     zeta, wish = fb.forces_from_torques(eom), (com + turn).pullback(eta)
     friction = tangential_bias(eom.contacts).pullback(zeta)
-    even = fb.Quadratic.from_residual(np.eye(12), np.tile([0.0, 2.0, eom.robot.weight / 4], 4), 1e-6).pullback(zeta)
-    to_the_right = fb.Quadratic.from_residual(eom.state.com_jacobian, -DESIRED_ACCELERATION - eom.state.com_drift)
+    even = fb.Quadratic.from_residual(
+        np.eye(12), np.tile([0.0, 2.0, eom.robot.weight / 4], 4), 1e-6
+    ).pullback(zeta)
+    to_the_right = fb.Quadratic.from_residual(
+        eom.state.com_jacobian, -DESIRED_ACCELERATION - eom.state.com_drift
+    )
     return [
-        (wish + 1e-4 * effort + 3e-5 * friction, ""), (wish + 1e-4 * effort + 1e-4 * friction, ""), (wish + even, ""),
-        (wish + 1e-4 * effort, "friction"), (com.pullback(eta) + 1e-4 * effort, "turning"), (wish + effort, "com"),
+        (wish + 1e-4 * effort + 3e-5 * friction, ""), (wish + 1e-4 * effort + 1e-4 * friction, ""),
+        (wish + even, ""),
+        (wish + 1e-4 * effort, "friction"), (com.pullback(eta) + 1e-4 * effort, "turning"),
+        (wish + effort, "com"),
         ((to_the_right + turn).pullback(eta) + 1e-4 * effort, "sign"), (com, "other_block"),
     ]  # fmt: skip
 
@@ -157,22 +200,33 @@ EXERCISES = (
                 praise="The chain rule: points go forward by η, slopes come back by its transpose.",
                 mistakes=_gradients(),
                 hints={
-                    "zero": "There is nothing there yet: at a minimum the gradient is zero, but τ = 0 is none.",
-                    "sign": "The sign: residual = actual - desired, and the gradient points uphill.",
-                    "drift_forgotten": "The drift is forgotten: the centre of mass accelerates by J_c q̈ + J̇_c q̇.",
+                    "zero": "There is nothing there yet: at a minimum the gradient is zero, but τ "
+                    "= 0 is none.",
+                    "sign": "The sign: residual = actual - desired, and the gradient points "
+                    "uphill.",
+                    "drift_forgotten": "The drift is forgotten: the centre of mass accelerates by "
+                    "J_c q̈ + J̇_c q̇.",
                     "drift_sign": "The drift has the wrong sign.",
-                    "offset_forgotten": "η has an offset: with the motors off the robot accelerates too, by `eta_moving.b`.",
-                    "offset_and_drift_forgotten": "The offset of η and the drift are both forgotten.",
-                    "into_world": "The frame: `desired` is in world axes, as Jacobian and drift are; do not turn it.",
-                    "out_of_world": "The frame: `desired` is in world axes already; the base's rotation takes it out of them.",
-                    "pseudo_inverse": "A gradient comes back by the transpose of η's matrix; a pseudo-inverse is for points.",
-                    "standing": "This is the cost of the standing robot; the moving one has another Jacobian and drift.",
+                    "offset_forgotten": "η has an offset: with the motors off the robot "
+                    "accelerates too, by `eta_moving.b`.",
+                    "offset_and_drift_forgotten": "The offset of η and the drift are both "
+                    "forgotten.",
+                    "into_world": "The frame: `desired` is in world axes, as Jacobian and drift "
+                    "are; do not turn it.",
+                    "out_of_world": "The frame: `desired` is in world axes already; the base's "
+                    "rotation takes it out of them.",
+                    "pseudo_inverse": "A gradient comes back by the transpose of η's matrix; a "
+                    "pseudo-inverse is for points.",
+                    "standing": "This is the cost of the standing robot; the moving one has "
+                    "another Jacobian and drift.",
                     "half": "The cost has a ½ in front, so the square's 2 cancels.",
                 },
             ),
             {
-                (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the torques.",
-                (3,): "3 numbers: that is the residual. Two steps are left to come back to the torques.",
+                (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the "
+                "torques.",
+                (3,): "3 numbers: that is the residual. Two steps are left to come back to the "
+                "torques.",
                 (12, 1): "This is a matrix with one column; the answer is a vector of shape (12,).",
                 (12, 12): "That is a curvature, shape (12, 12); the gradient is a vector.",
             },
@@ -181,15 +235,18 @@ EXERCISES = (
     ),
     Exercise(
         name="04.2",
-        statement="On three feet: how many independent ones of the flat directions of com + turn, in β, move the free foot?",
+        statement="On three feet: how many independent ones of the flat directions of com + turn, "
+        "in β, move the free foot?",
         stub="moving = 6  # replace this number by what you find",
-        solution='three = fb.feasible_space(fb.equations_of_motion(state, contacts.without("FL_foot")))\n'
+        solution="three = fb.feasible_space(fb.equations_of_motion(state, "
+        'contacts.without("FL_foot")))\n'
         "flat = null_space((com + turn).pullback(three.qdd).H)\n"
         'moving = rank(state.frame_jacobian("FL_foot")[:3] @ three.qdd.A @ flat)',
         judge=NumericJudge(
             is_count=True,
             right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
-            praise="Three squeezes are left on three feet; the other three flat directions take the free foot where you like.",
+            praise="Three squeezes are left on three feet; the other three flat directions take "
+            "the free foot where you like.",
             mistakes={
                 "all_flat": _flat_on_three_feet,
                 "com_alone": _flat_for_com,
@@ -199,21 +256,28 @@ EXERCISES = (
                 "all": lambda: _three_feet_eom().d,
             },
             hints={
-                "all_flat": "Those are all flat directions. Can three feet still squeeze, and what does that move?",
-                "com_alone": "So many are flat for `com` alone, or if squeezes count twice; for com + turn it is six.",
+                "all_flat": "Those are all flat directions. Can three feet still squeeze, and what "
+                "does that move?",
+                "com_alone": "So many are flat for `com` alone, or if squeezes count twice; for "
+                "com + turn it is six.",
                 "none": "Does a free foot have to stay where it is? Neither cost speaks of it.",
                 "one": "One foot, but a foot can go in more than one direction.",
                 "two": "Upwards is a direction, too: no ground is in the way.",
-                "all": "That is all of β. Directions along which the costs are curved do not count.",
+                "all": "That is all of β. Directions along which the costs are curved do not "
+                "count.",
             },
         ),
-        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and move nothing. The other "
-        "3 move the free foot, wherever you like, and base and legs follow so that neither wish is missed.",
+        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and "
+        "move nothing. The other "
+        "3 move the free foot, wherever you like, and base and legs follow so that neither wish is "
+        "missed.",
     ),
     Exercise(
         name="04.3",
-        statement="A cost on torques: 0.5 m/s² to the left, no turning, at most 6 N of friction at every foot.",
-        stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add costs",
+        statement="A cost on torques: 0.5 m/s² to the left, no turning, at most 6 N of friction at "
+        "every foot.",
+        stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add "
+        "costs",
         solution="from floatbase.objectives import tangential_bias\n\n"
         "friction = tangential_bias(contacts)  # on λ\n"
         "wishes = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort\n"
@@ -221,7 +285,8 @@ EXERCISES = (
         judge=_judge_design,
         namespace=_lesson_costs,
         examples=_designs,
-        explanation="Friction is easy to say in λ, so say it there and bring it to the torques through ζ. Its weight is small "
+        explanation="Friction is easy to say in λ, so say it there and bring it to the torques "
+        "through ζ. Its weight is small "
         "enough not to spoil the acceleration.",
     ),
 )

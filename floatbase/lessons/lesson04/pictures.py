@@ -17,11 +17,15 @@ from floatbase.viewer.scene.colours import COM, GREYS, hex_code
 
 ARROW_SCALE = 0.5  # m drawn for 1 m/s²
 LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
-VALLEY_RATIO = 0.02  # a direction that is so many times less curved than another counts as the floor of a valley
+# a direction that is so many times less curved than another counts as the floor of a valley
+VALLEY_RATIO = 0.02
 
 
-def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW_SCALE) -> Array:
-    """Draw the forces that torques bring about and the acceleration of the centre of mass, which is returned.
+def show_torques(
+    view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW_SCALE
+) -> Array:
+    """Draw the forces that torques bring about and the acceleration of the centre of mass, which is
+    returned.
 
     tau: shape (d,), N·m. length: m drawn for 1 m/s². Returns shape (3,), m/s², world.
     """
@@ -36,11 +40,14 @@ def show_torques(view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, lengt
 
 
 def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
-    """Level curves of costs on two variables. costs: title=(cost, name of x, name of y, half the width of the picture).
+    """Level curves of costs on two variables. costs: title=(cost, name of x, name of y, half the
+    width of the picture).
 
     Yellow is cheap. A dot marks the least point, except where the cost is a valley.
     """
-    figure, axes = plt.subplots(1, len(costs), figsize=(3.6 * len(costs), 3.5), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(
+        1, len(costs), figsize=(3.6 * len(costs), 3.5), layout="constrained", squeeze=False
+    )
     for ax, (title, (cost, x_name, y_name, half)) in zip(axes[0], costs.items(), strict=True):
         x, y = np.meshgrid(np.linspace(-half, half, 80), np.linspace(-half, half, 80))
         points = np.stack([x.ravel(), y.ravel()])
@@ -50,14 +57,23 @@ def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
         flat, curved = np.linalg.eigvalsh(cost.H)
         if flat > VALLEY_RATIO * curved:
-            ax.plot(*cost.minimiser(), "o", color=hex_code(GREYS[0]), markeredgecolor="white", markersize=8)
+            ax.plot(
+                *cost.minimiser(),
+                "o",
+                color=hex_code(GREYS[0]),
+                markeredgecolor="white",
+                markersize=8,
+            )
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure
 
 
-def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: str, y_name: str) -> str:
-    """Level curves of one cost on two variables with a dot at a point, as SVG: quick enough for a slider.
+def level_curves(
+    cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: str, y_name: str
+) -> str:
+    """Level curves of one cost on two variables with a dot at a point, as SVG: quick enough for a
+    slider.
 
     point: shape (2,).
     half: half the width of the picture, in the units of the variables.
@@ -69,20 +85,27 @@ def level_curves(cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: 
     turn = -np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
     s = 130.0 / half  # pixels for 1
     x, y = (np.array([1, -1]) * s * np.asarray(point)) + 130
-    at = f'transform="translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) rotate({turn:.2f})"'
+    at = (
+        f'transform="translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) '
+        f'rotate({turn:.2f})"'
+    )
     grey = hex_code(GREYS[1])
     rings = "".join(
-        f'<ellipse rx="{s * (2 * level / values[1]) ** 0.5:.1f}" ry="{s * (2 * level / values[0]) ** 0.5:.1f}" {at} '
+        f'<ellipse rx="{s * (2 * level / values[1]) ** 0.5:.1f}" '
+        f'ry="{s * (2 * level / values[0]) ** 0.5:.1f}" {at} '
         f'fill="{grey}" fill-opacity="0.15" stroke="{grey}" stroke-width="1.5"/>'
         for level in LEVELS
     )
     return (
         f'<svg width="310" viewBox="-40 0 310 290" style="max-width: 100%" fill="currentColor">'
-        f'<svg x="0" y="0" width="260" height="260"><rect width="260" height="260" fill-opacity="0.05"/>{rings}'
-        f'<path d="M0 130H260M130 0V260" stroke="currentColor" stroke-opacity="0.4" stroke-dasharray="3 3"/>'
+        f'<svg x="0" y="0" width="260" height="260"><rect width="260" height="260" '
+        f'fill-opacity="0.05"/>{rings}'
+        f'<path d="M0 130H260M130 0V260" stroke="currentColor" stroke-opacity="0.4" '
+        f'stroke-dasharray="3 3"/>'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6"/></svg>'
         f'<text x="130" y="278" text-anchor="middle" font-size="13">{x_name}, ± {half:g}</text>'
-        f'<text transform="translate(-10 130) rotate(-90)" text-anchor="middle" font-size="13">{y_name}, ± {half:g}</text>'
+        f'<text transform="translate(-10 130) rotate(-90)" text-anchor="middle" '
+        f'font-size="13">{y_name}, ± {half:g}</text>'
         "</svg>"
     )
 
@@ -92,7 +115,11 @@ def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) ->
     figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
     for (name, (x, y)), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         ax.plot(x, y, style, color=hex_code(colour), label=name, linewidth=2)
-    ax.set(xlabel="acceleration of the base to the left [m/s²]", ylabel="½‖τ‖² [(N·m)²]", ylim=(0, None))
+    ax.set(
+        xlabel="acceleration of the base to the left [m/s²]",
+        ylabel="½‖τ‖² [(N·m)²]",
+        ylim=(0, None),
+    )
     ax.grid(alpha=0.3)
     ax.legend()
     plt.close(figure)

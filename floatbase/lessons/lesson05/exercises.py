@@ -10,7 +10,14 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, minimiser_or_verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    minimiser_or_verdict,
+)
 from floatbase.lessons.lesson03 import standing_go2_eom, standing_still_beta
 from floatbase.lessons.lesson05.helpers import (
     ConstantForceController,
@@ -21,11 +28,21 @@ from floatbase.lessons.lesson05.helpers import (
     three_feet_eom,
 )
 from floatbase.lessons.rounding import rounded
-from floatbase.objectives import centroidal_momentum_rate, com_wrench_map, force_bias, tangential_bias, wrench_objective
+from floatbase.objectives import (
+    centroidal_momentum_rate,
+    com_wrench_map,
+    force_bias,
+    tangential_bias,
+    wrench_objective,
+)
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4
-MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = 0.5, 1.0, 0.1  # of a foot; N; N·m: what exercise 05.4 allows
+MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = (
+    0.5,
+    1.0,
+    0.1,
+)  # of a foot; N; N·m: what exercise 05.4 allows
 ROUNDING = 1e-6  # of a lean that is just what is allowed
 SHORT = 0.1  # s on the physics
 MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a slip
@@ -45,10 +62,14 @@ def _blocks(levers: Any, order: float = 1.0) -> Array:
 
 
 def _moments() -> dict[str, Callable[[], Any]]:
-    def moments(about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)) -> Callable[[], Array]:
+    def moments(
+        about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)
+    ) -> Callable[[], Array]:
         def value() -> Array:
             state = three_feet_eom().state
-            return factor * _blocks(three_feet_eom().contacts.positions(state)[list(feet)] - about(state))
+            return factor * _blocks(
+                three_feet_eom().contacts.positions(state)[list(feet)] - about(state)
+            )
 
         return value
 
@@ -67,7 +88,9 @@ def _moments() -> dict[str, Callable[[], Any]]:
 
 
 def _force_by_momentum() -> Array:
-    """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to change it."""
+    """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to
+    change it.
+    """
     state = standing_go2_eom().state
     rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
     return np.asarray(rate - state.robot.mass * state.robot.model.gravity.linear)
@@ -96,7 +119,9 @@ def _smallest_by_zeta() -> Array:
 
 
 def _torques() -> dict[str, Callable[[], Any]]:
-    def torques(offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv) -> Callable[[], Any]:
+    def torques(
+        offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv
+    ) -> Callable[[], Any]:
         def value() -> Array:
             C, a = torque_force_matrix(arm_robot_eom())
             return back(C[:, :18]) @ (offset * a - forces * C[:, 18:] @ squeezed_standing_forces())
@@ -125,13 +150,16 @@ def _torques() -> dict[str, Callable[[], Any]]:
         "all_still": still(squeezed_standing_forces),
         "no_squeeze": still(standing_forces),
         "standing": lambda: (
-            np.linalg.pinv(fb.forces_from_torques(arm_robot_eom()).A) @ (standing_forces() - fb.forces_from_torques(arm_robot_eom()).b)
+            np.linalg.pinv(fb.forces_from_torques(arm_robot_eom()).A)
+            @ (standing_forces() - fb.forces_from_torques(arm_robot_eom()).b)
         ),
     }
 
 
 def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
-    return wrench_objective(eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0])
+    return wrench_objective(
+        eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0]
+    )
 
 
 def _stub_names() -> dict[str, Any]:
@@ -163,36 +191,62 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
     if np.linalg.norm(force) > MISSED_FORCE:
         if _is_on_torques(eom, forces):
             return Verdict(
-                False, "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the pullback.", "on_torques"
+                False,
+                "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the "
+                "pullback.",
+                "on_torques",
             )
         f_c = rounded(points.sum(axis=0), "N", digits=3)
         better = "A smaller weight for the preference, or a better preference."
         return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}", "force")
     if np.linalg.norm(moment) > MISSED_MOMENT:
-        return Verdict(False, f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.", "moment")
+        return Verdict(
+            False,
+            f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.",
+            "moment",
+        )
     if points[:, 2].min() <= 0:
         return Verdict(False, "The wrench is right, but a foot pulls on the ground.", "pulls")
     lean = friction_ratios(eom.contacts, forces)
     if lean.max() > MOST_LEAN + ROUNDING:
         worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
-        prefers = "What does your preference call a good direction for a force, and which would be better?"
-        return Verdict(False, f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}", "leans")
+        prefers = (
+            "What does your preference call a good direction for a force, and which would "
+            "be better?"
+        )
+        return Verdict(
+            False,
+            f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}",
+            "leans",
+        )
     return None
 
 
 def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
-    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it is taken as τ."""
+    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it
+    is taken as τ.
+    """
     points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
-    return bool(np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]) < 0.1 * eom.robot.weight)
+    return bool(
+        np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight])
+        < 0.1 * eom.robot.weight
+    )
 
 
 def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     """Give the forces for a moment on a floor with μ = 0.5."""
-    record = fb.rollout(fb.Simulation(eom.robot, MOST_LEAN), ConstantForceController(eom.robot, eom.contacts, forces), SHORT)
+    record = fb.rollout(
+        fb.Simulation(eom.robot, MOST_LEAN),
+        ConstantForceController(eom.robot, eom.contacts, forces),
+        SHORT,
+    )
     slip = record.slip().max() if record.outcome == "completed" else np.inf
     if slip > MOST_SLIP:
         return Verdict(
-            False, "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further inside.", "slips"
+            False,
+            "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further "
+            "inside.",
+            "slips",
         )
     speed = record.final.com_velocity[0]
     return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
@@ -207,18 +261,25 @@ def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
 
 def _designs() -> list[Example]:
     eom = standing_go2_eom()
-    cost, share, force = _cost_60(eom), eom.robot.weight / 4, np.array([FORWARDS, 0.0, eom.robot.weight])
+    cost, share, force = (
+        _cost_60(eom),
+        eom.robot.weight / 4,
+        np.array([FORWARDS, 0.0, eom.robot.weight]),
+    )
     right, smallest = _leaning(force), cost.minimiser()
     by_hand = np.linalg.pinv(com_wrench_map(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
     by_hand[0::3] += [-7.8, -7.8, 7.8, 7.8]
     diagonal = squeeze_forces(eom.contacts)["diagonal"]
     return [
         (right, ""), (fb.Quadratic.from_residual(np.eye(12), by_hand), ""),
-        (cost + 1e-3 * force_bias(eom.contacts, 0.1, share), "leans"), (_leaning([30.0, 0.0, eom.robot.weight]), "leans"),
-        (cost + force_bias(eom.contacts, 0.1, share), "force"), (force_bias(eom.contacts, 0.1, share), "force"),
+        (cost + 1e-3 * force_bias(eom.contacts, 0.1, share), "leans"),
+        (_leaning([30.0, 0.0, eom.robot.weight]), "leans"),
+        (cost + force_bias(eom.contacts, 0.1, share), "force"),
+        (force_bias(eom.contacts, 0.1, share), "force"),
         (cost + 1e-3 * force_bias(eom.contacts, 10.0, share), "moment"),
         (fb.Quadratic.from_residual(np.eye(12), smallest + 25.0 * diagonal), "pulls"),
-        (cost.pullback(fb.forces_from_torques(eom)), "on_torques"), (right.pullback(fb.forces_from_torques(eom)), "on_torques"),
+        (cost.pullback(fb.forces_from_torques(eom)), "on_torques"),
+        (right.pullback(fb.forces_from_torques(eom)), "on_torques"),
         (cost.pullback(fb.forces_from_torques(arm_robot_eom())), "other_block"),
     ]  # fmt: skip
 
@@ -226,7 +287,8 @@ def _designs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="05.1",
-        statement="G_τ of (21) for three feet, shape (3, 9), from `x_feet` (3, 3) and `x_com` (3,), m, world.",
+        statement="G_τ of (21) for three feet, shape (3, 9), from `x_feet` (3, 3) and `x_com` "
+        "(3,), m, world.",
         stub="G_three = np.zeros((3, 9))  # replace: from x_feet and x_com",
         solution="x_feet = three_feet_eom().contacts.positions(three_feet_eom().state)\n"
         "x_com = three_feet_eom().state.com\n"
@@ -238,19 +300,28 @@ EXERCISES = (
                 praise="One block for each foot; the base's rows of J say the same.",
                 mistakes=_moments(),
                 hints={
-                    "zero": "There is nothing there yet: a foot beside the centre of mass has a lever.",
-                    "sign": "The opposite moment: the lever goes from x_c to the foot, and r × y, r × x are columns, not rows.",
-                    "about_base": "These are moments about the base's origin; x_c is another point.",
+                    "zero": "There is nothing there yet: a foot beside the centre of mass has a "
+                    "lever.",
+                    "sign": "The opposite moment: the lever goes from x_c to the foot, and r × y, "
+                    "r × x are columns, not rows.",
+                    "about_base": "These are moments about the base's origin; x_c is another "
+                    "point.",
                     "about_origin": "These are moments about the world's origin: subtract x_c.",
                     "millimetres": "The unit: this is in N·mm; lengths are in m.",
-                    "reversed": "The right blocks in the opposite order: λ begins with the first row of `x_feet`.",
-                    "order": "The right blocks in a wrong order: λ has the feet as `x_feet` has them.",
+                    "reversed": "The right blocks in the opposite order: λ begins with the first "
+                    "row of `x_feet`.",
+                    "order": "The right blocks in a wrong order: λ has the feet as `x_feet` has "
+                    "them.",
                 },
             ),
             {
                 (3, 12): "Twelve columns are for four feet; FL is in the air.",
                 (9, 3): "The blocks stand side by side, not below each other: `np.hstack`.",
-                (3, 3): "The blocks stand side by side; added up, they would need one force for all feet.",
+                (
+                    3,
+                    3,
+                ): "The blocks stand side by side; added up, they would need one force for all "
+                "feet.",
                 (3,): "That is a moment. G_τ is the matrix that makes it from λ.",
             },
         ),
@@ -258,7 +329,8 @@ EXERCISES = (
     ),
     Exercise(
         name="05.2",
-        statement="f̃_c, shape (3,), N, world: go2 shall accelerate by 0.5 m/s² forwards and 1 m/s² upwards.",
+        statement="f̃_c, shape (3,), N, world: go2 shall accelerate by 0.5 m/s² forwards and 1 "
+        "m/s² upwards.",
         stub="f_wish = np.array([0, 0, robot.weight])  # replace",
         solution="f_wish = robot.mass * np.array([0.5, 0, 1.0]) + np.array([0, 0, robot.weight])",
         judge=NumericJudge(
@@ -268,7 +340,8 @@ EXERCISES = (
             hints={
                 "weight_alone": "That holds it still. What accelerates it comes on top.",
                 "no_gravity": "Gravity is forgotten: the ground must carry the weight, too.",
-                "gravity_sign": "The sign of gravity: it pulls down, so the ground must push up by more.",
+                "gravity_sign": "The sign of gravity: it pulls down, so the ground must push up by "
+                "more.",
                 "weight_twice": "The weight counts twice.",
                 "no_mass": "The mass is forgotten: these are m/s², not N.",
                 "no_mass_on_a": "The mass is forgotten in one of the two parts.",
@@ -277,11 +350,13 @@ EXERCISES = (
             },
         ),
         namespace=lambda: {"robot": standing_go2_eom().robot},
-        explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of floatbase.objectives does it.",
+        explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of "
+        "floatbase.objectives does it.",
     ),
     Exercise(
         name="05.3",
-        statement="The smallest torques, shape (18,), N·m, with which anymal_kinova's feet get the forces `pressed`.",
+        statement="The smallest torques, shape (18,), N·m, with which anymal_kinova's feet get the "
+        "forces `pressed`.",
         stub="tau_pressed = np.zeros(18)  # replace: from C_tau, C_forces, a and pressed",
         solution="tau_pressed = np.linalg.pinv(C_tau) @ (a - C_forces @ pressed)",
         judge=ShapeJudge(
@@ -290,33 +365,42 @@ EXERCISES = (
                 praise="(25) in one line: what λ leaves to τ, by the pseudo-inverse of C_τ alone.",
                 mistakes=_torques(),
                 hints={
-                    "zero": "There is nothing there yet: without torques the feet carry hardly anything.",
-                    "whole_C": "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is not to be chosen: it is "
+                    "zero": "There is nothing there yet: without torques the feet carry hardly "
+                    "anything.",
+                    "whole_C": "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is "
+                    "not to be chosen: it is "
                     "`pressed`.",
                     "a_forgotten": "a is forgotten: gravity is in it.",
-                    "forces_forgotten": "λ is forgotten: move C_λ λ to the right side, then solve for τ.",
+                    "forces_forgotten": "λ is forgotten: move C_λ λ to the right side, then solve "
+                    "for τ.",
                     "forces_sign": "The sign of C_λ λ: it changes when it moves to the right side.",
                     "a_sign": "The sign of a.",
                     "transpose": "A transpose is no inverse: use the pseudo-inverse of C_τ.",
-                    "all_still": "These hold all joints still, the arm too. The same forces can be had for less.",
+                    "all_still": "These hold all joints still, the arm too. The same forces can be "
+                    "had for less.",
                     "no_squeeze": "These hold the robot still without the squeeze.",
-                    "standing": "These are for the forces of standing still; `pressed` has 20 N more between the front feet.",
+                    "standing": "These are for the forces of standing still; `pressed` has 20 N "
+                    "more between the front feet.",
                 },
             ),
             {
                 (12,): "12 numbers: those are forces. anymal_kinova has 18 motors.",
                 (30,): "30 numbers: that is (τ, λ); λ is given.",
-                (24,): "24 numbers: those are accelerations, or torques with six zeros for the base.",
+                (
+                    24,
+                ): "24 numbers: those are accelerations, or torques with six zeros for the base.",
                 (18, 1): "This is a matrix with one column; the answer is a vector of shape (18,).",
             },
         ),
         namespace=lambda: {"pressed": squeezed_standing_forces()},
-        explanation="(10) reads C_τ τ + C_λ λ = a. For a given λ that is a linear system for τ, with more unknowns than rows; "
+        explanation="(10) reads C_τ τ + C_λ λ = a. For a given λ that is a linear system for τ, "
+        "with more unknowns than rows; "
         "the pseudo-inverse gives its shortest solution. No β is needed.",
     ),
     Exercise(
         name="05.4",
-        statement="A cost on λ: 60 N forwards beside the weight, within 1 N and 0.1 N·m, and no foot leans by more than 0.5.",
+        statement="A cost on λ: 60 N forwards beside the weight, within 1 N and 0.1 N·m, and no "
+        "foot leans by more than 0.5.",
         stub="design = cost60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
         solution="whole = np.array([60, 0, robot.weight])  # where all forces together point\n"
         "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
@@ -324,7 +408,9 @@ EXERCISES = (
         judge=_judge_design,
         namespace=_stub_names,
         examples=_designs,
-        explanation="(23) calls a force without friction the best, and shares the friction equally. Where friction is the "
-        "wish, a better preference is the direction of the whole: then each foot leans as the sum does, by 60 / 158.",
+        explanation="(23) calls a force without friction the best, and shares the friction "
+        "equally. Where friction is the "
+        "wish, a better preference is the direction of the whole: then each foot leans as the sum "
+        "does, by 60 / 158.",
     ),
 )

@@ -1,4 +1,6 @@
-"""Lesson 05, Steering the centre of mass: squeezes, leans, a stretched arm, a controller that gives forces, the rose's one."""
+"""Lesson 05, Steering the centre of mass: squeezes, leans, a stretched arm, a controller that gives
+forces, the rose's one.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,14 @@ from floatbase.lessons.lesson03 import standing_still_beta
 from floatbase.objectives import torques_from_forces
 from floatbase.robots import Robot
 
-STRETCHED_ARM = (np.pi / 2, np.pi / 2, np.pi, 0.0, 0.0, 0.0)  # rad: anymal_kinova's arm, straight forwards
+STRETCHED_ARM = (
+    np.pi / 2,
+    np.pi / 2,
+    np.pi,
+    0.0,
+    0.0,
+    0.0,
+)  # rad: anymal_kinova's arm, straight forwards
 
 
 def make_controller() -> AnalyticController:
@@ -26,7 +35,9 @@ def make_controller() -> AnalyticController:
 
 
 def stretched_arm_state(angle: float) -> fb.State:
-    """anymal_kinova at rest with its arm stretched out. angle: rad, of the arm to the left; 0 is forwards."""
+    """anymal_kinova at rest with its arm stretched out. angle: rad, of the arm to the left; 0 is
+    forwards.
+    """
     robot = fb.load("anymal_kinova")
     q = robot.standing().q.copy()
     q[-6:] = STRETCHED_ARM
@@ -41,9 +52,11 @@ def com_in_base(state: fb.State) -> Array:
 
 
 def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
-    """Four of the six squeezes of a quadruped on level ground: name -> forces of 1 N at each foot concerned, shape (12,).
+    """Four of the six squeezes of a quadruped on level ground: name -> forces of 1 N at each foot
+    concerned, shape (12,).
 
-    contacts: feet in the order FL, FR, RL, RR, those at the front side by side, as those at the rear.
+    contacts: feet in the order FL, FR, RL, RR, those at the front side by side, as those at the
+        rear.
     """
     rows = {
         "front feet apart": [[0, 1, 0], [0, -1, 0], [0, 0, 0], [0, 0, 0]],
@@ -51,13 +64,18 @@ def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
         "left feet apart": [[1, 0, 0], [0, 0, 0], [-1, 0, 0], [0, 0, 0]],
         "diagonal": [[0, 0, 1], [0, 0, -1], [0, 0, -1], [0, 0, 1]],
     }
-    return {name: as_array(name, np.ravel(forces).astype(float), (contacts.k,)) for name, forces in rows.items()}
+    return {
+        name: as_array(name, np.ravel(forces).astype(float), (contacts.k,))
+        for name, forces in rows.items()
+    }
 
 
 def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
-    """How far the force of each point leans from its normal, tangential over normal part, shape (n,).
+    """How far the force of each point leans from its normal, tangential over normal part, shape
+    (n,).
 
-    μ where a force lies on its cone. Infinite where it has no normal part or pulls. forces: shape (k,) or (n, 3), N, world.
+    μ where a force lies on its cone. Infinite where it has no normal part or pulls. forces: shape
+    (k,) or (n, 3), N, world.
     """
     f = as_forces(forces, contacts.k).reshape(-1, 3)
     normal = np.einsum("ij,ij->i", f, contacts.normals)
@@ -86,7 +104,9 @@ class ConstantForceController:
 def three_feet_eom() -> EquationsOfMotion:
     """(7) of go2, tilted and moving, on all feet but FL."""
     robot = fb.load("go2")
-    return fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot"))
+    return fb.equations_of_motion(
+        robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot")
+    )
 
 
 @cache
@@ -97,7 +117,9 @@ def arm_robot_eom() -> EquationsOfMotion:
 
 
 def squeezed_standing_forces() -> Array:
-    """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N between the front feet."""
+    """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N
+    between the front feet.
+    """
     space = fb.feasible_space(arm_robot_eom())
     forces = space.forces(standing_still_beta(space)).copy()
     for foot, side in (("LF_FOOT", 20.0), ("RF_FOOT", -20.0)):

@@ -11,11 +11,22 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    array_or_verdict,
+)
 from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
 
-BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5  # of exercise 06.1: normal, not unit; μ; facets
+BANK, BANK_MU, BANK_FACETS = (
+    np.array([0.3, -0.2, 1.0]),
+    0.5,
+    5,
+)  # of exercise 06.1: normal, not unit; μ; facets
 FACETS, MU = 8, 0.7  # of exercise 06.2
 LOSS = 0.05  # of exercise 06.3
 HILL, MARGIN = 20.0, 3.0  # of exercise 06.4: degrees; N
@@ -24,7 +35,9 @@ SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
-    """Rows of exercise 06.1 from the polyhedron's edges, which are on the cone: each row is at right angles to two of them."""
+    """Rows of exercise 06.1 from the polyhedron's edges, which are on the cone: each row is at
+    right angles to two of them.
+    """
     n = np.asarray(normal) / np.linalg.norm(normal)
     t1, t2 = tangents(n)
     angles = turn + 2 * np.pi * (np.arange(BANK_FACETS + 1) - 0.5) / BANK_FACETS
@@ -46,12 +59,16 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
 
 
 def _fewest(lost: Any) -> int:
-    """The smallest number of facets that loses less than `LOSS`. lost: number of facets -> part that is lost."""
+    """The smallest number of facets that loses less than `LOSS`. lost: number of facets -> part
+    that is lost.
+    """
     return next(n for n in range(3, 100) if lost(n) < LOSS)
 
 
 def _lost_force(facets: int, inside: bool = True) -> float:
-    """What the middle of a facet misses of the cone, part of μ, tried with a force: how far it may lean along t1."""
+    """What the middle of a facet misses of the cone, part of μ, tried with a force: how far it may
+    lean along t1.
+    """
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
     leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])
     return abs(1.0 - float(leans))
@@ -78,25 +95,42 @@ def _judge_forces(answer: Any) -> Verdict:
 
 
 def _out_of_balance(f: Array) -> Verdict | None:
-    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where nothing is."""
+    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where
+    nothing is.
+    """
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
         ("nobody", "Nobody carries the robot yet."): 0.0 * n,
-        ("sign", "The sign: λ is what the ground does to the robot, and it pushes upwards."): -carried,
-        ("slides", "These forces carry only the weight's part along the normal: the robot slides."): weight * n[2] * n,
-        ("along_normal", "They add up to the weight, but along the slope's normal; gravity is vertical."): weight * n,
+        (
+            "sign",
+            "The sign: λ is what the ground does to the robot, and it pushes upwards.",
+        ): -carried,
+        (
+            "slides",
+            "These forces carry only the weight's part along the normal: the robot slides.",
+        ): weight * n[2] * n,
+        (
+            "along_normal",
+            "They add up to the weight, but along the slope's normal; gravity is vertical.",
+        ): weight * n,
     }
     for (hint, text), total in sums.items():
         if np.linalg.norm(f.sum(axis=0) - total) < BALANCE:
             return Verdict(False, text, hint)
     if missing > BALANCE:
-        return Verdict(False, f"The sum is {missing:.1f} N away from what carries the weight.", "sum")
+        return Verdict(
+            False, f"The sum is {missing:.1f} N away from what carries the weight.", "sum"
+        )
     moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
     if moment > BALANCE:
-        return Verdict(False, f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.", "moment")
+        return Verdict(
+            False,
+            f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.",
+            "moment",
+        )
     return None
 
 
@@ -107,22 +141,32 @@ def _judge_margins(f: Array) -> Verdict:
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
     if margins.min() >= MARGIN - SOLVED:
-        return Verdict(True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N.")
+        return Verdict(
+            True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N."
+        )
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(
-            False, f"In balance. But all feet hold alike against sliding, and the upper ones carry little: {least}.", "alike"
+            False,
+            f"In balance. But all feet hold alike against sliding, and the upper ones carry "
+            f"little: {least}.",
+            "alike",
         )
     if margins.min() >= -BALANCE:
         return Verdict(False, f"In balance and in the cones, but {least} only.", "in_cones")
     if upright.min() >= MARGIN:
         return Verdict(
-            False, f"In balance, with room enough in cones about the vertical; in the slope's own, {least}.", "vertical_cones"
+            False,
+            f"In balance, with room enough in cones about the vertical; in the slope's own, "
+            f"{least}.",
+            "vertical_cones",
         )
     return Verdict(False, f"In balance, but outside of a cone: {least}.", "outside")
 
 
 def _in_balance(facets: int, room: float) -> Array:
-    """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many facets."""
+    """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many
+    facets.
+    """
     state, contacts = stance_on_hill()
     carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
     rows = np.kron(np.eye(4), FrictionPolyhedron(slope_normal(HILL), MU, facets).face_matrix)
@@ -134,13 +178,17 @@ def _forces() -> list[Example]:
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
-    squeeze = np.zeros(12)  # the left feet against the right ones: it changes neither sum nor moment
+    squeeze = np.zeros(
+        12
+    )  # the left feet against the right ones: it changes neither sum nor moment
     squeeze[[7, 10]] = 1.0, -1.0
     return [
         *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
-        (np.zeros(12), "nobody"), (-smallest, "sign"), (np.tile(weight * n[2] * n / 4, 4), "slides"),
+        (np.zeros(12), "nobody"), (-smallest, "sign"),
+        (np.tile(weight * n[2] * n / 4, 4), "slides"),
         (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
-        (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"), (smallest + squeeze, "vertical_cones"),
+        (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"),
+        (smallest + squeeze, "vertical_cones"),
         (_in_balance(16, 0.1), "in_cones"), (smallest + 40 * squeeze, "outside"),
     ]  # fmt: skip
 
@@ -148,8 +196,10 @@ def _forces() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="06.1",
-        statement="Rows of the polyhedron inside the cone for a normal that is not unit, shape (5, 3).",
-        stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the cone",
+        statement="Rows of the polyhedron inside the cone for a normal that is not unit, shape (5, "
+        "3).",
+        stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the "
+        "cone",
         solution="from floatbase.friction import tangents\n\n"
         "n_bank = bank / np.linalg.norm(bank)\n"
         "t1, t2 = tangents(n_bank)\n"
@@ -159,12 +209,15 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_rows_from_edges,
-                praise="Five half-spaces; where two meet is an edge, and the edges lie on the cone.",
+                praise="Five half-spaces; where two meet is an edge, and the edges lie on the "
+                "cone.",
                 mistakes={
                     "zero": lambda: np.zeros((5, 3)),
                     "outside": partial(_rows_from_edges, BANK_MU / np.cos(np.pi / 5)),
                     "not_unit": lambda: _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK),
-                    "scale": lambda: _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None],
+                    "scale": lambda: (
+                        _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None]
+                    ),
                     "sign": lambda: -_rows_from_edges(),
                     "normal_sign": lambda: _with_tangents(-BANK_MU * np.cos(np.pi / 5)),
                     "no_mu": lambda: _rows_from_edges(1.0),
@@ -173,9 +226,12 @@ EXERCISES = (
                 },
                 hints={
                     "zero": "Nothing there yet: zero rows allow every force.",
-                    "outside": "That polyhedron lies outside the cone: its facets touch it in their middle.",
-                    "not_unit": "The normal is not of length one: make it so before its length counts as friction.",
-                    "scale": "The right half-spaces, in another scale: without the normal's part each row has length one.",
+                    "outside": "That polyhedron lies outside the cone: its facets touch it in "
+                    "their middle.",
+                    "not_unit": "The normal is not of length one: make it so before its length "
+                    "counts as friction.",
+                    "scale": "The right half-spaces, in another scale: without the normal's part "
+                    "each row has length one.",
                     "sign": "The sign: rows @ f ≤ 0 must hold for forces inside.",
                     "normal_sign": "The sign of the normal's part: with + the rows forbid to push.",
                     "no_mu": "μ is missing: these are the facets for μ = 1.",
@@ -189,11 +245,13 @@ EXERCISES = (
                 (5,): "Five numbers; each facet needs a row of three.",
             },
         ),
-        explanation="A facet's row takes the force along d_i and subtracts what friction allows in its middle, μ cos(π/5) nᵀf.",
+        explanation="A facet's row takes the force along d_i and subtracts what friction allows in "
+        "its middle, μ cos(π/5) nᵀf.",
     ),
     Exercise(
         name="06.2",
-        statement="The steepest slope, degrees, on which a force straight up stays in 8 facets inside the cone, μ = 0.7.",
+        statement="The steepest slope, degrees, on which a force straight up stays in 8 facets "
+        "inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
         judge=NumericJudge(
@@ -213,20 +271,26 @@ EXERCISES = (
             hints={
                 "45": "At 45° a force straight up needs μ = 1.",
                 "radians": "That is in radians.",
-                "round": "That is the round cone. A facet faces uphill, as this force leans; its middle allows less than μ.",
+                "round": "That is the round cone. A facet faces uphill, as this force leans; its "
+                "middle allows less than μ.",
                 "round_radians": "That is the angle in radians, and of the round cone.",
                 "sine": "A sine: on a slope α_∥ / α_⊥ is a tangent.",
-                "round_sine": "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet allows less than μ.",
+                "round_sine": "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet "
+                "allows less than μ.",
                 "four_facets": "That is for 4 facets, as before; here are 8.",
-                "outside": "That is for facets outside the cone; ask what their middle allows inside.",
-                "cosine_on_angle": "That is the loss in degrees on the angle itself; the cosine goes with μ.",
+                "outside": "That is for facets outside the cone; ask what their middle allows "
+                "inside.",
+                "cosine_on_angle": "That is the loss in degrees on the angle itself; the cosine "
+                "goes with μ.",
             },
         ),
-        explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a facet allows μ cos(π/8).",
+        explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a "
+        "facet allows μ cos(π/8).",
     ),
     Exercise(
         name="06.3",
-        statement="The fewest facets inside the cone whose middles lose less than 5 % of the tangential force.",
+        statement="The fewest facets inside the cone whose middles lose less than 5 % of the "
+        "tangential force.",
         stub="fewest = 4  # replace this number",
         solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
         judge=NumericJudge(
@@ -242,7 +306,8 @@ EXERCISES = (
                 "not_fewest": lambda: 16,
             },
             hints={
-                "area": "That many are needed to lose less than 5 % of the area; the question is about force.",
+                "area": "That many are needed to lose less than 5 % of the area; the question is "
+                "about force.",
                 "outside": "That is for a polyhedron outside: what its edges promise too much.",
                 "one_too_few": "One facet too few: it loses 6 %.",
                 "four": "Four lose 29 %.",
@@ -254,7 +319,8 @@ EXERCISES = (
     ),
     Exercise(
         name="06.4",
-        statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin of 3 N to its true cone.",
+        statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin "
+        "of 3 N to its true cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import com_wrench_map\n\n"
@@ -269,7 +335,8 @@ EXERCISES = (
         judge=_judge_forces,
         namespace=lambda: {"robot": fb.load("go2"), "on_hill": stance_on_hill},
         examples=_forces,
-        explanation="The rows of all feet with -3 on their right side, the balance as equalities, and least forces to choose.",
+        explanation="The rows of all feet with -3 on their right side, the balance as equalities, "
+        "and least forces to choose.",
     ),
 )
 

@@ -1,4 +1,6 @@
-"""Lesson 06, Friction cones: one cone and its force, facets from above, compasses, slopes and where the CoM may be."""
+"""Lesson 06, Friction cones: one cone and its force, facets from above, compasses, slopes and where
+the CoM may be.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ DRAWING_SIZE = 250  # pixels of a drawing from above
 
 
 def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
-    """Draw one round cone about the vertical with a force at its tip, in one scale; what (28) says of it, as text.
+    """Draw one round cone about the vertical with a force at its tip, in one scale; what (28) says
+    of it, as text.
 
     force: shape (3,), N.
     """
@@ -33,25 +36,37 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
         "patch": shapes.contact_patch(np.zeros(3), cone.normal, 0.05),
     }
     if np.any(f):
-        picture["measured"] = shapes.arrow(np.zeros(3), FORCE_SCALE * f, MEASURED, view.painter.size)
+        picture["measured"] = shapes.arrow(
+            np.zeros(3), FORCE_SCALE * f, MEASURED, view.painter.size
+        )
     view.draw(view.painter.ground_only() | picture)
     parts, margin = decompose(f, cone.normal), cone.margin(f)
-    sizes = f"α⊥ = {parts.alpha_perp:.0f} N, α∥ = {parts.alpha_par:.0f} N, μ α⊥ - α∥ = {margin:.0f} N: "
+    sizes = (
+        f"α⊥ = {parts.alpha_perp:.0f} N, α∥ = {parts.alpha_par:.0f} N, μ α⊥ - α∥ = {margin:.0f} N: "
+    )
     if margin < 0:
         return sizes + "no friction makes this force"
     return sizes + f"{margin:.0f} N may be added sideways"
 
 
 def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
-    """Draw the polyhedron inside a cone, the cone, and a force that leans as far forwards as the polyhedron lets it.
+    """Draw the polyhedron inside a cone, the cone, and a force that leans as far forwards as the
+    polyhedron lets it.
 
     From above, as SVG with their areas: the polyhedra inside and outside.
 
     mu, facets: as for `FrictionPolyhedron`.
     """
-    inner, outer = (FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside) for inside in (True, False))
-    most = 45.0 * np.array([inner.mu_facet, 0.0, 1.0])  # N: the furthest that facet 0 lets a force lean forwards
-    picture = prefixed("cone", shapes.friction_polyhedron(np.zeros(3), inner, CONE_HEIGHT, inner.status(most)))
+    inner, outer = (
+        FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside)
+        for inside in (True, False)
+    )
+    most = 45.0 * np.array(
+        [inner.mu_facet, 0.0, 1.0]
+    )  # N: the furthest that facet 0 lets a force lean forwards
+    picture = prefixed(
+        "cone", shapes.friction_polyhedron(np.zeros(3), inner, CONE_HEIGHT, inner.status(most))
+    )
     picture["planned"] = shapes.arrow(np.zeros(3), FORCE_SCALE * most, PLANNED, view.painter.size)
     picture["round"] = shapes.friction_cone(np.zeros(3), inner.normal, mu, CONE_HEIGHT, "idle")
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
@@ -59,33 +74,55 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
     rays = {"inside": (inner.rays, ""), "outside": (outer.rays, "6 4")}
     half = DRAWING_SIZE / 2
     s = 0.64 * half / mu  # pixels for 1: a triangle outside reaches 2 μ, and its corners may be cut
-    drawn = "".join(_polygon(half + s * _to_pixels(corners), dashes) for corners, dashes in rays.values())
-    circle = f'<circle cx="{half}" cy="{half}" r="{s * mu:.1f}" fill="none" stroke="currentColor" stroke-width="2"/>'
-    areas = " · ".join(f"{name} {100 * cone.area_ratio:.0f} %" for name, cone in (("inside", inner), ("outside", outer)))
-    weakest = f"weakest {inner.mu_facet:.2f} inside, strongest {np.linalg.norm(outer.rays[0, :2]):.2f} outside"
-    return _svg(drawn + circle, f"{facets} facets from above; forwards is up", f"area: {areas}", weakest)
+    drawn = "".join(
+        _polygon(half + s * _to_pixels(corners), dashes) for corners, dashes in rays.values()
+    )
+    circle = (
+        f'<circle cx="{half}" cy="{half}" r="{s * mu:.1f}" fill="none" stroke="currentColor" '
+        f'stroke-width="2"/>'
+    )
+    areas = " · ".join(
+        f"{name} {100 * cone.area_ratio:.0f} %"
+        for name, cone in (("inside", inner), ("outside", outer))
+    )
+    weakest = (
+        f"weakest {inner.mu_facet:.2f} inside, strongest "
+        f"{np.linalg.norm(outer.rays[0, :2]):.2f} outside"
+    )
+    return _svg(
+        drawn + circle, f"{facets} facets from above; forwards is up", f"area: {areas}", weakest
+    )
 
 
 def compass_row(**stances: WrenchSet) -> Figure:
-    """Compasses side by side, in one scale: title=the wrenches of a stance. "_" in a title shows as a blank."""
+    """Compasses side by side, in one scale: title=the wrenches of a stance. "_" in a title shows as
+    a blank.
+    """
     polar = {"projection": "polar"}
     figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 5.0), subplot_kw=polar)
     axes = np.atleast_1d(grid)
     for axis, (title, wrenches) in zip(axes, stances.items(), strict=True):
-        push_recovery_plots.plot_horizontal_force_limits(wrenches, axis, n=48).set_title(title.replace("_", " "), pad=14)
+        push_recovery_plots.plot_horizontal_force_limits(wrenches, axis, n=48).set_title(
+            title.replace("_", " "), pad=14
+        )
     most = max(axis.get_rmax() for axis in axes)
     for axis in axes:
         axis.set_rlim(0.0, most)
-        axis.set_xticks(np.pi / 2 * np.arange(4), ["x", "y", "-x", ""])  # the last would lie upon its neighbour's
+        axis.set_xticks(
+            np.pi / 2 * np.arange(4), ["x", "y", "-x", ""]
+        )  # the last would lie upon its neighbour's
         axis.get_legend().remove()
     figure.subplots_adjust(left=0.05, right=0.97, bottom=0.14, top=0.84, wspace=0.25)
-    figure.supxlabel("horizontal force at full weight without moment [N], from above", fontsize="medium")
+    figure.supxlabel(
+        "horizontal force at full weight without moment [N], from above", fontsize="medium"
+    )
     plt.close(figure)
     return figure
 
 
 def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> str:
-    """Draw a robot on a slope, with cones and planned forces of a controller that believes in another; the true lean as text.
+    """Draw a robot on a slope, with cones and planned forces of a controller that believes in
+    another; the true lean as text.
 
     slope, believed: degrees, up towards x.
     """
@@ -95,14 +132,22 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start), facets=facets)
     planned = controller(start.q, start.v).forces
     front, rear = friction_ratios(planned, n)[[0, 2]]
-    picture = view.painter.picture(start, fb.Contacts.points(robot, normals=n), planned=planned, cones=False)
+    picture = view.painter.picture(
+        start, fb.Contacts.points(robot, normals=n), planned=planned, cones=False
+    )
     drawn = view.painter.picture(start, contacts, planned=planned)
-    view.draw(picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"})
-    return f"planned lean from the true normal: front {front:.2f}, rear {rear:.2f}; the ground holds 0.70"
+    view.draw(
+        picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"}
+    )
+    return (
+        f"planned lean from the true normal: front {front:.2f}, rear {rear:.2f}; the ground "
+        f"holds 0.70"
+    )
 
 
 def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
-    """Draw a robot that stands on a slope, turned with it; from above, as SVG, where its centre of mass may be.
+    """Draw a robot that stands on a slope, turned with it; from above, as SVG, where its centre of
+    mass may be.
 
     slope: degrees, up towards x. mu, facets: of its friction polyhedra.
     """
@@ -121,17 +166,25 @@ def slope_normal(degrees: float) -> Array:
 
 
 def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
-    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the surface of its cone."""
+    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the
+    surface of its cone.
+    """
     parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
     return np.array([part.alpha_par / part.alpha_perp for part in parts])
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:
-    """From above, as SVG: where the centre of mass may be (filled), the hull of the feet (dashed), and where it is (dot).
+    """From above, as SVG: where the centre of mass may be (filled), the hull of the feet (dashed),
+    and where it is (dot).
 
-    feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none says nowhere.
+    feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none
+        says nowhere.
     """
-    half, s, middle = DRAWING_SIZE / 2, DRAWING_SIZE / 0.6, feet[:, :2].mean(axis=0)  # s: pixels for 1 m
+    half, s, middle = (
+        DRAWING_SIZE / 2,
+        DRAWING_SIZE / 0.6,
+        feet[:, :2].mean(axis=0),
+    )  # s: pixels for 1 m
 
     def seen(points: Array) -> Array:
         return half + s * _to_pixels(np.asarray(points) - middle)
@@ -141,27 +194,44 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
     if len(region) > 2:
         drawn += _polygon(seen(region), "", 0.35)
     x, y = seen(state.com[None, :2])[0]
-    dots = "".join(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>' for a, b in seen(feet[:, :2]))
-    dots += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hex_code(GREYS[1])}" stroke="currentColor"/>'
-    return _svg(drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM")
+    dots = "".join(
+        f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>'
+        for a, b in seen(feet[:, :2])
+    )
+    dots += (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hex_code(GREYS[1])}" '
+        f'stroke="currentColor"/>'
+    )
+    return _svg(
+        drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM"
+    )
 
 
 def _to_pixels(points: Array) -> Array:
-    """Where horizontal places, shape (n, 2) or more, are in a drawing with x upwards and y to the left."""
+    """Where horizontal places, shape (n, 2) or more, are in a drawing with x upwards and y to the
+    left.
+    """
     return np.column_stack([-points[:, 1], -points[:, 0]])
 
 
 def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
     points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
     fill = f'fill="{grey}" fill-opacity="{0 if dashes else opacity}"'
-    return f'<polygon points="{points}" {fill} stroke="{grey}" stroke-width="2" stroke-dasharray="{dashes}"/>'
+    return (
+        f'<polygon points="{points}" {fill} stroke="{grey}" stroke-width="2" '
+        f'stroke-dasharray="{dashes}"/>'
+    )
 
 
 def _svg(drawn: str, *lines: str) -> str:
     words = "".join(
-        f'<text x="{DRAWING_SIZE / 2}" y="{DRAWING_SIZE + 18 + 18 * i}" text-anchor="middle" font-size="13">{line}</text>'
+        f'<text x="{DRAWING_SIZE / 2}" y="{DRAWING_SIZE + 18 + 18 * i}" text-anchor="middle" '
+        f'font-size="13">{line}</text>'
         for i, line in enumerate(lines)
     )
     box = f'<svg x="0" y="0" width="{DRAWING_SIZE}" height="{DRAWING_SIZE}">{drawn}</svg>'
     height = DRAWING_SIZE + 18 * len(lines) + 10
-    return f'<svg width="300" viewBox="-25 0 300 {height}" style="max-width: 100%" fill="currentColor">{box}{words}</svg>'
+    return (
+        f'<svg width="300" viewBox="-25 0 300 {height}" style="max-width: 100%" '
+        f'fill="currentColor">{box}{words}</svg>'
+    )

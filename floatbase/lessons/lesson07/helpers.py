@@ -1,4 +1,6 @@
-"""Lesson 07, Control as a quadratic program: pushes on the physics, and controllers whose rows were added or taken away."""
+"""Lesson 07, Control as a quadratic program: pushes on the physics, and controllers whose rows were
+added or taken away.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ LEFT = np.array([0.0, 1.0, 0.0])
 
 
 class WithoutInequalities:
-    """A controller from which the inequality rows of some kinds were taken away: its QP without them, at every tick.
+    """A controller from which the inequality rows of some kinds were taken away: its QP without
+    them, at every tick.
 
     controller: the controller. kinds: "friction", "normal force" and others, as of `QP.without`.
     """
@@ -54,11 +57,15 @@ class WithConstraints:
         """The QP of one tick."""
         qp, costs = self.constraints.qp(eom.state), self.costs.objective(eom)
         H, g = block_diag(*(cost.H for cost in costs)), np.concatenate([cost.g for cost in costs])
-        return fb.QP(H, g, qp.A, qp.b, qp.G, qp.h, qp.equality_names, qp.inequality_names, qp.blocks)
+        return fb.QP(
+            H, g, qp.A, qp.b, qp.G, qp.h, qp.equality_names, qp.inequality_names, qp.blocks
+        )
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques for configuration q and velocity v."""
-        solution = fb.solve(self.qp(fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)))
+        solution = fb.solve(
+            self.qp(fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts))
+        )
         return TorqueCommand(solution["tau"], solution["forces"])
 
 
@@ -74,7 +81,9 @@ def run_with_push(controller: Controller, newtons: float, duration: float = 0.6)
 def make_controller() -> fb.WholeBodyController:
     """Motion, forces and torques in one QP: the controller whose push rose ends the lesson."""
     state = standing_go2_eom().state
-    return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state))
+    return fb.WholeBodyController(
+        state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state)
+    )
 
 
 def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
@@ -90,15 +99,21 @@ def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
 
 @cache
 def leaning_controller(mu: float) -> fb.WholeBodyController:
-    """The controller of exercise 07.3, for a coefficient of friction: 8 facets, and more wish than friction gives."""
+    """The controller of exercise 07.3, for a coefficient of friction: 8 facets, and more wish than
+    friction gives.
+    """
     state = standing_go2_eom().state
     wish = fb.CoMTask(state.com, acceleration=[6.0, 0.0, 0.0])
     contacts = fb.Contacts.points(state.robot, mu=mu)
-    return fb.WholeBodyController(state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8)
+    return fb.WholeBodyController(
+        state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8
+    )
 
 
 def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
-    """The controller of exercise 07.4: gains and weight of the centre of mass, and the weight of the posture."""
+    """The controller of exercise 07.4: gains and weight of the centre of mass, and the weight of
+    the posture.
+    """
     state = standing_go2_eom().state
     com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)
     tasks = [com, fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]

@@ -1,4 +1,6 @@
-"""Lesson 07, Control as a quadratic program: rounds of a solver, ways of the centre of mass, and rows by name."""
+"""Lesson 07, Control as a quadratic program: rounds of a solver, ways of the centre of mass, and
+rows by name.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ _MAX_LISTED = 4  # rows that a note lists
 
 
 def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figure:
-    """Rounds of the active-set method in each tick. ms: (n,), the time of each. rounds: how it started -> (n,) numbers."""
+    """Rounds of the active-set method in each tick. ms: (n,), the time of each. rounds: how it
+    started -> (n,) numbers.
+    """
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(rounds.items(), GREYS[:2], _STYLES, strict=False):
         ax.plot(ms, numbers, style, color=hex_code(colour), label=name, linewidth=2)
@@ -31,14 +35,18 @@ def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figur
 
 
 def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
-    """How far the centre of mass is from where it was first, and each foot at most. records: name -> record."""
+    """How far the centre of mass is from where it was first, and each foot at most. records: name
+    -> record.
+    """
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.2), layout="constrained")
     for (name, record), colour, style in zip(records.items(), GREYS, _STYLES, strict=False):
         feet = np.linalg.norm(record.foot_positions - record.foot_positions[0], axis=2).max(axis=1)
         com = np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
         for ax, away in zip(axes, (com, feet), strict=True):
             ax.plot(record.time, 1e3 * away, style, color=hex_code(colour), label=name, linewidth=2)
-    for ax, title in zip(axes, ("centre of mass, away [mm]", "foot that strayed most [mm]"), strict=True):
+    for ax, title in zip(
+        axes, ("centre of mass, away [mm]", "foot that strayed most [mm]"), strict=True
+    ):
         ax.set(xlabel="time [s]", title=title, ylim=(0, None))
         ax.grid(alpha=0.3)
     axes[0].legend()
@@ -51,4 +59,6 @@ def multiplier_text(solution: Solution) -> str:
     prices = sorted(solution.multipliers.items(), key=lambda row: -row[1])
     shown = [f"{name} {rounded(price)}" for name, price in prices if price > 1e-3]
     more = f" and {len(shown) - _MAX_LISTED} more" if len(shown) > _MAX_LISTED else ""
-    return "dearest rows: " + ", ".join(shown[:_MAX_LISTED]) + more if shown else "no row has a price"
+    return (
+        "dearest rows: " + ", ".join(shown[:_MAX_LISTED]) + more if shown else "no row has a price"
+    )

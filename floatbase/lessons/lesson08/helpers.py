@@ -1,4 +1,6 @@
-"""Lesson 08, Standing, shifting, stepping, walking: bodies that move over feet that stay, what a record says, crawls."""
+"""Lesson 08, Standing, shifting, stepping, walking: bodies that move over feet that stay, what a
+record says, crawls.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,17 @@ _ROW_STEP = 3  # rows of a record from one look at the margin to the next: 12 ms
 
 
 def make_controller() -> Stand:
-    """Standing, and trotting on the spot when it must: the controller whose push rose ends the lesson."""
+    """Standing, and trotting on the spot when it must: the controller whose push rose ends the
+    lesson.
+    """
     robot = fb.load("go2")
     return Stand(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
 
 
 def state_with_moved_body(state: fb.State, move: npt.ArrayLike) -> fb.State:
-    """The state with the body moved by (3,) m while all feet stay. Raises `InputError` for what the legs do not reach."""
+    """The state with the body moved by (3,) m while all feet stay. Raises `InputError` for what the
+    legs do not reach.
+    """
     feet = {foot.frame: state.frame_pose(foot.frame).translation for foot in state.robot.feet}
     return state_with_feet_at(state.robot, state.q[:3] + np.asarray(move), feet)
 
@@ -39,7 +45,9 @@ def state_with_moved_body(state: fb.State, move: npt.ArrayLike) -> fb.State:
 def uneven_stance() -> fb.State:
     """go2 with its RR foot further back than it stands usually."""
     state = standing_go2_eom().state
-    feet = {foot.frame: np.array(state.frame_pose(foot.frame).translation) for foot in state.robot.feet}
+    feet = {
+        foot.frame: np.array(state.frame_pose(foot.frame).translation) for foot in state.robot.feet
+    }
     feet["RR_foot"][0] -= FOOT_SETBACK
     return state_with_feet_at(state.robot, state.q[:3], feet)
 
@@ -53,7 +61,8 @@ def run_go2(
 ) -> Rollout:
     """The record of go2 on the physics, pushed at the base for 0.1 s.
 
-    controller: of go2. seconds: of the record. push: (3,) N, world; none by default. start: s, of the push.
+    controller: of go2. seconds: of the record. push: (3,) N, world; none by default. start: s, of
+        the push.
     period: s, between two ticks.
     """
     pushes = [fb.Push(np.asarray(push, dtype=np.float64), start)] if np.any(push) else []
@@ -74,14 +83,20 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
 
 
 def torque_jump(record: Rollout) -> float:
-    """The jump of a torque from one tick to the next where a foot lifts, N·m: the largest of all joints, median of lifts."""
+    """The jump of a torque from one tick to the next where a foot lifts, N·m: the largest of all
+    joints, median of lifts.
+    """
     counts = [len(record.contacts_at(i)) for i in range(len(record))]
     lifts = [i for i in range(1, len(record)) if counts[i] < counts[i - 1]]
-    return float(np.median([np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in lifts]))
+    return float(
+        np.median([np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in lifts])
+    )
 
 
 def smallest_support_margin(record: Rollout) -> float:
-    """The least distance of the centre of mass from the edge of the feet that stand, seen from above, m."""
+    """The least distance of the centre of mass from the edge of the feet that stand, seen from
+    above, m.
+    """
     names = record.contacts.names
     margins = []
     for i in range(0, len(record), _ROW_STEP):
@@ -92,21 +107,33 @@ def smallest_support_margin(record: Rollout) -> float:
 
 @cache
 def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
-    """The record of a crawl by `Walk`, 6 s long. swing, pause: s, as of `Gait.crawl`. forwards: m/s."""
+    """The record of a crawl by `Walk`, 6 s long. swing, pause: s, as of `Gait.crawl`. forwards:
+    m/s.
+    """
     robot = standing_go2_eom().robot
     gait = Gait.crawl(robot, swing, pause, start=0.5)
-    return run_go2(Walk(robot, fb.Contacts.points(robot, mu=MU), gait, (forwards, 0.0)), CRAWL_DURATION, period=SLOW_PERIOD)
+    return run_go2(
+        Walk(robot, fb.Contacts.points(robot, mu=MU), gait, (forwards, 0.0)),
+        CRAWL_DURATION,
+        period=SLOW_PERIOD,
+    )
 
 
 def opposite_foot(foot: str) -> str:
     """The foot on the other diagonal, across: the one that lies opposite."""
-    return {"FL_foot": "RR_foot", "FR_foot": "RL_foot", "RL_foot": "FR_foot", "RR_foot": "FL_foot"}[foot]
+    return {"FL_foot": "RR_foot", "FR_foot": "RL_foot", "RL_foot": "FR_foot", "RR_foot": "FL_foot"}[
+        foot
+    ]
 
 
-def shortest_com_shift(state: fb.State, foot: str, to: Callable[[Array], Array] | None = None) -> Array:
-    """The shortest way of the centre of mass, (2,) m, after which a foot's opposite carries nothing when it lifts.
+def shortest_com_shift(
+    state: fb.State, foot: str, to: Callable[[Array], Array] | None = None
+) -> Array:
+    """The shortest way of the centre of mass, (2,) m, after which a foot's opposite carries nothing
+    when it lifts.
 
-    to: exchanges the point from which it is measured, for mistakes: the centre of mass, (2,) m, to another point.
+    to: exchanges the point from which it is measured, for mistakes: the centre of mass, (2,) m, to
+        another point.
     """
     contacts = fb.Contacts.points(state.robot)
     feet = dict(zip(contacts.names, contacts.positions(state)[:, :2], strict=True))

@@ -1,4 +1,6 @@
-"""Lesson 08, Standing, shifting, stepping, walking: triangles from above, a falling pendulum, footholds, two robots to push."""
+"""Lesson 08, Standing, shifting, stepping, walking: triangles from above, a falling pendulum,
+footholds, two robots to push.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,20 @@ _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
 _PATCH_HEIGHT = 0.003  # m above the ground: no flicker with its lines
 _MAX_PUSH = 600.0  # N: the hardest push of the panel
-_RECORDED_PUSHES = (150.0, 250.0, 350.0)  # N: what both stand, what only steps save, what they save to the side only
-_HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")  # below each other where a page is narrow
+_RECORDED_PUSHES = (
+    150.0,
+    250.0,
+    350.0,
+)  # N: what both stand, what only steps save, what they save to the side only
+_HALF_WIDTH = widgets.Layout(
+    flex="1 1 45%", min_width="min(260px, 100%)"
+)  # below each other where a page is narrow
 
 
 def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
-    """From above, side by side: where the centre of mass may be with each of these feet lifted, and where it is."""
+    """From above, side by side: where the centre of mass may be with each of these feet lifted, and
+    where it is.
+    """
     feet = contacts.positions(state)
     drawn = ""
     for foot in lifted:
@@ -45,11 +55,20 @@ def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str)
 
 
 def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
-    """The distance of the centre of mass from the line of two feet, m, over time, s, and that of the pendulum of ω, 1/s."""
+    """The distance of the centre of mass from the line of two feet, m, over time, s, and that of
+    the pendulum of ω, 1/s.
+    """
     t, d = np.asarray(time), np.asarray(away)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     ax.plot(t, 1e3 * d, color=hex_code(GREYS[0]), linewidth=2, label="MuJoCo")
-    ax.plot(t, 1e3 * d[0] * np.cosh(omega * t), "--", color=hex_code(GREYS[1]), linewidth=2, label="pendulum, d cosh ωt")
+    ax.plot(
+        t,
+        1e3 * d[0] * np.cosh(omega * t),
+        "--",
+        color=hex_code(GREYS[1]),
+        linewidth=2,
+        label="pendulum, d cosh ωt",
+    )
     ax.set(xlabel="time [s]", ylabel="away from the line [mm]", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()
@@ -58,8 +77,12 @@ def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -
 
 
 def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
-    """The normal force of one foot, planned and measured, N, from begin to end, s. records: title -> record."""
-    figure, axes = plt.subplots(1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained")
+    """The normal force of one foot, planned and measured, N, from begin to end, s. records: title
+    -> record.
+    """
+    figure, axes = plt.subplots(
+        1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained"
+    )
     for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
         rows = (record.time >= begin) & (record.time <= end)
         for kind, colour, width in (("planned", PLANNED, 3.5), ("measured", MEASURED, 1.2)):
@@ -74,7 +97,8 @@ def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end
 
 
 def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a patch, others a label.
+    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a
+    patch, others a label.
 
     Two feet have the line between them, too.
     """
@@ -84,26 +108,38 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
     for name, place in places.items():
         at = np.array([*np.asarray(place, dtype=np.float64)[:2], _PATCH_HEIGHT])
         foot = name in feet
-        picture[f"place/{name}"] = shapes.contact_patch(at, _VERTICAL, _SIZES["foothold" if foot else "point"])
+        picture[f"place/{name}"] = shapes.contact_patch(
+            at, _VERTICAL, _SIZES["foothold" if foot else "point"]
+        )
         if not foot:
             picture[f"label/{name}"] = shapes.label(at + aside, name, 0.035)
             aside = aside * [1.0, -1.0, 1.0]
-    ends = [np.array([*np.asarray(places[name], dtype=np.float64)[:2], _PATCH_HEIGHT]) for name in places if name in feet]
+    ends = [
+        np.array([*np.asarray(places[name], dtype=np.float64)[:2], _PATCH_HEIGHT])
+        for name in places
+        if name in feet
+    ]
     if len(ends) == 2:
         way = ends[1] - ends[0]
         length = float(np.linalg.norm(way))
-        picture["line"] = shapes.rod(ends[0], geometry.rotation_with_z_axis(way / length), length, _PATCH_HEIGHT, GREYS[1])
+        picture["line"] = shapes.rod(
+            ends[0], geometry.rotation_with_z_axis(way / length), length, _PATCH_HEIGHT, GREYS[1]
+        )
     return picture
 
 
 class PushComparison(widgets.VBox):
-    """Robots side by side, each with a controller of its own, pushed alike by one handle. Nothing moves before the first push.
+    """Robots side by side, each with a controller of its own, pushed alike by one handle. Nothing
+    moves before the first push.
 
     controllers: title -> controller; each has a `robot`.
     """
 
     def __init__(self, controllers: Mapping[str, Any]):
-        self.views = {title: fb.Viewer(one.robot, height=300, follow=True) for title, one in controllers.items()}
+        self.views = {
+            title: fb.Viewer(one.robot, height=300, follow=True)
+            for title, one in controllers.items()
+        }
         self.runs: dict[str, LiveSimulation] = {}
         self.lines = {title: widgets.Label(value="paused") for title in controllers}
         for title, one in controllers.items():
@@ -113,12 +149,18 @@ class PushComparison(widgets.VBox):
             self.runs[title].on_status(partial(self._tell, title))
         self.force = _slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
         self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
-        self.push_button, self.reset_button = widgets.Button(description="push both"), widgets.Button(description="reset")
+        self.push_button, self.reset_button = (
+            widgets.Button(description="push both"),
+            widgets.Button(description="reset"),
+        )
         self.push_button.on_click(lambda _: self.push())
         self.reset_button.on_click(lambda _: self.reset())
         self._pictures = {title: widgets.VBox() for title in controllers}
         columns = [
-            widgets.VBox([widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]], layout=_HALF_WIDTH)
+            widgets.VBox(
+                [widgets.HTML(f"<b>{title}</b>"), self._pictures[title], self.lines[title]],
+                layout=_HALF_WIDTH,
+            )
             for title in controllers
         ]
         buttons = widgets.HBox([self.push_button, self.reset_button])
@@ -148,17 +190,31 @@ class PushComparison(widgets.VBox):
         super().close()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The pictures are put in only here, as those of a slider panel; a site has some recorded pushes of both."""
+        """The pictures are put in only here, as those of a slider panel; a site has some recorded
+        pushes of both.
+        """
         if display_mode() == "site":
-            titles = {title: (self.views[title], run.sim, run.controller) for title, run in self.runs.items()}
+            titles = {
+                title: (self.views[title], run.sim, run.controller)
+                for title, run in self.runs.items()
+            }
             return recorded_pushes(titles, _RECORDED_PUSHES, ["forwards", "to the left"])
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
         return with_thumbnail(
-            super()._repr_mimebundle_(**kwargs), *(picture.children[0] for picture in self._pictures.values())
+            super()._repr_mimebundle_(**kwargs),
+            *(picture.children[0] for picture in self._pictures.values()),
         )
 
 
 def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
     layout = widgets.Layout(width="60%", min_width="min(340px, 100% - 4px)")
-    return widgets.FloatSlider(value=first, min=low, max=high, step=step, description=text, readout_format=".0f", layout=layout)
+    return widgets.FloatSlider(
+        value=first,
+        min=low,
+        max=high,
+        step=step,
+        description=text,
+        readout_format=".0f",
+        layout=layout,
+    )

@@ -13,7 +13,14 @@ from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict, array_or_verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    array_or_verdict,
+)
 from floatbase.lessons.lesson09.helpers import (
     LEAN_START,
     MU,
@@ -28,33 +35,48 @@ from floatbase.linear_algebra import rank
 from floatbase.simulation import Rollout
 
 ANKLE = 0.107  # m: height of the sensor of exercise 09.1 above the sole
-CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12.0, 9.0, 90.0))  # N, of exercise 09.1
+CORNER_FORCES = (
+    (30.0, 5.0, 210.0),
+    (24.0, -6.0, 120.0),
+    (14.0, 2.0, 60.0),
+    (12.0, 9.0, 90.0),
+)  # N, of exercise 09.1
 LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
 ROUND = 360  # facets that stand for a round cone: they miss 4e-5 of it
 LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09.4 asks for
 _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little holds arms and trunk
 
 
-# 09.1 ---------------------------------------------------------------------------------------------------------------------
+# 09.1 ---------------------------------------------------------------------------------------------
 
 
 @cache
 def ankle_sensor_reading() -> Array:
-    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about itself, N·m, world."""
+    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about
+    itself, N·m, world.
+    """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
-    return contact_wrench(state, sole, np.array(CORNER_FORCES), state.point("left_sole_link") + [0.0, 0.0, ANKLE])
+    return contact_wrench(
+        state, sole, np.array(CORNER_FORCES), state.point("left_sole_link") + [0.0, 0.0, ANKLE]
+    )
 
 
 def _pushed() -> Array:
-    """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from the point below the sensor."""
+    """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from
+    the point below the sensor.
+    """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
-    return (centre_of_pressure(state, sole, np.array(CORNER_FORCES)) - state.point("left_sole_link"))[:2]
+    return (
+        centre_of_pressure(state, sole, np.array(CORNER_FORCES)) - state.point("left_sole_link")
+    )[:2]
 
 
 def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
-    """The centre of pressure from the sensor. height: which is added to the moments as height · force, m."""
+    """The centre of pressure from the sensor. height: which is added to the moments as height ·
+    force, m.
+    """
 
     def value() -> Array:
         fx, fy, fz, tx, ty, _ = ankle_sensor_reading()
@@ -64,7 +86,7 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
     return value
 
 
-# 09.2 ---------------------------------------------------------------------------------------------------------------------
+# 09.2 ---------------------------------------------------------------------------------------------
 
 
 @cache
@@ -72,7 +94,9 @@ def _new_soles() -> fb.Contacts:
     """Two soles with six corners each."""
     angles = np.pi / 3 * np.arange(6)
     corners = np.column_stack([0.1 * np.cos(angles), 0.06 * np.sin(angles), np.zeros(6)])
-    return fb.Contacts([FlatFootContact(name, corners) for name in ("left_sole_link", "right_sole_link")])
+    return fb.Contacts(
+        [FlatFootContact(name, corners) for name in ("left_sole_link", "right_sole_link")]
+    )
 
 
 def _counted() -> Array:
@@ -82,7 +106,7 @@ def _counted() -> Array:
     return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
 
 
-# 09.3 ---------------------------------------------------------------------------------------------------------------------
+# 09.3 ---------------------------------------------------------------------------------------------
 
 
 def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
@@ -93,15 +117,19 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
     return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
 
 
-# 09.4 ---------------------------------------------------------------------------------------------------------------------
+# 09.4 ---------------------------------------------------------------------------------------------
 
 
 @cache
 def run_lean(seconds: float, posture: float) -> Rollout:
-    """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the posture."""
+    """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the
+    posture.
+    """
     controller = leaning_controller(LEAN, seconds, posture)
     ticks = int(np.ceil((LEAN_START + seconds + TIME_AFTER_LEAN) / SLOW_PERIOD))
-    return fb.rollout(fb.Simulation(load_talos()), controller, ticks * SLOW_PERIOD, control_period=SLOW_PERIOD)
+    return fb.rollout(
+        fb.Simulation(load_talos()), controller, ticks * SLOW_PERIOD, control_period=SLOW_PERIOD
+    )
 
 
 def _judge_lean(answer: Any) -> Verdict:
@@ -111,7 +139,9 @@ def _judge_lean(answer: Any) -> Verdict:
         return given
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
-        return Verdict(False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range")
+        return Verdict(
+            False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range"
+        )
     try:
         record = run_lean(seconds, posture)
     except InputError as error:
@@ -119,19 +149,30 @@ def _judge_lean(answer: Any) -> Verdict:
     if record.outcome != "completed":
         why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
         return Verdict(
-            False, f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.{why}", "falls"
+            False,
+            f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the "
+            f"start.{why}",
+            "falls",
         )
     return _judge_record(record, seconds)
 
 
 def _judge_record(record: Rollout, seconds: float) -> Verdict:
-    """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how long it took."""
+    """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how
+    long it took.
+    """
     settled = record.time > 0.1  # the robot is put down at first
-    toes, heels = record.foot_positions[..., 0].max(axis=1), record.foot_positions[..., 0].min(axis=1)
+    toes, heels = (
+        record.foot_positions[..., 0].max(axis=1),
+        record.foot_positions[..., 0].min(axis=1),
+    )
     pushed = centre_of_pressure_path(record)[:, 0]
     if np.isnan(pushed[settled]).any():
         return Verdict(
-            False, "For a moment no corner touches the ground. Arms and trunk are thrown about: what holds them?", "in_the_air"
+            False,
+            "For a moment no corner touches the ground. Arms and trunk are thrown about: what "
+            "holds them?",
+            "in_the_air",
         )
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
@@ -140,35 +181,55 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     told += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
     told += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
-        return Verdict(False, f"It tips: {told}. At an edge the sole has nothing left to push with.", "tips")
+        return Verdict(
+            False, f"It tips: {told}. At an edge the sole has nothing left to push with.", "tips"
+        )
     if ahead < EDGE and abs(short) > NEAR:
-        return Verdict(False, f"Too near to the toes, and it does not get there either: {told}.", "toes_and_short")
+        return Verdict(
+            False,
+            f"Too near to the toes, and it does not get there either: {told}.",
+            "toes_and_short",
+        )
     if ahead < EDGE:
-        return Verdict(False, f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?", "toes")
+        return Verdict(
+            False,
+            f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?",
+            "toes",
+        )
     if short > NEAR:
-        return Verdict(False, f"It does not get there: {told}. Another wish holds it back.", "short")
+        return Verdict(
+            False, f"It does not get there: {told}. Another wish holds it back.", "short"
+        )
     if short < -NEAR:
-        return Verdict(False, f"It goes beyond: {told}. Nothing brakes the rest of the body.", "beyond")
+        return Verdict(
+            False, f"It goes beyond: {told}. Nothing brakes the rest of the body.", "beyond"
+        )
     if seconds > QUICK:
         slow = rounded(seconds, "s", digits=3)
-        return Verdict(False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.", "slow")
+        return Verdict(
+            False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.", "slow"
+        )
     return Verdict(True, f"On the physics: {told}.")
 
 
 def _leans() -> list[Example]:
     return [
-        ((1.5, 0.01), ""), ((1.45, 0.02), ""), ((1.0, 0.1), "toes_and_short"), ((0.6, 0.01), "tips"), ((1.1, 0.01), "toes"),
-        ((1.3, 0.1), "short"), ((3.0, 0.01), "slow"), ((-1.0, 0.1), "range"), ((1.0, -0.1), "range"),
+        ((1.5, 0.01), ""), ((1.45, 0.02), ""), ((1.0, 0.1), "toes_and_short"),
+        ((0.6, 0.01), "tips"), ((1.1, 0.01), "toes"),
+        ((1.3, 0.1), "short"), ((3.0, 0.01), "slow"), ((-1.0, 0.1), "range"),
+        ((1.0, -0.1), "range"),
     ]  # fmt: skip
 
 
 EXERCISES = (
     Exercise(
         name="09.1",
-        statement="The centre of pressure of the left sole, shape (2,), m, from the point below the sensor: a sensor in the "
+        statement="The centre of pressure of the left sole, shape (2,), m, from the point below "
+        "the sensor: a sensor in the "
         "ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N and N·m, world, about itself.",
         stub="pushed_at = np.zeros(2)  # replace: forwards and to the left, m",
-        solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - 0.107 * fy]) / fz",
+        solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - "
+        "0.107 * fy]) / fz",
         judge=NumericJudge(
             right=_pushed,
             praise="The tangential force has a lever as long as the ankle is high.",
@@ -179,18 +240,30 @@ EXERCISES = (
                 "swapped": _read(swap=True),
                 "no_height_swapped": _read(0.0, swap=True),
                 "sign": lambda: (
-                    np.array([ankle_sensor_reading()[4] + ANKLE * ankle_sensor_reading()[0], -ankle_sensor_reading()[3] + ANKLE * ankle_sensor_reading()[1]])
+                    np.array(
+                        [
+                            ankle_sensor_reading()[4] + ANKLE * ankle_sensor_reading()[0],
+                            -ankle_sensor_reading()[3] + ANKLE * ankle_sensor_reading()[1],
+                        ]
+                    )
                     / ankle_sensor_reading()[2]
                 ),
                 "millimetres": lambda: 1e3 * _pushed(),
                 "not_divided": lambda: _pushed() * ankle_sensor_reading()[2],
-                "whole_force": lambda: _pushed() * ankle_sensor_reading()[2] / np.linalg.norm(ankle_sensor_reading()[:3]),
+                "whole_force": lambda: (
+                    _pushed()
+                    * ankle_sensor_reading()[2]
+                    / np.linalg.norm(ankle_sensor_reading()[:3])
+                ),
             },
             hints={
                 "zero": "Nothing there yet: that is the point below the sensor.",
-                "no_height": "The ankle's height is missing: the formula of the lesson is about a point on the ground.",
-                "height_sign": "The height goes in with the wrong sign: the ground is below the sensor.",
-                "swapped": "x and y are swapped: a push that is further ahead makes a moment about y.",
+                "no_height": "The ankle's height is missing: the formula of the lesson is about a "
+                "point on the ground.",
+                "height_sign": "The height goes in with the wrong sign: the ground is below the "
+                "sensor.",
+                "swapped": "x and y are swapped: a push that is further ahead makes a moment about "
+                "y.",
                 "no_height_swapped": "Height forgotten, and x and y swapped.",
                 "sign": "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).",
                 "millimetres": "That is in mm.",
@@ -199,18 +272,21 @@ EXERCISES = (
             },
         ),
         examples=lambda: [(np.round(_pushed(), 5), "")],
-        explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y and τ_y + h f_x.",
+        explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y "
+        "and τ_y + h f_x.",
     ),
     Exercise(
         name="09.2",
-        statement="Talos gets soles with six corners each. Three numbers: dimensions of λ that move nothing and that no torque "
+        statement="Talos gets soles with six corners each. Three numbers: dimensions of λ that "
+        "move nothing and that no torque "
         "feels; dimensions of λ that do not push the base; dimension of all motions, dim β.",
         stub="counted = np.array([12, 18, 44])  # of the lesson; replace all three",
         solution="k, r, d = 36, 12, 32\ncounted = np.array([k - r, k - 6, d + k - r])",
         judge=ShapeJudge(
             NumericJudge(
                 right=_counted,
-                praise="More corners add nothing to what a sole can do, only to what nobody can know.",
+                praise="More corners add nothing to what a sole can do, only to what nobody can "
+                "know.",
                 tolerance=1e-6,
                 is_count=True,
                 mistakes={
@@ -227,11 +303,14 @@ EXERCISES = (
                     "four_corners": "That is for four corners each.",
                     "one_sole": "That is one sole: there are two.",
                     "rank": "J has rank 12, however many corners a rigid sole has.",
-                    "rows_of_corners": "Rows of corners are no rows of motion: J has 36 rows and rank 12.",
+                    "rows_of_corners": "Rows of corners are no rows of motion: J has 36 rows and "
+                    "rank 12.",
                     "swapped": "The first two are swapped.",
                     "beta": "The first two are right. dim β = d + k - r, with k = 36.",
-                    "base_twelve": "The first and the last are right. What the base feels has six dimensions, not twelve.",
-                    "length_of_forces": "36 is the length of λ; what is left once each sole's six numbers are taken off?",
+                    "base_twelve": "The first and the last are right. What the base feels has six "
+                    "dimensions, not twelve.",
+                    "length_of_forces": "36 is the length of λ; what is left once each sole's six "
+                    "numbers are taken off?",
                 },
             ),
             {(): "Three numbers are asked for: np.array([…, …, …])."},
@@ -240,7 +319,8 @@ EXERCISES = (
     ),
     Exercise(
         name="09.3",
-        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm bears on a floor of μ = 0.6, pressed with 400 N in its "
+        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm bears on a floor of μ = "
+        "0.6, pressed with 400 N in its "
         "middle, without a sideways force, by four corners with round cones.",
         stub="largest_twist = 0.0  # N·m; replace by your expression",
         solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
@@ -262,29 +342,38 @@ EXERCISES = (
             },
             hints={
                 "zero": "Nothing there yet.",
-                "pyramids": "That is for pyramids with four facets inside the cones; here they are round.",
-                "half_length": "That is μ f_z times half the length: the lever of a corner goes from the middle to the corner.",
-                "half_width": "That is μ f_z times half the width: the lever of a corner goes from the middle to the corner.",
+                "pyramids": "That is for pyramids with four facets inside the cones; here they are "
+                "round.",
+                "half_length": "That is μ f_z times half the length: the lever of a corner goes "
+                "from the middle to the corner.",
+                "half_width": "That is μ f_z times half the width: the lever of a corner goes from "
+                "the middle to the corner.",
                 "whole_sides": "Half the sides, not the sides: the levers begin in the middle.",
                 "one_corner": "That is one corner; four carry.",
                 "four_times": "Four corners share the 400 N: each has 100 N.",
                 "no_mu": "μ is missing: friction gives less than the normal force.",
                 "mu_of_lesson": "That is with the μ of the lesson; here it is 0.6.",
-                "square": "Half the length plus half the width is the lever for square pyramids; use the distance.",
-                "disc": "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times its radius.",
+                "square": "Half the length plus half the width is the lever for square pyramids; "
+                "use the distance.",
+                "disc": "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times "
+                "its radius.",
             },
         ),
-        explanation="The levers of all corners are as long, so however they share the load: μ f_z times the distance.",
+        explanation="The levers of all corners are as long, so however they share the load: μ f_z "
+        "times the distance.",
     ),
     Exercise(
         name="09.4",
-        statement="Seconds for a lean of 6 cm forwards, and the weight of the posture: it ends within 2 mm of its goal, the "
+        statement="Seconds for a lean of 6 cm forwards, and the weight of the posture: it ends "
+        "within 2 mm of its goal, the "
         "centre of pressure stays 15 mm from every edge, in at most 1.5 s.",
         stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
         solution="design = np.array([1.5, 0.01])",
         judge=_judge_lean,
         examples=_leans,
-        explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over ω², which falls with the "
-        "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends where it should.",
+        explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over "
+        "ω², which falls with the "
+        "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends "
+        "where it should.",
     ),
 )

@@ -1,4 +1,6 @@
-"""Lesson 09, Feet with area: Talos held upright, where the ground pushes, a lean, and the controllers of its roses."""
+"""Lesson 09, Feet with area: Talos held upright, where the ground pushes, a lean, and the
+controllers of its roses.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from floatbase.lessons.lesson06 import constrained_minimiser
 from floatbase.simulation import Rollout
 
 MU = 0.7
-PERIOD = 2e-3  # s: a tick of the controller; 1 ms makes no difference to what the lesson shows, and takes twice as long
+# s: a tick of the controller; 1 ms makes no difference to what the lesson shows, and takes twice as
+# long
+PERIOD = 2e-3
 SLOW_PERIOD = 4e-3  # s, for long records
 PUSH_RECOVERY_WATCH_TIME = 4.0  # s: who steps may fall late
 SWING = 0.4  # s of each step after a push
@@ -51,7 +55,9 @@ def run_standing(
 
 
 def outcome_text(record: Rollout) -> str:
-    """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in words."""
+    """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in
+    words.
+    """
     x, y, _ = record.com[-1] - record.com[0]
     if record.outcome == "completed":
         return "stands"
@@ -61,29 +67,41 @@ def outcome_text(record: Rollout) -> str:
 
 
 def centre_of_pressure_path(record: Rollout) -> Array:
-    """Where the ground pushed: the centre of pressure of all points together at each row, shape (n, 2), m, world.
+    """Where the ground pushed: the centre of pressure of all points together at each row, shape (n,
+    2), m, world.
 
     NaN while nothing touches. The ground is level.
     """
     normal = record.measured[:, 2::3]
     total = np.sum(normal, axis=1)
     total = np.where(total > 0.0, total, np.nan)
-    return read_only(np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None])
+    return read_only(
+        np.einsum("ij,ijk->ik", normal, record.foot_positions[:, :, :2]) / total[:, None]
+    )
 
 
 def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
-    """Rows of a record in which one foot stands alone, and its corners there from above, shape (n, 2), m, world.
+    """Rows of a record in which one foot stands alone, and its corners there from above, shape (n,
+    2), m, world.
 
     every: of so many rows one is looked at.
     """
     stances = {i: record.contacts_at(i) for i in range(0, len(record), every)}
-    return {i: stance.positions(record.state(i))[:, :2] for i, stance in stances.items() if len(stance) == 1}
+    return {
+        i: stance.positions(record.state(i))[:, :2]
+        for i, stance in stances.items()
+        if len(stance) == 1
+    }
 
 
-def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4) -> Array:
-    """The forces at the corners of one sole, inside their pyramids, whose wrench is nearest to the one given, shape (k,), N.
+def corner_forces(
+    state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4
+) -> Array:
+    """The forces at the corners of one sole, inside their pyramids, whose wrench is nearest to the
+    one given, shape (k,), N.
 
-    Of those that make it, the smallest. wrench: shape (6,), about the origin of the sole's frame, N and N·m, world.
+    Of those that make it, the smallest. wrench: shape (6,), about the origin of the sole's frame, N
+    and N·m, world.
     facets: of each pyramid.
     """
     cones = zip(sole.normals, sole.mus, strict=True)
@@ -91,23 +109,36 @@ def corner_forces(state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, fac
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
     weights = np.repeat([1.0, 10.0], 3)  # 1 N·m counts as 10 N: at the corners, 10 cm away, it is
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
-    return constrained_minimiser(cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows)
+    return constrained_minimiser(
+        cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows
+    )
 
 
-def leaning_controller(centimetres: float, seconds: float, posture: float) -> fb.WholeBodyController:
-    """Talos moves its centre of mass forwards along a minimum-jerk path, from 0.2 s on, and stays there.
+def leaning_controller(
+    centimetres: float, seconds: float, posture: float
+) -> fb.WholeBodyController:
+    """Talos moves its centre of mass forwards along a minimum-jerk path, from 0.2 s on, and stays
+    there.
 
     centimetres: how far. seconds: how long it takes. posture: weight of the posture.
     """
     robot, state = load_talos(), load_talos().standing()
-    path = Swing(state.com, state.com + [0.01 * centimetres, 0.0, 0.0], LEAN_START, LEAN_START + seconds, 0.0)
+    path = Swing(
+        state.com, state.com + [0.01 * centimetres, 0.0, 0.0], LEAN_START, LEAN_START + seconds, 0.0
+    )
     tasks = [fb.CoMTask(path), fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
     return fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot, mu=MU), tasks)
 
 
 def make_controller() -> Stand:
-    """Talos stands on its soles, and steps when its capture point comes near their edge: its rose ends the lesson."""
-    return Stand(load_talos(), fb.Contacts.flat_feet(load_talos(), mu=MU), Gait.walk(load_talos(), swing=SWING))
+    """Talos stands on its soles, and steps when its capture point comes near their edge: its rose
+    ends the lesson.
+    """
+    return Stand(
+        load_talos(),
+        fb.Contacts.flat_feet(load_talos(), mu=MU),
+        Gait.walk(load_talos(), swing=SWING),
+    )
 
 
 def make_standing_controller() -> Stand:

@@ -1,4 +1,6 @@
-"""Lesson 09, Feet with area: soles with their corner forces and resultants, one sole's limits, and a walk from above."""
+"""Lesson 09, Feet with area: soles with their corner forces and resultants, one sole's limits, and
+a walk from above.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ _FRAME_RATE = 30.0  # 1/s: pictures of a movie
 _MAX_DISTANCE = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
 MIN_FORCE = 1.0  # N: a force that is not drawn
 _HIDDEN_PARTS = ("robot", "com", "scale")  # what is drawn of Talos beside its feet
-_BESIDE, _SIZE = (-0.1, 0.21, 0.002), 0.3  # m, world: where the scale of forces is, and the size of two feet
+_BESIDE, _SIZE = (
+    (-0.1, 0.21, 0.002),
+    0.3,
+)  # m, world: where the scale of forces is, and the size of two feet
 WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
 _LIMIT_TOLERANCE = 1e-6  # of the normal force: a wrench this near to a limit is within it
@@ -33,7 +38,8 @@ _ZERO_TOLERANCE = 1e-9  # of a row of length one: rounding
 
 
 def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Draw planned forces at the corners of soles; from above, as SVG, where each sole and both together are pushed.
+    """Draw planned forces at the corners of soles; from above, as SVG, where each sole and both
+    together are pushed.
 
     forces: at the corners, shape (k,), N, world.
     """
@@ -42,15 +48,22 @@ def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt
 
 
 def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
-    """A picture of Talos without what is above its feet, its scale of forces beside them. side: of the one foot to keep."""
+    """A picture of Talos without what is above its feet, its scale of forces beside them. side: of
+    the one foot to keep.
+    """
     feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
-    kept = {path: item for path, item in picture.items() if path.startswith(feet) or path.split("/")[0] not in _HIDDEN_PARTS}
+    kept = {
+        path: item
+        for path, item in picture.items()
+        if path.startswith(feet) or path.split("/")[0] not in _HIDDEN_PARTS
+    }
     bar = shapes.scale_bar(_BESIDE, 100.0, 100.0 * view.scale, _SIZE, view.painter.text_colour)
     return kept | prefixed("scale", bar)
 
 
 def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Soles from above, as SVG: corners as dots with their normal force as area, centres of pressure as crosses, x_c as a ring.
+    """Soles from above, as SVG: corners as dots with their normal force as area, centres of
+    pressure as crosses, x_c as a ring.
 
     forces: at the corners, shape (k,), N, world.
     """
@@ -63,20 +76,29 @@ def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike)
         drawn += _polygon(corners)
         for (x, y), normal in zip(corners, own[2::3], strict=True):
             radius = 0.8 * np.sqrt(max(float(normal), 0.0))
-            drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hex_code(PLANNED)}"/>'
+            drawn += (
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hex_code(PLANNED)}"/>'
+            )
         if own[2::3].sum() > MIN_FORCE:
             drawn += _cross(_to_pixels(centre_of_pressure(state, one, own)[None])[0], 5)
     drawn += _cross(_to_pixels(centre_of_pressure(state, contacts, flat)[None])[0], 9)
     x, y = _to_pixels(state.com[None])[0]
-    drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
+    drawn += (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hex_code(GREYS[1])}" '
+        f'stroke-width="3"/>'
+    )
     words = ("small crosses: where each sole is pushed", "large cross: both together; ring: x_c")
     return _svg(drawn, "from above; forwards is up", *words)
 
 
-def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSet, wrench: npt.ArrayLike) -> str:
-    """Draw one sole with the corner forces that make a wrench, and their sum where the ground pushes; its limits as SVG.
+def show_sole(
+    view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSet, wrench: npt.ArrayLike
+) -> str:
+    """Draw one sole with the corner forces that make a wrench, and their sum where the ground
+    pushes; its limits as SVG.
 
-    sole: contacts of one sole. limits: its wrenches about the origin of its frame. wrench: shape (6,), about that point, N and
+    sole: contacts of one sole. limits: its wrenches about the origin of its frame. wrench: shape
+        (6,), about that point, N and
     N·m, world; it presses.
     """
     w = np.asarray(wrench, dtype=np.float64)
@@ -89,27 +111,42 @@ def show_sole(view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSe
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
     possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
-    told = "corner forces exist" if possible else f"no corner forces make this: {_violated_limits(limits, w)}"
-    nearest = "" if possible else f"the nearest miss it by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
+    told = (
+        "corner forces exist"
+        if possible
+        else f"no corner forces make this: {_violated_limits(limits, w)}"
+    )
+    nearest = (
+        ""
+        if possible
+        else f"the nearest miss it by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
+    )
     return _slice(limits, w, told, nearest)
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
-    """Play a record whose plan holds a wrench for each sole, about its frame's origin: its force, where the plan wants it.
+    """Play a record whose plan holds a wrench for each sole, about its frame's origin: its force,
+    where the plan wants it.
 
     speed: 1 for real time. title: a line in the corner.
     """
-    rows = range(0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0])))))
+    rows = range(
+        0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0]))))
+    )
     pictures = []
     for i in rows:
         state = record.state(i)
         picture = view.painter.picture(state)
         for contact, wrench in zip(record.contacts, record.planned[i].reshape(-1, 6), strict=True):
             f, tau = wrench[:3], wrench[3:]
-            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > MIN_FORCE else np.full(3, np.inf)
+            ahead = (
+                np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > MIN_FORCE else np.full(3, np.inf)
+            )
             if np.linalg.norm(ahead) < _MAX_DISTANCE:
                 at = state.point(contact.name) + ahead
-                picture[f"planned/{contact.name}"] = shapes.arrow(at, view.scale * f, PLANNED, view.painter.size, halo=True)
+                picture[f"planned/{contact.name}"] = shapes.arrow(
+                    at, view.scale * f, PLANNED, view.painter.size, halo=True
+                )
         pictures.append(picture)
     view.play_pictures(record.time[list(rows)].tolist(), pictures, speed=speed, title=title)
     return view
@@ -122,46 +159,92 @@ def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
 
 
 def limit_kinds(rows: npt.ArrayLike) -> list[str]:
-    """What each row on the wrench of a level sole forbids, shape (n, 6), about the middle of the sole: its name."""
+    """What each row on the wrench of a level sole forbids, shape (n, 6), about the middle of the
+    sole: its name.
+    """
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
-    moment, twist = np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE, np.abs(R[:, 5]) > _ZERO_TOLERANCE
-    return ["twisting" if t else "tipping" if m else "sliding" for m, t in zip(moment, twist, strict=True)]
+    moment, twist = (
+        np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE,
+        np.abs(R[:, 5]) > _ZERO_TOLERANCE,
+    )
+    return [
+        "twisting" if t else "tipping" if m else "sliding"
+        for m, t in zip(moment, twist, strict=True)
+    ]
 
 
 def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
-    """As SVG: all centres of pressure along x with all twists that the sole can make at this force; the wrench as a dot."""
+    """As SVG: all centres of pressure along x with all twists that the sole can make at this force;
+    the wrench as a dot.
+    """
     half, most = 150.0, 60.0  # mm, N·m: the ends of the axes
     sx, sy = WIDE / (2 * half), HIGH / (2 * most)
     x = np.linspace(-half, half, _COLUMNS)
     many = np.tile(wrench, (len(x), 1))
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
-    room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]  # each row says: by_twist · twist ≤ room
-    up, down, free = by_twist > _ZERO_TOLERANCE, by_twist < -_ZERO_TOLERANCE, np.abs(by_twist) <= _ZERO_TOLERANCE
-    highest, lowest = (room[:, up] / by_twist[up]).min(axis=1), (room[:, down] / by_twist[down]).max(axis=1)
+    room, by_twist = (
+        -many @ limits.face_matrix.T,
+        limits.face_matrix[:, 5],
+    )  # each row says: by_twist · twist ≤ room
+    up, down, free = (
+        by_twist > _ZERO_TOLERANCE,
+        by_twist < -_ZERO_TOLERANCE,
+        np.abs(by_twist) <= _ZERO_TOLERANCE,
+    )
+    highest, lowest = (
+        (room[:, up] / by_twist[up]).min(axis=1),
+        (room[:, down] / by_twist[down]).max(axis=1),
+    )
     there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO_TOLERANCE * wrench[2], axis=1)
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])
     corners = np.column_stack([WIDE / 2 + sx * across, HIGH / 2 - sy * twist])
-    drawn = f'<path d="M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}" stroke="{hex_code(GREYS[2])}" stroke-width="1"/>'
+    drawn = (
+        f'<path d="M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}" stroke="{hex_code(GREYS[2])}" '
+        f'stroke-width="1"/>'
+    )
     drawn += _polygon(corners, 0.35) if len(corners) else ""
     at = -1e3 * wrench[4] / wrench[2], wrench[5]
-    drawn += f'<circle cx="{WIDE / 2 + sx * at[0]:.1f}" cy="{HIGH / 2 - sy * at[1]:.1f}" r="6" fill="currentColor"/>'
-    axes = f"across: centre of pressure, ±{half:.0f} mm", f"up: twist, ±{most:.0f} N·m; filled: allowed"
+    drawn += (
+        f'<circle cx="{WIDE / 2 + sx * at[0]:.1f}" cy="{HIGH / 2 - sy * at[1]:.1f}" r="6" '
+        f'fill="currentColor"/>'
+    )
+    axes = (
+        f"across: centre of pressure, ±{half:.0f} mm",
+        f"up: twist, ±{most:.0f} N·m; filled: allowed",
+    )
     return _svg(drawn, *axes, *lines)
 
 
 def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
-    """A walk from above: where x_c was, where the ground pushed, and the soles that stood. steps: `walk.history`."""
+    """A walk from above: where x_c was, where the ground pushed, and the soles that stood. steps:
+    `walk.history`.
+    """
     figure, axis = plt.subplots(figsize=(8.5, 3.0), layout="constrained")
     for step in steps:
         state = record.state(min(int(np.searchsorted(record.time, step.time)), len(record) - 1))
         for name in step.stance:
             corners = record.contacts.only(name).positions(state)[:, :2]
             label = "_" if axis.patches else "soles"
-            axis.add_patch(Polygon(corners, closed=True, color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label=label))
+            axis.add_patch(
+                Polygon(
+                    corners,
+                    closed=True,
+                    color=hex_code(GREYS[2]),
+                    alpha=0.3,
+                    linewidth=0,
+                    label=label,
+                )
+            )
     pushed, com = centre_of_pressure_path(record), record.com
-    axis.plot(pushed[:, 0], pushed[:, 1], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    axis.plot(
+        pushed[:, 0],
+        pushed[:, 1],
+        color=hex_code(GREYS[1]),
+        linewidth=1.5,
+        label="centre of pressure",
+    )
     axis.plot(com[:, 0], com[:, 1], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
@@ -170,14 +253,30 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
 
 
 def plot_lean(record: Rollout) -> Axes:
-    """Forwards and backwards through time: x_c, the centre of pressure, and between which edges of the soles it must stay."""
+    """Forwards and backwards through time: x_c, the centre of pressure, and between which edges of
+    the soles it must stay.
+    """
     figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     edges = record.foot_positions[..., 0]
     axis.fill_between(
-        record.time, edges.min(axis=1), edges.max(axis=1), color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label="soles"
+        record.time,
+        edges.min(axis=1),
+        edges.max(axis=1),
+        color=hex_code(GREYS[2]),
+        alpha=0.3,
+        linewidth=0,
+        label="soles",
     )
-    axis.plot(record.time, centre_of_pressure_path(record)[:, 0], color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
-    axis.plot(record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
+    axis.plot(
+        record.time,
+        centre_of_pressure_path(record)[:, 0],
+        color=hex_code(GREYS[1]),
+        linewidth=1.5,
+        label="centre of pressure",
+    )
+    axis.plot(
+        record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c"
+    )
     axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     plt.close(figure)
@@ -185,27 +284,38 @@ def plot_lean(record: Rollout) -> Axes:
 
 
 def _to_pixels(places: Array) -> Array:
-    """Where horizontal places, shape (n, 2) or more, m, are in a drawing with x upwards and y to the left."""
+    """Where horizontal places, shape (n, 2) or more, m, are in a drawing with x upwards and y to
+    the left.
+    """
     scale = WIDE / 0.44  # pixels for 1 m
     return np.column_stack([WIDE / 2 - scale * places[:, 1], HIGH / 2 - scale * places[:, 0]])
 
 
 def _cross(at: Array, half: float) -> str:
     x, y = at
-    path = f"M{x - half:.1f} {y - half:.1f}l{2 * half} {2 * half}m{-2 * half} 0l{2 * half} {-2 * half}"
+    path = (
+        f"M{x - half:.1f} {y - half:.1f}l{2 * half} {2 * half}m{-2 * half} 0l{2 * half} {-2 * half}"
+    )
     return f'<path d="{path}" stroke="currentColor" stroke-width="2.5"/>'
 
 
 def _polygon(corners: Array, opacity: float = 0.12) -> str:
     points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
-    return f'<polygon points="{points}" fill="{grey}" fill-opacity="{opacity}" stroke="{grey}" stroke-width="2"/>'
+    return (
+        f'<polygon points="{points}" fill="{grey}" fill-opacity="{opacity}" stroke="{grey}" '
+        f'stroke-width="2"/>'
+    )
 
 
 def _svg(drawn: str, *lines: str) -> str:
     words = "".join(
-        f'<text x="{WIDE / 2}" y="{HIGH + 18 + 18 * i}" text-anchor="middle" font-size="13">{line}</text>'
+        f'<text x="{WIDE / 2}" y="{HIGH + 18 + 18 * i}" text-anchor="middle" '
+        f'font-size="13">{line}</text>'
         for i, line in enumerate(lines)
     )
     box = f'<svg x="0" y="0" width="{WIDE}" height="{HIGH}">{drawn}</svg>'
     height = HIGH + 18 * len(lines) + 10
-    return f'<svg width="340" viewBox="-20 0 340 {height}" style="max-width: 100%" fill="currentColor">{box}{words}</svg>'
+    return (
+        f'<svg width="340" viewBox="-20 0 340 {height}" style="max-width: 100%" '
+        f'fill="currentColor">{box}{words}</svg>'
+    )

@@ -13,7 +13,10 @@ from floatbase.dynamics import bias_forces, coriolis_matrix
 from floatbase.lessons.exercises import Exercise, NumericJudge
 
 PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
-CHILD_POSITION, CHILD_VELOCITY = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])  # m and m/s, in the merry-go-round's axes
+CHILD_POSITION, CHILD_VELOCITY = (
+    np.array([2.0, 0.0, 0.0]),
+    np.array([1.5, 0.0, 0.0]),
+)  # m and m/s, in the merry-go-round's axes
 LIFT_JOINT, ELBOW_JOINT = 1, 2  # of exercise A.2: ur5's joints
 JOINT_VELOCITY = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
 STEP = 1e-4  # s, and of differences
@@ -31,7 +34,9 @@ def _force_on_the_walker() -> Array:
     def place(t: float) -> Array:
         angle = PLATFORM_RATE[2] * t
         c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (CHILD_POSITION + t * CHILD_VELOCITY)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (
+            CHILD_POSITION + t * CHILD_VELOCITY
+        )
 
     return np.asarray(CHILD_MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
 
@@ -41,15 +46,26 @@ def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callabl
 
     def force() -> Array:
         turned = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
-        return np.asarray(mass * (coriolis * turned + inward * np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))))
+        return np.asarray(
+            mass
+            * (
+                coriolis * turned
+                + inward * np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))
+            )
+        )
 
     return force
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
-    """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's velocity."""
+    """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's
+    velocity.
+    """
     e = np.eye(6)
-    return np.asarray(coriolis_matrix(arm_state(tuple(e[i]))) @ e[j] + coriolis_matrix(arm_state(tuple(e[j]))) @ e[i])
+    return np.asarray(
+        coriolis_matrix(arm_state(tuple(e[i]))) @ e[j]
+        + coriolis_matrix(arm_state(tuple(e[j]))) @ e[i]
+    )
 
 
 def _both(fictitious_only: bool) -> Array:
@@ -69,7 +85,9 @@ def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callab
         v = state.v
 
         def change(way: Array) -> Array:
-            after, before = (state.replace(q=state.integrate(s * STEP * way)).M for s in (1.0, -1.0))
+            after, before = (
+                state.replace(q=state.integrate(s * STEP * way)).M for s in (1.0, -1.0)
+            )
             return np.asarray((after - before) / (2.0 * STEP))
 
         gradient = np.array([v @ change(unit) @ v for unit in np.eye(6)])
@@ -81,14 +99,16 @@ def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callab
 EXERCISES = (
     Exercise(
         name="A.1",
-        statement="The force of the floor on a child that walks straight out on a merry-go-round, shape (3,), N.",
+        statement="The force of the floor on a child that walks straight out on a merry-go-round, "
+        "shape (3,), N.",
         stub="floor = np.zeros(3)  # N, in the merry-go-round's axes; replace by your expression",
         solution="coriolis = -2 * np.cross(omega, p_dot)\n"
         "centrifugal = -np.cross(omega, np.cross(omega, p))\n"
         "floor = -mass * (coriolis + centrifugal)",
         judge=NumericJudge(
             right=_force_on_the_walker,
-            praise="Inwards to keep the child on the disc, and sideways to keep up with it: a real force, from the floor.",
+            praise="Inwards to keep the child on the disc, and sideways to keep up with it: a real "
+            "force, from the floor.",
             mistakes={
                 "zero": lambda: np.zeros(3),
                 "felt": _walker(-1.0, -1.0),
@@ -100,27 +120,37 @@ EXERCISES = (
                 "no_mass": _walker(1.0, 1.0, 1.0),
             },
             hints={
-                "zero": "Without a force the child would go straight in the world, and curve in these axes.",
-                "felt": "That is what the child feels pushed by. The floor has to answer it: the opposite.",
-                "no_factor_2": "The factor 2: half of 2 ω × ṗ is for the velocity's axes that turn, half for the place that "
+                "zero": "Without a force the child would go straight in the world, and curve in "
+                "these axes.",
+                "felt": "That is what the child feels pushed by. The floor has to answer it: the "
+                "opposite.",
+                "no_factor_2": "The factor 2: half of 2 ω × ṗ is for the velocity's axes that "
+                "turn, half for the place that "
                 "does.",
-                "coriolis_alone": "That holds the child against the Coriolis term only; it is off the axis, too.",
+                "coriolis_alone": "That holds the child against the Coriolis term only; it is off "
+                "the axis, too.",
                 "inwards_alone": "That would do for a child that stands still: it also walks.",
-                "inwards_sign": "Sideways right; but inwards, the other way: the floor has to bend the path towards the axis.",
-                "sideways_sign": "Inwards right; but sideways the other way. In ω × ṗ the order counts.",
+                "inwards_sign": "Sideways right; but inwards, the other way: the floor has to bend "
+                "the path towards the axis.",
+                "sideways_sign": "Inwards right; but sideways the other way. In ω × ṗ the order "
+                "counts.",
                 "no_mass": "That is an acceleration, m/s²: the mass is missing.",
             },
         ),
-        explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious terms add up to zero.",
+        explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious terms "
+        "add up to zero.",
     ),
     Exercise(
         name="A.2",
-        statement="What lift and elbow of ur5, at 1 rad/s each, make together and neither alone, shape (6,), N·m.",
+        statement="What lift and elbow of ur5, at 1 rad/s each, make together and neither alone, "
+        "shape (6,), N·m.",
         stub="pair = np.zeros(6)  # N·m; replace by calls of h_of",
-        solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - h_of(elbow) + g",
+        solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - "
+        "h_of(elbow) + g",
         judge=NumericJudge(
             right=_pair,
-            praise="The Coriolis part of this pair. Two calls do: half of h(lift + elbow) - h(lift - elbow). Do you see why?",
+            praise="The Coriolis part of this pair. Two calls do: half of h(lift + elbow) - h(lift "
+            "- elbow). Do you see why?",
             mistakes={
                 "zero": lambda: np.zeros(6),
                 "gravity_short": lambda: _pair() - arm_state().h,
@@ -133,18 +163,24 @@ EXERCISES = (
                 "pan_lift": lambda: _pair(0, 1),
             },
             hints={
-                "zero": "Nothing there yet. Call h_of with the lift alone, with the elbow alone, and with both.",
-                "gravity_short": "Gravity stands in each call: here it was taken away once too often.",
+                "zero": "Nothing there yet. Call h_of with the lift alone, with the elbow alone, "
+                "and with both.",
+                "gravity_short": "Gravity stands in each call: here it was taken away once too "
+                "often.",
                 "gravity_left": "Gravity is still in it, once.",
-                "all_of_h": "That is all of h with both moving: gravity and what each feels alone are in it.",
+                "all_of_h": "That is all of h with both moving: gravity and what each feels alone "
+                "are in it.",
                 "alone_left": "Without gravity, but what each joint makes alone is still in it.",
-                "half": "That is half of it: the sum over i and j has the pair twice, as (i, j) and as (j, i).",
-                "twice": "That is twice the pair: it stands in h(lift + elbow), and with the other sign in h(lift - elbow).",
+                "half": "That is half of it: the sum over i and j has the pair twice, as (i, j) "
+                "and as (j, i).",
+                "twice": "That is twice the pair: it stands in h(lift + elbow), and with the other "
+                "sign in h(lift - elbow).",
                 "elbow_wrist": "Those are other joints: counted from 0, lift is 1 and elbow 2.",
                 "pan_lift": "Those are pan and lift: counted from 0, lift is 1 and elbow 2.",
             },
         ),
-        explanation="h = g + Σ Γ_ij v_i v_j; both moving, minus each alone, leaves 2 Γ_ij and minus one g, which goes back in.",
+        explanation="h = g + Σ Γ_ij v_i v_j; both moving, minus each alone, leaves 2 Γ_ij and "
+        "minus one g, which goes back in.",
     ),
     Exercise(
         name="A.3",
@@ -155,7 +191,8 @@ EXERCISES = (
         "Cv = change(w) @ w - slopes / 2",
         judge=NumericJudge(
             right=_velocity_part,
-            praise="All of the fictitious forces, from how the inertia changes with the posture. That is where h comes from.",
+            praise="All of the fictitious forces, from how the inertia changes with the posture. "
+            "That is where h comes from.",
             mistakes={
                 "zero": lambda: np.zeros(6),
                 "no_half_in_slope": _from_differences(1.0, -1.0),
@@ -171,14 +208,18 @@ EXERCISES = (
                 "zero": "Nothing there yet.",
                 "no_half_in_slope": "Kinetic energy is ½ vᵀ M v: the half is missing in its slope.",
                 "rate_alone": "That is Ṁ v alone; the slope of the kinetic energy is missing.",
-                "slope_sign": "The sign of the slope: momentum changes by what pushes, and the slope stands on that side.",
-                "slope_alone": "That is the slope of the kinetic energy alone; d/dt of the momentum M v has Ṁ v.",
+                "slope_sign": "The sign of the slope: momentum changes by what pushes, and the "
+                "slope stands on that side.",
+                "slope_alone": "That is the slope of the kinetic energy alone; d/dt of the "
+                "momentum M v has Ṁ v.",
                 "half_on_rate": "The half belongs to the kinetic energy's slope, not to Ṁ v.",
-                "both_halved": "Both terms are halved: the half belongs to the kinetic energy alone.",
+                "both_halved": "Both terms are halved: the half belongs to the kinetic energy "
+                "alone.",
                 "sign": "The other sign: C v stands on the side of M q̈.",
                 "gravity_too": "Gravity is in it; C v is the velocity part of h.",
             },
         ),
-        explanation="Lagrange: d/dt (M v) = slope of ½ vᵀ M v + forces, so M q̈ + (Ṁ v - slope) = forces; the bracket is C v.",
+        explanation="Lagrange: d/dt (M v) = slope of ½ vᵀ M v + forces, so M q̈ + (Ṁ v - slope) = "
+        "forces; the bracket is C v.",
     ),
 )

@@ -1,4 +1,6 @@
-"""Lesson A, Fictitious forces: a puck on a turntable, two ways to write one tumble, errors against speed, feet that travel."""
+"""Lesson A, Fictitious forces: a puck on a turntable, two ways to write one tumble, errors against
+speed, feet that travel.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 
 TABLE_RADIUS, TABLE_HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
 START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
-TABLE_VIEW = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))  # x to the right, y away, as in the rider's drawing
+TABLE_VIEW = View(
+    -90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0)
+)  # x to the right, y away, as in the rider's drawing
 PIECES = 24  # of a drawn path
 SIDE = 250  # pixels of a drawing
 ACCELERATION_SCALE = 0.05  # m drawn for 1 m/s²
@@ -34,16 +38,20 @@ FRAME_RATE = 10  # pictures for each second of the travelling feet
 
 
 def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str:
-    """Draw a puck that slides straight over a turning table and leaves chalk on it; what a rider sees, as SVG.
+    """Draw a puck that slides straight over a turning table and leaves chalk on it; what a rider
+    sees, as SVG.
 
-    omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a moment.
+    omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a
+        moment.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
     top = np.array([0.0, 0.0, TABLE_HEIGHT])
     straight = START + np.outer(times, [speed, 0.0, 0.0])
     chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now
-    picture = view.painter.ground_only() | {"table": props.turntable(top, TABLE_RADIUS, omega * time)}
+    picture = view.painter.ground_only() | {
+        "table": props.turntable(top, TABLE_RADIUS, omega * time)
+    }
     picture |= _path("chalk", chalk + top + [0.0, 0.0, 0.006], 0.012, GREYS[0])
     picture |= _path("way", straight + top + [0.0, 0.0, 0.05], 0.006, GREYS[1])
     puck = straight[-1] + top
@@ -54,18 +62,28 @@ def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str
 
 def _path(name: str, points: Array, radius: float, colour: tuple[float, float, float]) -> Picture:
     """Rods from point to point, m, world."""
-    return {f"{name}/{i}": rod for i, (a, b) in enumerate(pairwise(points)) if (rod := _rod(a, b, radius, colour))}
+    return {
+        f"{name}/{i}": rod
+        for i, (a, b) in enumerate(pairwise(points))
+        if (rod := _rod(a, b, radius, colour))
+    }
 
 
-def _rod(a: Array, b: Array, radius: float, colour: tuple[float, float, float]) -> shapes.Item | None:
+def _rod(
+    a: Array, b: Array, radius: float, colour: tuple[float, float, float]
+) -> shapes.Item | None:
     length = float(np.linalg.norm(b - a))
     return (
-        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour) if length > MIN_ROD_LENGTH / 10 else None
+        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour)
+        if length > MIN_ROD_LENGTH / 10
+        else None
     )
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
-    """From above, as SVG, with the table at rest: the path, (n, 3), m, and the accelerations at its end, m/s²."""
+    """From above, as SVG, with the table at rest: the path, (n, 3), m, and the accelerations at its
+    end, m/s².
+    """
     half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE_RADIUS)
 
     def seen(points: Array) -> Array:
@@ -74,20 +92,36 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in seen(position))
     x, y = seen(position[-1])
     tip = seen(np.array([0.95 * TABLE_RADIUS, 0.0]))
-    drawn = f'<circle cx="{half}" cy="{half}" r="{scale * TABLE_RADIUS:.1f}" fill="none" stroke="currentColor"/>'
-    drawn += f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" stroke="currentColor" stroke-width="3"/>'
-    drawn += f'<polyline points="{path}" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
+    drawn = (
+        f'<circle cx="{half}" cy="{half}" r="{scale * TABLE_RADIUS:.1f}" fill="none" '
+        f'stroke="currentColor"/>'
+    )
+    drawn += (
+        f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" '
+        f'stroke="currentColor" stroke-width="3"/>'
+    )
+    drawn += (
+        f'<polyline points="{path}" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
+    )
     drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>'
     for acceleration, dashes in ((centrifugal, "4 3"), (coriolis, "")):
-        drawn += _arrow(seen(position[-1]), seen(position[-1] + ACCELERATION_SCALE * acceleration), dashes)
+        drawn += _arrow(
+            seen(position[-1]), seen(position[-1] + ACCELERATION_SCALE * acceleration), dashes
+        )
     sizes = [float(np.linalg.norm(each)) for each in (centrifugal, coriolis)]
-    words = ("what the rider sees", f"dashed: centrifugal, {sizes[0]:.1f} m/s²", f"solid: Coriolis, {sizes[1]:.1f} m/s²")
+    words = (
+        "what the rider sees",
+        f"dashed: centrifugal, {sizes[0]:.1f} m/s²",
+        f"solid: Coriolis, {sizes[1]:.1f} m/s²",
+    )
     lines = "".join(
-        f'<text x="{half}" y="{SIDE + 40 + 18 * i}" text-anchor="middle" font-size="13">{word}</text>'
+        f'<text x="{half}" y="{SIDE + 40 + 18 * i}" text-anchor="middle" '
+        f'font-size="13">{word}</text>'
         for i, word in enumerate(words)
     )
     return (
-        f'<svg width="300" viewBox="-25 -30 300 {SIDE + 18 * len(words) + 65}" style="max-width: 100%" '
+        f'<svg width="300" viewBox="-25 -30 300 {SIDE + 18 * len(words) + 65}" style="max-width: '
+        f'100%" '
         f'fill="currentColor">{drawn}{lines}</svg>'
     )
 
@@ -102,15 +136,19 @@ def _arrow(start: Array, end: Array, dashes: str) -> str:
     corners = [end, end - 9.0 * along + 4.5 * aside, end - 9.0 * along - 4.5 * aside]
     tip = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
     (x1, y1), (x2, y2) = start, end - 8.0 * along
-    line = f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="currentColor" stroke-width="2"'
+    line = (
+        f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="currentColor" '
+        f'stroke-width="2"'
+    )
     return f'{line} stroke-dasharray="{dashes}"/><polygon points="{tip}"/>'
 
 
 def show_tumble(view: Viewer, glide: float, spin: float) -> str:
-    """Draw a robot in the air that glides to its left and turns about the vertical, and what is called a force on its base.
+    """Draw a robot in the air that glides to its left and turns about the vertical, and what is
+    called a force on its base.
 
-    Grey, since nobody exerts them: the velocity part of h on the base, written in the base's axes (dark) and in the world's
-    (light); their sizes and the base's acceleration, as text.
+    Grey, since nobody exerts them: the velocity part of h on the base, written in the base's axes
+    (dark) and in the world's (light); their sizes and the base's acceleration, as text.
 
     glide: m/s. spin: rad/s.
     """
@@ -122,35 +160,58 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
     parts = {axes: bias_forces(state, axes=axes).fictitious for axes in ("base", "world")}
     picture = view.painter.picture(state, com=False)
     base = state.frame_pose("base").translation + [0.0, 0.0, 0.1]
-    for (name, h), colour, lift in zip(parts.items(), (GREYS[0], GREYS[2]), (0.06, 0.0), strict=True):
+    for (name, h), colour, lift in zip(
+        parts.items(), (GREYS[0], GREYS[2]), (0.06, 0.0), strict=True
+    ):
         tip = FORCE_SCALE * h[:3]
         if np.linalg.norm(tip) > MIN_ROD_LENGTH:
-            picture[f"called/{name}"] = shapes.arrow(base + [0.0, 0.0, lift], tip, colour, view.painter.size)
-            text_at = base + tip + np.array([0.0, 0.0, lift + 0.05]) + 0.12 * tip / np.linalg.norm(tip)
+            picture[f"called/{name}"] = shapes.arrow(
+                base + [0.0, 0.0, lift], tip, colour, view.painter.size
+            )
+            text_at = (
+                base + tip + np.array([0.0, 0.0, lift + 0.05]) + 0.12 * tip / np.linalg.norm(tip)
+            )
             picture[f"label/{name}"] = shapes.label(text_at, f"{name}'s axes", 0.05, plate=False)
     view.draw(picture)
     places = [_falling(state, h, axes) for axes, h in parts.items()]
-    forces = " N, ".join(f"in the {axes}'s axes {format_vector(h[:3])}" for axes, h in parts.items())
+    forces = " N, ".join(
+        f"in the {axes}'s axes {format_vector(h[:3])}" for axes, h in parts.items()
+    )
     apart = float(np.linalg.norm(places[0] - places[1]))
     return f"{forces} N; the base's acceleration in the world by both: {apart:.1f} m/s² apart"
 
 
 def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
-    """Acceleration of the base in the world, (3,), m/s², from the velocity part of h alone, written in those axes."""
+    """Acceleration of the base in the world, (3,), m/s², from the velocity part of h alone, written
+    in those axes.
+    """
     R = state.frame_pose("base").rotation
     if axes == "base":
-        return np.asarray(R @ (np.linalg.solve(state.M, -fictitious)[:3] + np.cross(state.v[3:6], state.v[:3])))
+        return np.asarray(
+            R @ (np.linalg.solve(state.M, -fictitious)[:3] + np.cross(state.v[3:6], state.v[:3]))
+        )
     T = np.eye(state.robot.nv)
     T[:3, :3] = T[3:6, 3:6] = R.T
     return np.asarray(np.linalg.solve(T.T @ state.M @ T, -fictitious)[:3])
 
 
 def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
-    """Curves of errors, name -> mm at each speed, on logarithmic axes, each with the slope of its ends."""
+    """Curves of errors, name -> mm at each speed, on logarithmic axes, each with the slope of its
+    ends.
+    """
     _, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
-    for (name, curve), colour, style in zip(errors.items(), GREYS, ("o-", "s--", "^:"), strict=False):
+    for (name, curve), colour, style in zip(
+        errors.items(), GREYS, ("o-", "s--", "^:"), strict=False
+    ):
         slope = np.log(curve[-1] / curve[0]) / np.log(speeds[-1] / speeds[0])
-        axis.loglog(speeds, curve, style, color=hex_code(colour), linewidth=2.0, label=f"{name}: slope {abs(slope):.1f}")
+        axis.loglog(
+            speeds,
+            curve,
+            style,
+            color=hex_code(colour),
+            linewidth=2.0,
+            label=f"{name}: slope {abs(slope):.1f}",
+        )
     axis.set_xticks(speeds, [f"{speed:g}" for speed in speeds])
     axis.minorticks_off()
     axis.set(xlabel="speed, 1 for an eight in 6 s", ylabel="tool's error [mm]", ylim=(1e-2, 1e2))
@@ -160,10 +221,14 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
 
 
 def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
-    """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to the side as it is now."""
+    """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to
+    the side as it is now.
+    """
     contacts = record.contacts
     home = contacts.positions(record.state(0))
-    rows = np.arange(0, len(record), max(1, round(1.0 / FRAME_RATE / (record.time[1] - record.time[0]))))
+    rows = np.arange(
+        0, len(record), max(1, round(1.0 / FRAME_RATE / (record.time[1] - record.time[0])))
+    )
 
     def picture(i: int) -> Picture:
         state = record.state(i)

@@ -12,12 +12,18 @@ import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
 PUSH = np.array([0.0, 30.0, 0.0])  # N, to the left, for 0.1 s: the lesson's
-SETTLE, BEFORE, AFTER = 0.5, 0.1, 1.4  # s: on perfect torques, on oil before the push, and from its start to the end
+SETTLE, BEFORE, AFTER = (
+    0.5,
+    0.1,
+    1.4,
+)  # s: on perfect torques, on oil before the push, and from its start to the end
 JUDGED_TIME = 0.2  # s, at the end, in which it is judged
 
 
 class PushResponse(NamedTuple):
-    """How a push ended: outcome; mm by which go2 is off its place at worst in the end, and by which it then still swings."""
+    """How a push ended: outcome; mm by which go2 is off its place at worst in the end, and by which
+    it then still swings.
+    """
 
     outcome: str
     offset: float
@@ -41,4 +47,6 @@ def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
     push = fb.Push(PUSH, start=sim.time + BEFORE)
     record = fb.rollout(sim, controller, BEFORE + AFTER, [push], actuators=oil)
     end = 1000.0 * (record.com - state.com)[record.time > record.time[-1] - JUDGED_TIME]
-    return PushResponse(record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max()))
+    return PushResponse(
+        record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max())
+    )

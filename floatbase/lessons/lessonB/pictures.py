@@ -1,4 +1,6 @@
-"""Lesson B, Torque is an abstraction: a cylinder on its crank, torques on the bench, how far go2 sways, and where watts go."""
+"""Lesson B, Torque is an abstraction: a cylinder on its crank, torques on the bench, how far go2
+sways, and where watts go.
+"""
 
 from __future__ import annotations
 
@@ -27,20 +29,30 @@ BEND = np.deg2rad(115.0)  # rad: from the crank to the shank, one piece of steel
 SHANK_LENGTH = 0.35  # m
 JOINT_VIEW = View(-90.0, 4.0, 1.0, around=((0.05, 0.0, 0.55), 0.62))
 DASHES = ("-", "--", ":", "-.")
-WIDTH, HEIGHT, LEFT, GAP = 620.0, 150.0, 58.0, 34.0  # pixels of a strip in the panel, of what is left of it and below it
+WIDTH, HEIGHT, LEFT, GAP = (
+    620.0,
+    150.0,
+    58.0,
+    34.0,
+)  # pixels of a strip in the panel, of what is left of it and below it
 RUN_DURATION = 0.4  # s, of the panel's run
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
-    """Draw a knee's cylinder, three times as large, with its chambers A and B; as text its lever, and pressures for a torque.
+    """Draw a knee's cylinder, three times as large, with its chambers A and B; as text its lever,
+    and pressures for a torque.
 
-    angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque: N·m.
+    angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque:
+        N·m.
     """
     bench = Bench(lambda t: (np.deg2rad(angle), 0.0))
     gamma = np.arccos(bench.crank / bench.base) + bench.angle
     foot = JOINT + [0.0, 0.0, DRAWING_SCALE * bench.base]
     end = JOINT + DRAWING_SCALE * bench.crank * _towards(gamma)
-    stroke = (DRAWING_SCALE * (bench.base - bench.crank), DRAWING_SCALE * (bench.base + bench.crank))
+    stroke = (
+        DRAWING_SCALE * (bench.base - bench.crank),
+        DRAWING_SCALE * (bench.base + bench.crank),
+    )
     least, most = bench.torque_range()
     a, b = _pressures(bench, min(most, max(least, torque)))
     supply = bench.hydraulics.supply_pressure
@@ -50,7 +62,9 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     beside = np.cross([0.0, 1.0, 0.0], end - foot) / np.linalg.norm(end - foot)
     for name, chamber in (("A", "base chamber"), ("B", "rod chamber")):
         filled = picture[f"cylinder/{chamber}"].matrix
-        picture[f"chamber {name}"] = shapes.label(filled[:3, 3] + 0.5 * filled[:3, 2] - 0.09 * beside, name, 0.04)
+        picture[f"chamber {name}"] = shapes.label(
+            filled[:3, 3] + 0.5 * filled[:3, 2] - 0.09 * beside, name, 0.04
+        )
     for name, start, tip, radius in (
         ("thigh", JOINT, foot, 0.012),
         ("crank", JOINT, end, 0.016),
@@ -59,12 +73,21 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         way = tip - start
         length = float(np.linalg.norm(way))
         aside = np.array([0.0, 0.09 if name == "thigh" else 0.0, 0.0])  # behind the cylinder
-        picture[name] = shapes.rod(start + aside, geometry.rotation_with_z_axis(way / length), length, radius, GREYS[1])
+        picture[name] = shapes.rod(
+            start + aside, geometry.rotation_with_z_axis(way / length), length, radius, GREYS[1]
+        )
     picture["joint"] = shapes.rod(
-        JOINT + [0.0, -0.05, 0.0], geometry.rotation_with_z_axis([0.0, 1.0, 0.0]), 0.16, 0.028, GREYS[0]
+        JOINT + [0.0, -0.05, 0.0],
+        geometry.rotation_with_z_axis([0.0, 1.0, 0.0]),
+        0.16,
+        0.028,
+        GREYS[0],
     )
     view.draw(picture)
-    told = f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: {least:.0f} to {most:.0f} N·m; "
+    told = (
+        f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: "
+        f"{least:.0f} to {most:.0f} N·m; "
+    )
     if not least <= torque <= most:
         return f"{told}<b>{torque:.0f} N·m are more than the supply gives here</b>"
     return f"{told}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
@@ -76,9 +99,14 @@ def _towards(gamma: float) -> Array:
 
 
 def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
-    """Of both chambers, Pa, that make a torque, as much below the supply at one as above the tank at the other."""
+    """Of both chambers, Pa, that make a torque, as much below the supply at one as above the tank
+    at the other.
+    """
     h = bench.hydraulics
-    lines, force = h.supply_pressure + h.tank_pressure, torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0
+    lines, force = (
+        h.supply_pressure + h.tank_pressure,
+        torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0,
+    )
     a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
 
@@ -97,20 +125,35 @@ def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0
     axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
     for i, (name, rows) in enumerate(runs.items()):
         times, torques = [1000 * row.time for row in rows], [row.torque for row in rows]
-        axis.plot(times, torques, DASHES[i % 4], color=hex_code(GREYS[min(i, 2)]), linewidth=1.8, label=name)
+        axis.plot(
+            times,
+            torques,
+            DASHES[i % 4],
+            color=hex_code(GREYS[min(i, 2)]),
+            linewidth=1.8,
+            label=name,
+        )
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
 
 def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
-    """How far the centre of mass has gone to the left, mm, over time from the start of each record; name -> record.
+    """How far the centre of mass has gone to the left, mm, over time from the start of each record;
+    name -> record.
 
     side: -1 for to the right.
     """
     axis = _axes("time [s]", f"gone to the {'left' if side > 0 else 'right'} [mm]")
     for i, (name, record) in enumerate(records.items()):
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
-        axis.plot(record.time - record.time[0], gone, DASHES[i % 4], color=hex_code(GREYS[i % 3]), linewidth=1.8, label=name)
+        axis.plot(
+            record.time - record.time[0],
+            gone,
+            DASHES[i % 4],
+            color=hex_code(GREYS[i % 3]),
+            linewidth=1.8,
+            label=name,
+        )
     axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
@@ -122,7 +165,14 @@ def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -
     watts = np.asarray(watts)
     for i, name in enumerate(names):
         times = step * np.arange(len(watts))
-        axis.plot(times, watts[:, i], DASHES[i % 4], color=hex_code(GREYS[i % 3]), linewidth=1.8, label=name)
+        axis.plot(
+            times,
+            watts[:, i],
+            DASHES[i % 4],
+            color=hex_code(GREYS[i % 3]),
+            linewidth=1.8,
+            label=name,
+        )
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
@@ -135,25 +185,41 @@ def _axes(x: str, y: str) -> Axes:
 
 
 def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
-    """The package's loop on the bench: 12 N·m wanted from 0 s on, and the joint turned for a while from 150 ms on; as SVG.
+    """The package's loop on the bench: 12 N·m wanted from 0 s on, and the joint turned for a while
+    from 150 ms on; as SVG.
 
     bandwidth: Hz, of the loop. supply: bar. turning: rad/s; the rod goes out.
     """
     hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
-    rows = run_force_loop(Bench(hold_then_turn(turning), hydraulics=hydraulics), bandwidth, RUN_DURATION)
+    rows = run_force_loop(
+        Bench(hold_then_turn(turning), hydraulics=hydraulics), bandwidth, RUN_DURATION
+    )
     torques = [row.torque for row in rows]
     low, high = np.floor(min(torques) / 20 + 0.02), np.ceil(max(torques) / 20)
     ticks = 20 * np.linspace(low, high, round(high - low) + 1)
     drawn = _strip(0.0, "torque [N·m]", ticks, {"wanted": [12.0] * len(rows), "got": torques})
-    pressures = {"A": [row.pressure_a / BAR for row in rows], "B": [row.pressure_b / BAR for row in rows]}
+    pressures = {
+        "A": [row.pressure_a / BAR for row in rows],
+        "B": [row.pressure_b / BAR for row in rows],
+    }
     drawn += _strip(HEIGHT + GAP, "pressure [bar]", np.linspace(0.0, 200.0, 5), pressures)
     boiling = sum(min(row.pressure_a, row.pressure_b) <= VACUUM for row in rows)
     reached = next((row.time for row in rows if abs(row.torque - 12.0) < 0.6), None)
-    late = "12 N·m are not reached" if reached is None else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
+    late = (
+        "12 N·m are not reached"
+        if reached is None
+        else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
+    )
     boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
     total = 2 * HEIGHT + 2 * GAP
-    svg = f'<svg width="{WIDTH}" viewBox="0 -8 {WIDTH} {total}" style="max-width: 100%" fill="currentColor">{drawn}</svg>'
-    return f"{svg}<div>{late}; while it turns, {min(torques[150:]):.1f} to {max(torques[150:]):.1f} N·m; {boils}</div>"
+    svg = (
+        f'<svg width="{WIDTH}" viewBox="0 -8 {WIDTH} {total}" style="max-width: 100%" '
+        f'fill="currentColor">{drawn}</svg>'
+    )
+    return (
+        f"{svg}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
+        f"{max(torques[150:]):.1f} N·m; {boils}</div>"
+    )
 
 
 def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[float]]) -> str:
@@ -170,17 +236,26 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
     drawn += f'transform="rotate(-90 14 {top + HEIGHT / 2})">{title}</text>'
     for value in ticks:
         drawn += (
-            f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" stroke="currentColor" opacity="0.15"/>'
+            f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" '
+            f'stroke="currentColor" opacity="0.15"/>'
         )
-        drawn += f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" font-size="11" text-anchor="end">{value:.0f}</text>'
+        drawn += (
+            f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" font-size="11" '
+            f'text-anchor="end">{value:.0f}</text>'
+        )
     for t in np.linspace(0.0, RUN_DURATION, 5):
-        drawn += f'<text x="{x(t):.1f}" y="{top + HEIGHT + 15}" font-size="11" text-anchor="middle">{1000 * t:.0f} ms</text>'
+        drawn += (
+            f'<text x="{x(t):.1f}" y="{top + HEIGHT + 15}" font-size="11" '
+            f'text-anchor="middle">{1000 * t:.0f} ms</text>'
+        )
     heights = [y(values[-1]) for values in curves.values()]
     if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other
         up = 1.0 if heights[0] > heights[1] else -1.0
         middle = sum(heights) / 2
         heights = [middle + 7.0 * up, middle - 7.0 * up]
-    for (name, values), at, dash, grey in zip(curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True):
+    for (name, values), at, dash, grey in zip(
+        curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True
+    ):
         path = " ".join(f"{x(1e-3 * i):.1f},{y(value):.1f}" for i, value in enumerate(values))
         style = f'stroke="{hex_code(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
         drawn += f'<polyline points="{path}" fill="none" {style}/>'

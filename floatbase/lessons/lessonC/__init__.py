@@ -15,7 +15,13 @@ from floatbase.lessons.lessonC.helpers import (
     run_with_push,
     standing_controller,
 )
-from floatbase.lessons.lessonC.pictures import ActiveSetGame, plot_problem, plot_rounds, show_solver_path, show_table
+from floatbase.lessons.lessonC.pictures import (
+    ActiveSetGame,
+    plot_problem,
+    plot_rounds,
+    show_solver_path,
+    show_table,
+)
 
 __all__ = [
     "EXERCISES",

@@ -18,29 +18,44 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 _CLOSE = 1e-6  # of lengths, which are between 0 and 1
 
 
-# C.1 ----------------------------------------------------------------------------------------------------------------------
+# C.1 ----------------------------------------------------------------------------------------------
 
 
 def slanted_table() -> QP:
-    """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along - up ≤ 0."""
+    """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along
+    - up ≤ 0.
+    """
     H = np.diag([1.0, 4.0])
-    return QP(H, -H @ [2.0, -2.0], *_NONE, np.array([[0.5, -1.0]]), np.zeros(1), inequality_names=("slant",))
+    return QP(
+        H,
+        -H @ [2.0, -2.0],
+        *_NONE,
+        np.array([[0.5, -1.0]]),
+        np.zeros(1),
+        inequality_names=("slant",),
+    )
 
 
 def _price() -> float:
-    """By the rate at which the least objective falls when the row is loosened: no system of equations in it."""
+    """By the rate at which the least objective falls when the row is loosened: no system of
+    equations in it.
+    """
     qp = slanted_table()
     h = 1e-4
-    low, high = (fb.solve(QP(qp.H, qp.g, qp.A, qp.b, qp.G, np.array([d]))).objective for d in (-h, h))
+    low, high = (
+        fb.solve(QP(qp.H, qp.g, qp.A, qp.b, qp.G, np.array([d]))).objective for d in (-h, h)
+    )
     return (low - high) / (2 * h)
 
 
-# C.2 ----------------------------------------------------------------------------------------------------------------------
+# C.2 ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class _StepCase:
-    """A step in the plane, whose answer is known from how it was made, and what is said of a function that misses it."""
+    """A step in the plane, whose answer is known from how it was made, and what is said of a
+    function that misses it.
+    """
 
     hint: str  # its name
     text: str
@@ -57,7 +72,8 @@ _STEP_CASES = (
         (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None),
     ),
     _StepCase(
-        "halfway", "A row is in the way halfway: where it holds with equality, slack = length · speed.",
+        "halfway", "A row is in the way halfway: where it holds with equality, slack = length · "
+                   "speed.",
         (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
     ),
     _StepCase(
@@ -65,7 +81,8 @@ _STEP_CASES = (
         (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
     ),
     _StepCase(
-        "along", "A row along which the step runs (speed 0) is never in the way, and nothing can be divided by its speed.",
+        "along", "A row along which the step runs (speed 0) is never in the way, and nothing can "
+                 "be divided by its speed.",
         (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
     ),
     _StepCase(
@@ -74,7 +91,8 @@ _STEP_CASES = (
     ),
     _StepCase(
         "soonest",
-        "Here two rows are in the way at different speeds: it is not the slack alone that counts, but how soon it is used up.",
+        "Here two rows are in the way at different speeds: it is not the slack alone that counts, "
+        "but how soon it is used up.",
         (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
     ),
     _StepCase(
@@ -83,7 +101,8 @@ _STEP_CASES = (
     ),
     _StepCase(
         "touches",
-        "The point touches a row that is not in W and would cross it: then the step has length 0, and that row blocks.",
+        "The point touches a row that is not in W and would cross it: then the step has length 0, "
+        "and that row blocks.",
         (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
     ),
     _StepCase(
@@ -92,12 +111,14 @@ _STEP_CASES = (
     ),
     _StepCase(
         "slack_rounding",
-        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of equal rows the first.",
+        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of "
+        "equal rows the first.",
         (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
     _StepCase(
         "speed_rounding",
-        "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the limit.",
+        "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the "
+        "limit.",
         (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
     ),
 )  # fmt: skip
@@ -105,55 +126,87 @@ _STEP_CASES = (
 
 def _judge_step(answer: Any) -> Verdict:
     def one(way: _StepCase) -> Verdict | None:
-        for origin in (np.zeros(2), np.array([0.3, -0.2])):  # the same step elsewhere: the slack is h - G x
+        for origin in (
+            np.zeros(2),
+            np.array([0.3, -0.2]),
+        ):  # the same step elsewhere: the slack is h - G x
             G = np.array(way.G, dtype=np.float64)
             h = np.array(way.h, dtype=np.float64) + G @ origin
             given = answer(origin, np.array(way.p, dtype=np.float64), G, h, list(way.W))
             if not isinstance(given, tuple) or len(given) != 2:
-                return Verdict(False, "Return two things: the length, and the number of the row or None.", "not_two")
+                return Verdict(
+                    False,
+                    "Return two things: the length, and the number of the row or None.",
+                    "not_two",
+                )
             length, row = given
             if not isinstance(length, int | float | np.number) or not np.isfinite(length):
-                told = f"The length is {length!r}; it should be a number from 0 to 1. Was it divided by a speed of zero?"
+                told = (
+                    f"The length is {length!r}; it should be a number from 0 to 1. Was it "
+                    f"divided by a speed of zero?"
+                )
                 return Verdict(False, told, "no_length")
             if length < 0:
-                return Verdict(False, f"A length is negative ({length:.2g}). {way.text}", "negative")
+                return Verdict(
+                    False, f"A length is negative ({length:.2g}). {way.text}", "negative"
+                )
             if row is not None and not isinstance(row, int | np.integer):
-                return Verdict(False, f"The row is {row!r}; it should be its number in G, or None.", "no_row")
+                return Verdict(
+                    False, f"The row is {row!r}; it should be its number in G, or None.", "no_row"
+                )
             right, blocks = way.answer
             if abs(length - right) > _CLOSE or row != blocks:
                 if row is not None and row in way.W:
-                    return Verdict(False, f"Row {row} is in W and must not block. {way.text}", "held")
+                    return Verdict(
+                        False, f"Row {row} is in W and must not block. {way.text}", "held"
+                    )
                 if np.any(origin):
-                    return Verdict(False, f"Is the slack h - G x, or h alone? {way.text}", "elsewhere")
+                    return Verdict(
+                        False, f"Is the slack h - G x, or h alone? {way.text}", "elsewhere"
+                    )
                 return Verdict(False, way.text, way.hint)
         return None
 
-    return _tried(answer, [partial(one, way) for way in _STEP_CASES], "As far as all rows hold, and no further.")
+    return _tried(
+        answer,
+        [partial(one, way) for way in _STEP_CASES],
+        "As far as all rows hold, and no further.",
+    )
 
 
 def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
     """Run cases of a learner's function; the first that has something to say decides."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: give your function, without brackets.", "no_answer")
+        return Verdict(
+            False, "There is no answer yet: give your function, without brackets.", "no_answer"
+        )
     if not callable(answer):
-        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
+        return Verdict(
+            False,
+            f"The answer is a function, written with def; this is {type(answer).__name__}.",
+            "no_function",
+        )
     for case in cases:
         try:
             with np.errstate(all="ignore"):
                 said = case()
         except Exception as error:  # whatever a learner's function raises
-            said = Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
+            said = Verdict(
+                False, f"Your function stops with {type(error).__name__}: {error}", "stops"
+            )
         if said:
             return said
     return Verdict(True, praise)
 
 
-# C.3 ----------------------------------------------------------------------------------------------------------------------
+# C.3 ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class _Drop:
-    """Rows that are on and their prices, and what is said of a function that does not drop the right one."""
+    """Rows that are on and their prices, and what is said of a function that does not drop the
+    right one.
+    """
 
     hint: str  # its name
     text: str
@@ -163,12 +216,42 @@ class _Drop:
 
 
 _DROP_CASES = (
-    _Drop("pulls", "One row pulls (its price is negative): that one has to go.", [5, 3, 8], [2.0, -0.5, 1.0], 3),
-    _Drop("pushes", "No price is negative here: every row pushes, and none leaves.", [4, 2], [1.0, 0.5], None),
+    _Drop(
+        "pulls",
+        "One row pulls (its price is negative): that one has to go.",
+        [5, 3, 8],
+        [2.0, -0.5, 1.0],
+        3,
+    ),
+    _Drop(
+        "pushes",
+        "No price is negative here: every row pushes, and none leaves.",
+        [4, 2],
+        [1.0, 0.5],
+        None,
+    ),
     _Drop("empty", "W may be empty: then there is nothing to drop.", [], [], None),
-    _Drop("most_negative", "Two rows pull: drop the one with the most negative price.", [5, 3, 8], [-0.5, 1.0, -2.0], 8),
-    _Drop("negative_alone", "Only a negative price counts, however large another one is.", [1, 6], [9.0, -0.1], 6),
-    _Drop("rounding", "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9.", [1, 6], [3.0, -1e-14], None),
+    _Drop(
+        "most_negative",
+        "Two rows pull: drop the one with the most negative price.",
+        [5, 3, 8],
+        [-0.5, 1.0, -2.0],
+        8,
+    ),
+    _Drop(
+        "negative_alone",
+        "Only a negative price counts, however large another one is.",
+        [1, 6],
+        [9.0, -0.1],
+        6,
+    ),
+    _Drop(
+        "rounding",
+        "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9.",
+        [1, 6],
+        [3.0, -1e-14],
+        None,
+    ),
 )
 
 
@@ -176,52 +259,86 @@ def _judge_drop(answer: Any) -> Verdict:
     def one(drop: _Drop) -> Verdict | None:
         given = answer(list(drop.W), np.array(drop.prices))
         if given is not None and not isinstance(given, int | np.integer):
-            return Verdict(False, f"The answer is {given!r}; it should be a row's number in G, or None.", "no_number")
+            return Verdict(
+                False,
+                f"The answer is {given!r}; it should be a row's number in G, or None.",
+                "no_number",
+            )
         if given is not None and given not in drop.W:
-            return Verdict(False, "Give the row's number in G, which stands in W, not its place in W.", "place")
+            return Verdict(
+                False, "Give the row's number in G, which stands in W, not its place in W.", "place"
+            )
         return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
 
     cases = [partial(one, drop) for drop in _DROP_CASES]
-    return _tried(answer, cases, "A row may push, never pull: that is the whole test of an optimum.")
+    return _tried(
+        answer, cases, "A row may push, never pull: that is the whole test of an optimum."
+    )
 
 
-# C.4 ----------------------------------------------------------------------------------------------------------------------
+# C.4 ----------------------------------------------------------------------------------------------
 
 
 def _judge_guess(answer: Any) -> Verdict:
-    """One system of equations with the rows of the guess, as in the game; whether it is the optimum a solver says."""
+    """One system of equations with the rows of the guess, as in the game; whether it is the optimum
+    a solver says.
+    """
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: list the names of rows.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
-        return Verdict(False, "The answer is a list of names, such as those in qp.inequality_names.", "no_names")
+        return Verdict(
+            False,
+            "The answer is a list of names, such as those in qp.inequality_names.",
+            "no_names",
+        )
     qp = braking_qp()
     names = list(dict.fromkeys(answer))
     if unknown := [name for name in names if name not in qp.inequality_names]:
-        return Verdict(False, f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.", "no_such_row")
+        return Verdict(
+            False,
+            f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.",
+            "no_such_row",
+        )
     if not names:
-        return Verdict(False, "With no row on, the plan pulls on the ground. Which feet does the push lift off?", "no_row")
+        return Verdict(
+            False,
+            "With no row on, the plan pulls on the ground. Which feet does the push lift off?",
+            "no_row",
+        )
     rows = [qp.inequality_names.index(name) for name in names]
     small, Z = qp.reduced, qp.reduced.G[rows]
     if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
         return Verdict(
             False,
-            "These rows depend on one another: a foot has three numbers, and no more than three rows can be on at it.",
+            "These rows depend on one another: a foot has three numbers, and no more than three "
+            "rows can be on at it.",
             "dependent",
         )
     k = len(rows)
-    found = np.linalg.solve(np.block([[small.H, Z.T], [Z, np.zeros((k, k))]]), np.concatenate([-small.g, small.h[rows]]))
+    found = np.linalg.solve(
+        np.block([[small.H, Z.T], [Z, np.zeros((k, k))]]), np.concatenate([-small.g, small.h[rows]])
+    )
     over, prices = small.G @ found[: small.n] - small.h, found[small.n :]
     broken = [str(qp.inequality_names[i]) for i in np.flatnonzero(over > 1e-6)]
     pulls = [name for name, price in zip(names, prices, strict=True) if price < -1e-9]
     if not broken and not pulls:
-        return Verdict(True, "One system of equations, and nothing to correct: a solver that begins here is done in one round.")
+        return Verdict(
+            True,
+            "One system of equations, and nothing to correct: a solver that begins here is done in "
+            "one round.",
+        )
     if not any("foot" in name for name in names):
-        return Verdict(False, "Motors are far from their limits here. What does a push do to the feet?", "motors")
+        return Verdict(
+            False,
+            "Motors are far from their limits here. What does a push do to the feet?",
+            "motors",
+        )
     told = [f"{len(broken)} rows are broken, {_example_of(broken)}"] if broken else []
     told += [f"{len(pulls)} of yours pull, {_example_of(pulls)}"] if pulls else []
     return Verdict(
         False,
-        f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and check again.",
+        f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and "
+        f"check again.",
         "corrections",
     )
 
@@ -232,7 +349,9 @@ def _example_of(names: Sequence[str]) -> str:
 
 
 def rounds_from_guess(guess: Sequence[str]) -> int:
-    """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active rows."""
+    """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active
+    rows.
+    """
     return active_set(braking_qp(), working_set=tuple(guess)).solution.iterations
 
 
@@ -273,8 +392,15 @@ def _steps() -> list[Example]:
         """A `longest_step` that does one thing in another way."""
 
         def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
-            rows = [(room, speed, i) for i, (room, speed) in enumerate(zip(slack(x, G, h), G @ p, strict=True))]
-            near = [(length(*row[:2]), row[2]) for row in rows if not (held and row[2] in W) and counts(*row[:2])]
+            rows = [
+                (room, speed, i)
+                for i, (room, speed) in enumerate(zip(slack(x, G, h), G @ p, strict=True))
+            ]
+            near = [
+                (length(*row[:2]), row[2])
+                for row in rows
+                if not (held and row[2] in W) and counts(*row[:2])
+            ]
             found, row = best(near, default=(most, None))
             return (found, row) if found < beyond else (most, None)
 
@@ -289,15 +415,22 @@ def _steps() -> list[Example]:
         return (found, row) if found < 1.0 else (1.0, None)
 
     return [
-        (right, ""), (step(most=np.inf), "no_length"), (step(most=2.0), "free"), (lambda x, p, G, h, W: (1.0, None), "halfway"),
-        (step(counts=lambda room, speed: speed != 0), "negative"), (step(slack=lambda x, G, h: G @ x - h), "negative"),
-        (step(slack=lambda x, G, h: h), "elsewhere"), (step(counts=lambda room, speed: speed > 1e-9), "speed_rounding"),
+        (right, ""), (step(most=np.inf), "no_length"), (step(most=2.0), "free"),
+        (lambda x, p, G, h, W: (1.0, None), "halfway"),
+        (step(counts=lambda room, speed: speed != 0), "negative"),
+        (step(slack=lambda x, G, h: G @ x - h), "negative"),
+        (step(slack=lambda x, G, h: h), "elsewhere"),
+        (step(counts=lambda room, speed: speed > 1e-9), "speed_rounding"),
         (step(counts=lambda room, speed: abs(speed) > 1e-6, length=lambda room, speed: room / abs(speed)), "away"),
         (step(counts=lambda room, speed: speed >= 0, length=lambda room, speed: room / max(speed, 1e-3)), "along"),
-        (step(best=max), "nearest"), (by_room, "soonest"), (step(counts=lambda room, speed: speed > 1e-9, held=False), "held"),
-        (step(counts=lambda room, speed: speed > 1e-6 and room > 0), "touches"), (step(beyond=1.6), "beyond"),
-        (step(slack=lambda x, G, h: h - G @ x), "slack_rounding"), (lambda x, p, G, h, W: right(x, p, G, h, W)[0], "not_two"),
-        (lambda x, p, G, h, W: (right(x, p, G, h, W)[0], "row"), "no_row"), (lambda x, p: 1.0, "stops"), (0.5, "no_function"),
+        (step(best=max), "nearest"), (by_room, "soonest"),
+        (step(counts=lambda room, speed: speed > 1e-9, held=False), "held"),
+        (step(counts=lambda room, speed: speed > 1e-6 and room > 0), "touches"),
+        (step(beyond=1.6), "beyond"),
+        (step(slack=lambda x, G, h: h - G @ x), "slack_rounding"),
+        (lambda x, p, G, h, W: right(x, p, G, h, W)[0], "not_two"),
+        (lambda x, p, G, h, W: (right(x, p, G, h, W)[0], "row"), "no_row"),
+        (lambda x, p: 1.0, "stops"), (0.5, "no_function"),
     ]  # fmt: skip
 
 
@@ -309,11 +442,14 @@ def _drops() -> list[Example]:
         return W[int(np.argmin(prices))]
 
     return [
-        (drop(hardest), ""), (lambda W, prices: None, "pulls"), (drop(lambda W, prices: int(np.argmin(prices))), "place"),
-        (drop(lambda W, prices: W[int(np.argmax(np.abs(prices)))]), "pulls"), (drop(hardest, 0.0), "rounding"),
+        (drop(hardest), ""), (lambda W, prices: None, "pulls"),
+        (drop(lambda W, prices: int(np.argmin(prices))), "place"),
+        (drop(lambda W, prices: W[int(np.argmax(np.abs(prices)))]), "pulls"),
+        (drop(hardest, 0.0), "rounding"),
         (drop(lambda W, prices: next(r for r, p in zip(W, prices, strict=True) if p < 0)), "most_negative"),
         (lambda W, prices: hardest(W, prices) if len(W) else None, "pushes"),
-        (drop(hardest, -0.2), "negative_alone"), (lambda W, prices: drop(hardest)(W, prices) if len(W) else 3, "place"),
+        (drop(hardest, -0.2), "negative_alone"),
+        (lambda W, prices: drop(hardest)(W, prices) if len(W) else 3, "place"),
         (lambda W, prices: hardest(W, prices) if min(prices) < -1e-9 else None, "stops"),
         (drop(lambda W, prices: float(hardest(W, prices))), "no_number"), ([3], "no_function"),
     ]  # fmt: skip
@@ -324,7 +460,8 @@ def _guesses() -> list[Example]:
     motor = next(name for name in braking_qp().inequality_names if "upper" in name)
     return [
         (active, ""), (tuple(reversed(active)), ""), ([], "no_row"), (active[:-1], "corrections"),
-        (["RR facet 2"], "no_such_row"), ([*active, "FL_foot facet 0"], "corrections"), ([motor], "motors"),
+        (["RR facet 2"], "no_such_row"), ([*active, "FL_foot facet 0"], "corrections"),
+        ([motor], "motors"),
         ("RR_foot facet 2", "no_names"), ([f"RR_foot facet {i}" for i in range(4)], "dependent"),
     ]  # fmt: skip
 
@@ -339,7 +476,8 @@ EXERCISES = (
         "price = np.linalg.solve(KKT, [2, -8, 0])[2]",
         judge=NumericJudge(
             right=_price,
-            praise="Three equations: two say that the row balances the slope, one that the marble lies on it.",
+            praise="Three equations: two say that the row balances the slope, one that the marble "
+            "lies on it.",
             mistakes={
                 "sign": lambda: -_price(),
                 "length": lambda: _price() * np.sqrt(1.25),
@@ -351,42 +489,52 @@ EXERCISES = (
                 "distance": lambda: 3.0,
             },
             hints={
-                "sign": "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is positive.",
-                "length": "That is the slope's length. A price belongs to the row as it is written; this one has length √1.25.",
+                "sign": "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is "
+                "positive.",
+                "length": "That is the slope's length. A price belongs to the row as it is "
+                "written; this one has length √1.25.",
                 "level": "That is the price of a level table. Here along and up pay together.",
                 "no_curvature": "The curvature of 4 is missing.",
                 "no_half": "The objective has a ½ before each square.",
                 "along": "That is where the marble lies along the table.",
                 "height": "That is how high the marble lies.",
-                "distance": "That is the distance by which the row is broken at the bowl's lowest point.",
+                "distance": "That is the distance by which the row is broken at the bowl's lowest "
+                "point.",
             },
         ),
-        explanation="On the row up = 0.5 along, so ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = along, which is least at a = -1: the "
-        "marble lies at (-1, -0.5), where the slope is (-3, 6); the row (0.5, -1) times 6 balances it.",
+        explanation="On the row up = 0.5 along, so ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = along, "
+        "which is least at a = -1: the "
+        "marble lies at (-1, -0.5), where the slope is (-3, 6); the row (0.5, -1) times 6 balances "
+        "it.",
     ),
     Exercise(
         name="C.2",
-        statement="`longest_step(x, p, G, h, W)`: how far from x along p, at most 1, all rows of G x ≤ h hold, and the number "
+        statement="`longest_step(x, p, G, h, W)`: how far from x along p, at most 1, all rows of G "
+        "x ≤ h hold, and the number "
         "of the row that blocks, or None. Rows in the list W are held already.",
         stub=LONGEST_STEP_STUB,
         solution=LONGEST_STEP,
         judge=_judge_step,
         examples=_steps,
-        explanation="A row i leaves slack / speed of room along the step, if the step comes closer to it at all. The least of "
+        explanation="A row i leaves slack / speed of room along the step, if the step comes closer "
+        "to it at all. The least of "
         "these lengths decides, and 1 if none is less.",
     ),
     Exercise(
         name="C.3",
-        statement="`row_to_drop(W, prices)`: the number of the row of W with the most negative price, or None if no row pulls.",
+        statement="`row_to_drop(W, prices)`: the number of the row of W with the most negative "
+        "price, or None if no row pulls.",
         stub=ROW_TO_DROP_STUB,
         solution=ROW_TO_DROP,
         judge=_judge_drop,
         examples=_drops,
-        explanation="A negative price says: ψ would fall if this row were left. The most negative one promises the most.",
+        explanation="A negative price says: ψ would fall if this row were left. The most negative "
+        "one promises the most.",
     ),
     Exercise(
         name="C.4",
-        statement="The names of the rows that are active in go2's QP, 50 ms into a push of 120 N forwards and to the left.",
+        statement="The names of the rows that are active in go2's QP, 50 ms into a push of 120 N "
+        "forwards and to the left.",
         stub='guess = ["RR_foot normal force"]  # more names, or others',
         solution="guess = [\n"
         '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
@@ -394,8 +542,10 @@ EXERCISES = (
         "]",
         judge=_judge_guess,
         examples=_guesses,
-        explanation="To brake, the feet must push backwards and to the right: facets 2 and 3. The rear right foot, which the "
-        "push relieves, carries nothing: all its three numbers are held. FL, on which go2 leans, is free.",
+        explanation="To brake, the feet must push backwards and to the right: facets 2 and 3. The "
+        "rear right foot, which the "
+        "push relieves, carries nothing: all its three numbers are held. FL, on which go2 leans, "
+        "is free.",
     ),
 )
 

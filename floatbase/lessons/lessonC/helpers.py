@@ -1,4 +1,6 @@
-"""Lesson C, How a QP solver thinks: problems in the plane, Beale's corner, and a controller whose solver is the learner's."""
+"""Lesson C, How a QP solver thinks: problems in the plane, Beale's corner, and a controller whose
+solver is the learner's.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +24,33 @@ PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it 
 _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
-def corner_table(minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike = (1.0, 0.5)) -> fb.QP:
-    """The course text's table with three walls: a bowl with its lowest point at `minimum`, in the plane (along, up).
+def corner_table(
+    minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike = (1.0, 0.5)
+) -> fb.QP:
+    """The course text's table with three walls: a bowl with its lowest point at `minimum`, in the
+    plane (along, up).
 
     Rows: table up ≥ 0, ramp along - 3 up ≤ 2, roof 2 along + 3 up ≤ 2, wall along ≥ -3.
     """
     H = np.diag(as_array("curvature", curvature, (2,)))
-    G, h = np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]]), np.array([0.0, 2.0, 2.0, 3.0])
-    return fb.QP(H, -H @ as_array("minimum", minimum, (2,)), *_NONE, G, h, inequality_names=("table", "ramp", "roof", "wall"))
+    G, h = (
+        np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]]),
+        np.array([0.0, 2.0, 2.0, 3.0]),
+    )
+    return fb.QP(
+        H,
+        -H @ as_array("minimum", minimum, (2,)),
+        *_NONE,
+        G,
+        h,
+        inequality_names=("table", "ramp", "roof", "wall"),
+    )
 
 
 def hexagon_table() -> fb.QP:
-    """A table with six edges seen from above, 2 from its middle, and a long, slanting bowl that is lowest at (1, 3.9)."""
+    """A table with six edges seen from above, 2 from its middle, and a long, slanting bowl that is
+    lowest at (1, 3.9).
+    """
     angles = np.pi / 3 * np.arange(6) + np.pi / 6
     turn = np.deg2rad(15.0)
     axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -44,14 +61,22 @@ def hexagon_table() -> fb.QP:
 
 
 def beale_problem(curvature: float = 0.1) -> fb.QP:
-    """Beale's problem, on which careless rules go round for ever, with a little curvature: 4 variables, 7 rows.
+    """Beale's problem, on which careless rules go round for ever, with a little curvature: 4
+    variables, 7 rows.
 
-    Six of the rows meet in the point 0, where it begins. Source: E. M. L. Beale, Cycling in the dual simplex algorithm, Naval
-    Research Logistics Quarterly 2 (1955).
+    Six of the rows meet in the point 0, where it begins. Source: E. M. L. Beale, Cycling in the
+    dual simplex algorithm, Naval Research Logistics Quarterly 2 (1955).
     """
     rows = [[0.25, -60.0, -0.04, 9.0], [0.5, -90.0, -0.02, 3.0], [0.0, 0.0, 1.0, 0.0], *-np.eye(4)]
     g = np.array([-0.75, 150.0, -0.02, 6.0])
-    return fb.QP(curvature * np.eye(4), g, np.zeros((0, 4)), np.zeros(0), np.array(rows), np.array([0, 0, 1.0, 0, 0, 0, 0]))
+    return fb.QP(
+        curvature * np.eye(4),
+        g,
+        np.zeros((0, 4)),
+        np.zeros(0),
+        np.array(rows),
+        np.array([0, 0, 1.0, 0, 0, 0, 0]),
+    )
 
 
 class SolverController:
@@ -60,7 +85,9 @@ class SolverController:
     controller: makes the QP. solver: is called with it, and returns x = (q̈, τ, λ), shape (n,).
     """
 
-    def __init__(self, controller: fb.WholeBodyController, solver: Callable[[fb.QP], npt.ArrayLike]):
+    def __init__(
+        self, controller: fb.WholeBodyController, solver: Callable[[fb.QP], npt.ArrayLike]
+    ):
         self.robot, self.contacts = controller.robot, controller.contacts
         self.controller, self.solver = controller, solver
 
@@ -72,9 +99,11 @@ class SolverController:
 
 
 class LimitedActiveSet:
-    """A solver for `SolverController`: the package's `active_set`, stopped after so many rounds, from nothing or from the tick before.
+    """A solver for `SolverController`: the package's `active_set`, stopped after so many rounds,
+    from nothing or from the tick before.
 
-    max_rounds: rounds in a tick. warm: whether it begins with the rows on which the tick before ended. runs: of all ticks.
+    max_rounds: rounds in a tick. warm: whether it begins with the rows on which the tick before
+        ended. runs: of all ticks.
     """
 
     def __init__(self, max_rounds: int, warm: bool):
@@ -91,16 +120,24 @@ class LimitedActiveSet:
 def standing_controller() -> fb.WholeBodyController:
     """go2 that stands, as in lesson 07: 42 variables, 30 equalities, 44 inequalities."""
     state = standing_go2_eom().state
-    return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state))
+    return fb.WholeBodyController(
+        state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state)
+    )
 
 
-def run_with_push(controller: Controller, newtons: float, duration: float = 0.6, towards: float = 90.0) -> Rollout:
+def run_with_push(
+    controller: Controller, newtons: float, duration: float = 0.6, towards: float = 90.0
+) -> Rollout:
     """The record of go2 on the physics, pushed at the base from 0.05 to 0.15 s.
 
     newtons: how hard. duration: s, of the record. towards: degrees, 0 forwards, 90 to its left.
     """
     angle = np.deg2rad(towards)
-    push = fb.Push(newtons * np.array([np.cos(angle), np.sin(angle), 0.0]), start=PUSH_START, duration=PUSH_DURATION)
+    push = fb.Push(
+        newtons * np.array([np.cos(angle), np.sin(angle), 0.0]),
+        start=PUSH_START,
+        duration=PUSH_DURATION,
+    )
     return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
 
 
@@ -112,9 +149,11 @@ def braking_qp() -> fb.QP:
 
 
 def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
-    """Where the marble lies when every row repels it, ψ - t Σ log(h - G x), for each softness t: Newton's method, damped.
+    """Where the marble lies when every row repels it, ψ - t Σ log(h - G x), for each softness t:
+    Newton's method, damped.
 
-    start: (n,), inside all rows. softness: (k,), from soft to hard, each begun where the last ended. This is the central path
+    start: (n,), inside all rows. softness: (k,), from soft to hard, each begun where the last
+        ended. This is the central path
     of interior-point methods. Source: Boyd and Vandenberghe, Convex Optimization, ch. 11.2.
     """
     x, points = as_array("start", start, (qp.n,)), []
@@ -132,7 +171,9 @@ def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> li
 
 
 def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
-    """The answer to an exercise if it is right; `otherwise` if it is not, and a line that says so. Counts no try."""
+    """The answer to an exercise if it is right; `otherwise` if it is not, and a line that says so.
+    Counts no try.
+    """
     if all_exercises()[name].judge(answer).right:
         print(f"{name}: the lesson goes on with yours.")
         return answer
@@ -140,8 +181,12 @@ def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
     return otherwise
 
 
-def longest_step(x: Array, p: Array, G: Array, h: Array, W: Sequence[int]) -> tuple[float, int | None]:
-    """The solution of exercise C.2: how far from x along p, at most 1, all rows hold, and the first row in the way, or None."""
+def longest_step(
+    x: Array, p: Array, G: Array, h: Array, W: Sequence[int]
+) -> tuple[float, int | None]:
+    """The solution of exercise C.2: how far from x along p, at most 1, all rows hold, and the first
+    row in the way, or None.
+    """
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):

@@ -1,4 +1,6 @@
-"""Lesson C, How a QP solver thinks: the table, a game of rows on and off, the way of a solver, rounds and slacks."""
+"""Lesson C, How a QP solver thinks: the table, a game of rows on and off, the way of a solver,
+rounds and slacks.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,19 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 _BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
 _COLOURS = 48
 _NEAR = 1e-9  # a row broken by less, or a price less negative, is right but for rounding
-PUZZLES = ((0.5, -1.0), (2.5, 2.0), (-4.0, 1.5), (-1.5, -1.5), (-4.0, -1.0))  # lowest points of the bowls to be played
+PUZZLES = (
+    (0.5, -1.0),
+    (2.5, 2.0),
+    (-4.0, 1.5),
+    (-1.5, -1.5),
+    (-4.0, -1.0),
+)  # lowest points of the bowls to be played
 _STYLES = ("-", "--", ":")
 
 
 def show_table(lowest: float) -> str:
-    """The course text's table and a bowl with its lowest point so far above it: where the marble rests and what the row costs.
+    """The course text's table and a bowl with its lowest point so far above it: where the marble
+    rests and what the row costs.
 
     lowest: m, negative below the table. Returns HTML.
     """
@@ -44,23 +53,30 @@ def show_table(lowest: float) -> str:
     axis = _flat_axis(qp, (-2.5, 3.0, -2.2, 2.2), solution.active, solution.x)
     axis.plot(0.5, lowest, "x", color=GREYS[1], markersize=9)
     rests = "rests on the table" if solution.x[1] < _NEAR else "does not touch the table"
-    return _image(axis) + f"<div>the marble {rests}; price of the row: <b>{rounded(price)}</b></div>"
+    return (
+        _image(axis) + f"<div>the marble {rests}; price of the row: <b>{rounded(price)}</b></div>"
+    )
 
 
 class ActiveSetGame(widgets.VBox):
-    """A QP in the plane to be solved by hand: a button for each row, which is on or off, and one for the next bowl.
+    """A QP in the plane to be solved by hand: a button for each row, which is on or off, and one
+    for the next bowl.
 
-    Each click solves one linear system, that of the rows which are on. `working` lists their names, `clicks` counts,
-    `solved` says whether the present point is the optimum.
+    Each click solves one linear system, that of the rows which are on. `working` lists their names,
+    `clicks` counts, `solved` says whether the present point is the optimum.
     """
 
     def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
         self._puzzles, self._at = tuple(puzzles), 0
         self._picture, self._told = widgets.HTML(), widgets.HTML()
         self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
-        self.next = widgets.Button(description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto"))
+        self.next = widgets.Button(
+            description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto")
+        )
         self.next.on_click(self._next_puzzle)
-        buttons = widgets.HBox([*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap"))
+        buttons = widgets.HBox(
+            [*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap")
+        )
         super().__init__([self._picture, buttons, self._told])
         self._start_puzzle()
 
@@ -95,10 +111,14 @@ class ActiveSetGame(widgets.VBox):
         self._show()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        return self._site_bundle() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
+        return (
+            self._site_bundle() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
+        )
 
     def _site_bundle(self) -> dict[str, Any]:
-        """For a site: what every set of rows shows, in every bowl. The game is left at its beginning."""
+        """For a site: what every set of rows shows, in every bowl. The game is left at its
+        beginning.
+        """
         bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
         pack = static_export.StaticExport([], words="In the live lesson the clicks are counted.")
         switches = list(product((0, 1), repeat=len(self.rows)))
@@ -120,19 +140,28 @@ class ActiveSetGame(widgets.VBox):
 
     def _show(self) -> None:
         for name, button in self.rows.items():
-            button.icon, button.style.font_weight = ("check", "bold") if name in self.working else ("", "normal")
+            button.icon, button.style.font_weight = (
+                ("check", "bold") if name in self.working else ("", "normal")
+            )
         self._picture.value, faults = self._current_view()
         self.solved = not faults
         clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
-        self._told.value = f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_describe_faults(faults)}"
+        self._told.value = (
+            f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_describe_faults(faults)}"
+        )
 
 
 def _describe_faults(faults: Sequence[str]) -> str:
-    return "; ".join(faults) if faults else "<b>solved</b>: no row is broken, and none that is on pulls"
+    return (
+        "; ".join(faults)
+        if faults
+        else "<b>solved</b>: no row is broken, and none that is on pulls"
+    )
 
 
 def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
-    """The least point on the rows of `working`, shape (n,), and in words what is wrong with it; nothing at the optimum.
+    """The least point on the rows of `working`, shape (n,), and in words what is wrong with it;
+    nothing at the optimum.
 
     None where these rows have no point in common, or depend on one another.
     """
@@ -140,11 +169,21 @@ def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list
     G, k = qp.G[rows], len(rows)
     if k and np.linalg.matrix_rank(G) < k:
         return None, [f"{' and '.join(working)}: these lines have no point, or too many, in common"]
-    found = np.linalg.solve(np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]]))
+    found = np.linalg.solve(
+        np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]])
+    )
     x, prices = found[: qp.n], found[qp.n :]
     over = qp.G @ x - qp.h
-    broken = [f"{name} is broken by {rounded(d)}" for name, d in zip(qp.inequality_names, over, strict=True) if d > _NEAR]
-    pulls = [f"{name} pulls: its price is {rounded(p)}" for name, p in zip(working, prices, strict=True) if p < -_NEAR]
+    broken = [
+        f"{name} is broken by {rounded(d)}"
+        for name, d in zip(qp.inequality_names, over, strict=True)
+        if d > _NEAR
+    ]
+    pulls = [
+        f"{name} pulls: its price is {rounded(p)}"
+        for name, p in zip(working, prices, strict=True)
+        if p < -_NEAR
+    ]
     return x, broken + pulls
 
 
@@ -154,9 +193,11 @@ def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
 
 
 def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
-    """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are on, and the objective.
+    """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are
+    on, and the objective.
 
-    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on. rounds: between whole numbers
+    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on.
+        rounds: between whole numbers
     the point is under way.
     """
     whole = min(int(rounds), len(ways) - 1)
@@ -167,14 +208,26 @@ def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds
     axis = _flat_axis(qp, _hexagon_example(), names, x)
     passed = [point for point, _ in ways[: whole + 1]]
     axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
-    return _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective {rounded(qp.objective(x), digits=3)}</div>"
+    return (
+        _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective "
+        f"{rounded(qp.objective(x), digits=3)}</div>"
+    )
 
 
 def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
-    """Numbers round by round. curves: name -> (n,) numbers, one before the first round and one after each. label: of them."""
+    """Numbers round by round. curves: name -> (n,) numbers, one before the first round and one
+    after each. label: of them.
+    """
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
-        ax.plot(np.atleast_1d(numbers), style, color=hex_code(colour), marker="o", label=name, linewidth=2)
+        ax.plot(
+            np.atleast_1d(numbers),
+            style,
+            color=hex_code(colour),
+            marker="o",
+            label=name,
+            linewidth=2,
+        )
     ax.set(xlabel="rounds", ylabel=label)
     ax.grid(alpha=0.3)
     ax.legend()
@@ -186,11 +239,17 @@ def _hexagon_example() -> tuple[float, float, float, float]:
     return (-3.2, 3.2, -2.9, 4.3)
 
 
-def _flat_axis(qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None) -> Axes:
-    """A picture of a problem on a small figure of its own, which pyplot does not know and need not close."""
+def _flat_axis(
+    qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None
+) -> Axes:
+    """A picture of a problem on a small figure of its own, which pyplot does not know and need not
+    close.
+    """
     figure = Figure(figsize=(4.6, 3.8), dpi=80)
     FigureCanvasAgg(figure)
-    axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))  # few: they take most of the time
+    axis = figure.add_axes(
+        (0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2)
+    )  # few: they take most of the time
     return qp_plots.plot(qp, box, working, x, axis)
 
 
@@ -198,6 +257,11 @@ def _image(axis: Axes) -> str:
     """The figure of an axis as HTML; few colours make it a third as large."""
     canvas, data = FigureCanvasAgg(axis.figure), io.BytesIO()  # type: ignore[arg-type]
     canvas.draw()
-    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(_COLOURS).save(data, "png", optimize=True)
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(_COLOURS).save(
+        data, "png", optimize=True
+    )
     text = base64.b64encode(data.getvalue()).decode()
-    return f'<img src="data:image/png;base64,{text}" style="max-width: 100%" alt="a quadratic program in the plane">'
+    return (
+        f'<img src="data:image/png;base64,{text}" style="max-width: 100%" alt="a quadratic '
+        f'program in the plane">'
+    )

@@ -10,7 +10,13 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
-from floatbase.lessons.lessonP.helpers import BAG_MASS, HIDDEN_MASS, com_sag, time_on_two_feet, unknown_mass_record
+from floatbase.lessons.lessonP.helpers import (
+    BAG_MASS,
+    HIDDEN_MASS,
+    com_sag,
+    time_on_two_feet,
+    unknown_mass_record,
+)
 
 G = 9.81  # m/s²
 MAX_SAG, MIN_SAG = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
@@ -41,11 +47,14 @@ def _stiffness_slips() -> dict[str, float]:
 
 
 _STIFFNESS = {
-    "robot_too": "That carries the robot and the bag; it knows its own weight. Only what it does not know makes it sink.",
+    "robot_too": "That carries the robot and the bag; it knows its own weight. Only what it does "
+    "not know makes it sink.",
     "robot_alone": "That would be for the robot's own weight. Only the bag is not known.",
     "metres": "Metres: 10 mm are 0.01 m, and kp is for metres.",
-    "newtons": "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the controller believes.",
-    "true_mass": "The controller plans forces for the mass that it believes, the smaller one: divide by that.",
+    "newtons": "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the "
+    "controller believes.",
+    "true_mass": "The controller plans forces for the mass that it believes, the smaller one: "
+    "divide by that.",
     "damping": "That looks like kd = 2 √kp, which acts on velocities; at rest there are none.",
     "no_g": "Without g that is no acceleration.",
 }
@@ -63,26 +72,44 @@ def _judge_stiffness(answer: Any) -> Verdict:
         if abs(kp - slip) <= MISTAKE_TOLERANCE * slip:
             return Verdict(False, _STIFFNESS[hint], hint)
     if kp > MAX_KP:
-        return Verdict(False, "No motor follows that: the controller looks at the robot only every 4 ms.", "too_stiff")
+        return Verdict(
+            False,
+            "No motor follows that: the controller looks at the robot only every 4 ms.",
+            "too_stiff",
+        )
     below = 1e3 * com_sag(kp)
     if not np.isfinite(below):
         return Verdict(False, "So soft that the robot sinks to the ground.", "ground")
     if below > MAX_SAG + ROUNDING:
         return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.", "soft")
     if below < MIN_SAG:
-        return Verdict(False, f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to motors.", "hard")
-    return Verdict(True, f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not known.)")
+        return Verdict(
+            False,
+            f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to "
+            f"motors.",
+            "hard",
+        )
+    return Verdict(
+        True,
+        f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not "
+        f"known.)",
+    )
 
 
 def _corners() -> tuple[Array, dict[str, Array]]:
     """The centre of mass and the feet, each seen from above, (2,) m."""
     state = fb.load("go2").standing()
     contacts = fb.Contacts.feet(state.robot)
-    return state.com[:2], {name: place[:2] for name, place in zip(contacts.names, contacts.positions(state), strict=True)}
+    return state.com[:2], {
+        name: place[:2]
+        for name, place in zip(contacts.names, contacts.positions(state), strict=True)
+    }
 
 
 def _nearest(first: str = "FL_foot", second: str = "RR_foot") -> Array:
-    """The way from the centre of mass to the nearest point of a line through two feet, (3,) m: least squares along the line."""
+    """The way from the centre of mass to the nearest point of a line through two feet, (3,) m:
+    least squares along the line.
+    """
     com, feet = _corners()
     line = feet[second] - feet[first]
     along = np.linalg.lstsq(line[:, None], com - feet[first], rcond=None)[0]
@@ -116,12 +143,15 @@ _SHIFT = NumericJudge(
         "direction": lambda: np.append(_unit_line(), 0.0),
     },
     hints={
-        "zero": "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot tips.",
+        "zero": "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot "
+        "tips.",
         "other_diagonal": "That is over the other diagonal, of FR and RL, which are to be lifted.",
         "sign": "The other way round: from the centre of mass to the line, not from the line.",
-        "not_shortest": "That is over the diagonal, but it is not the shortest way: a plumb line meets it at a right angle.",
+        "not_shortest": "That is over the diagonal, but it is not the shortest way: a plumb line "
+        "meets it at a right angle.",
         "on_FL": "That is over a foot. Standing on one end of the diagonal is harder than on both.",
-        "on_RR": "That is over the foot RR. Standing on one end of the diagonal is harder than on both.",
+        "on_RR": "That is over the foot RR. Standing on one end of the diagonal is harder than on "
+        "both.",
         "metres": "Metres, please: that would be as many millimetres.",
         "along": "That is the part of the way *along* the diagonal; the part across it is needed.",
         "halfway": "Halfway. The centre of mass is not over the line yet.",
@@ -137,14 +167,24 @@ def _judge_shift(answer: Any) -> Verdict:
     if isinstance(given, Verdict):
         return given
     if abs(given[2]) > HEIGHT:
-        return Verdict(False, "Seen from above: the centre of mass keeps its height, so the third number is 0.", "height")
+        return Verdict(
+            False,
+            "Seen from above: the centre of mass keeps its height, so the third number is 0.",
+            "height",
+        )
     verdict = _SHIFT(given)
     if not verdict.right:
         return verdict
     times = [time_on_two_feet(shift) for shift in (np.zeros(3), given)]
     if times[1] < TIME_ON_TWO_FEET:
-        return Verdict(False, f"On physics it stood on two feet for {times[1]:.1f} s only.", "short")
-    return Verdict(True, f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where it was.")
+        return Verdict(
+            False, f"On physics it stood on two feet for {times[1]:.1f} s only.", "short"
+        )
+    return Verdict(
+        True,
+        f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where "
+        f"it was.",
+    )
 
 
 def _measured(row: int = -1) -> float:
@@ -163,7 +203,8 @@ def _by_sinking(kp: float) -> float:
 def _stiffnesses() -> list[Example]:
     right = _load() * G / (MAX_SAG / 1e3)
     return [
-        *((kp, hint) for hint, kp in _stiffness_slips().items()), (right, ""), (0.97 * right, ""), (-right, "not_above_zero"),
+        *((kp, hint) for hint, kp in _stiffness_slips().items()), (right, ""), (0.97 * right, ""),
+        (-right, "not_above_zero"),
         (0.8 * right, "soft"), (1.5 * right, "hard"), (1e6, "too_stiff"), (3.0, "ground"),
     ]  # fmt: skip
 
@@ -175,32 +216,38 @@ def _shifts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="P.1",
-        statement="The kp of the task for the centre of mass with which go2 sinks 10 mm under a bag of 6 kg, 1/s².",
+        statement="The kp of the task for the centre of mass with which go2 sinks 10 mm under a "
+        "bag of 6 kg, 1/s².",
         stub="kp = 0.0  # 1/s²; replace by your expression",
         solution="kp = bag / go2.mass * 9.81 / 0.010",
         judge=_judge_stiffness,
         examples=_stiffnesses,
-        explanation="At rest m (kp s + g) = (m + bag) g. On physics it is 3 to 6 % less, since legs have masses of their own.",
+        explanation="At rest m (kp s + g) = (m + bag) g. On physics it is 3 to 6 % less, since "
+        "legs have masses of their own.",
     ),
     Exercise(
         name="P.2",
-        statement="The shortest horizontal shift of the centre of mass that brings it over the diagonal FL - RR, (3,), m.",
+        statement="The shortest horizontal shift of the centre of mass that brings it over the "
+        "diagonal FL - RR, (3,), m.",
         stub="shift = np.zeros(3)  # m, world; replace by your expression",
         solution="line = feet['RR_foot'] - feet['FL_foot']\n"
         "across = np.array([-line[1], line[0], 0]) / np.linalg.norm(line[:2])\n"
         "shift = across * (across @ (feet['FL_foot'] - com))",
         judge=_judge_shift,
         examples=_shifts,
-        explanation="The part of (foot - com) across the line; what is along the line does not matter.",
+        explanation="The part of (foot - com) across the line; what is along the line does not "
+        "matter.",
     ),
     Exercise(
         name="P.3",
-        statement="The mass in the world of a record, as a multiple of what the controller believes.",
+        statement="The mass in the world of a record, as a multiple of what the controller "
+        "believes.",
         stub="factor = 1.0  # replace by what you read from dark",
         solution="factor = dark.measured[-1, 2::3].sum() / go2.weight",
         judge=NumericJudge(
             right=lambda: HIDDEN_MASS,
-            praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, and a good robot has four.)",
+            praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, "
+            "and a good robot has four.)",
             mistakes={
                 "believed": lambda: 1.0,
                 "first_row": lambda: _measured(0),
@@ -214,14 +261,18 @@ EXERCISES = (
             },
             hints={
                 "believed": "That is what it believes.",
-                "first_row": "That is the first row, before the ground has answered: wait until it is at rest.",
-                "planned": "That is planned. It plans for an acceleration that never comes; take what was measured.",
+                "first_row": "That is the first row, before the ground has answered: wait until it "
+                "is at rest.",
+                "planned": "That is planned. It plans for an acceleration that never comes; take "
+                "what was measured.",
                 "missing": "That is what is missing, as a part; the question is all of it.",
                 "inverse": "The other way round: believed for true.",
                 "kilograms": "That is a mass in kg; as a multiple of what is believed, please.",
-                "newtons": "Those are newtons; as a multiple of the weight that is believed, please.",
+                "newtons": "Those are newtons; as a multiple of the weight that is believed, "
+                "please.",
                 "one_foot": "That is one foot's part on average: four feet carry.",
-                "sinking": "That is from how far it sank, with kp = 100. Who says that kp was 100? Forces do not need it.",
+                "sinking": "That is from how far it sank, with kp = 100. Who says that kp was 100? "
+                "Forces do not need it.",
             },
             tolerance=5e-3,
         ),

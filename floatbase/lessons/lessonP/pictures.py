@@ -1,4 +1,6 @@
-"""Lesson P, Playground: outcomes for what is believed and what is true, and how far a push moves a robot with slow motors."""
+"""Lesson P, Playground: outcomes for what is believed and what is true, and how far a push moves a
+robot with slow motors.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 
 
 def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
-    """A table of squares: dark where a robot fell, with the time when it was down, light where it stood.
+    """A table of squares: dark where a robot fell, with the time when it was down, light where it
+    stood.
 
     records: (believed, true) -> record. name: of what is believed.
     """
@@ -32,14 +35,23 @@ def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> 
 
 
 def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) -> Axes:
-    """How far a push moves a robot, mm, for gains, 1/s²; a cross at the top is a fall, a dashed line the border."""
+    """How far a push moves a robot, mm, for gains, 1/s²; a cross at the top is a fall, a dashed
+    line the border.
+    """
     _, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
     stands = np.isfinite(y)
     top = 1.3 * y[stands].max(initial=1.0)
     axis.semilogx(x[stands], y[stands], "o-", color=hex_code(GREYS[0]), label="stands")
     if not stands.all():
-        axis.plot(x[~stands], np.full((~stands).sum(), top), "x", color=hex_code(GREYS[0]), ms=9, label="falls")
+        axis.plot(
+            x[~stands],
+            np.full((~stands).sum(), top),
+            "x",
+            color=hex_code(GREYS[0]),
+            ms=9,
+            label="falls",
+        )
     axis.axvline(border, color=hex_code(GREYS[1]), linestyle="--", label="4 ω²")
     axis.set_xticks(x, [f"{gain:g}" for gain in x])
     axis.minorticks_off()

@@ -22,7 +22,12 @@ from floatbase.lessons.lessonX.diagnostics import (
     sliding_friction_ratios,
 )
 from floatbase.lessons.lessonX.exercises import EXERCISES, kicked_box
-from floatbase.lessons.lessonX.pictures import draw_torque_comparison, play_box, plot_residual_force, show_instant
+from floatbase.lessons.lessonX.pictures import (
+    draw_torque_comparison,
+    play_box,
+    plot_residual_force,
+    show_instant,
+)
 from floatbase.lessons.lessonX.verdicts import COUNTER_EVIDENCE, judge_line, named_fault
 
 __all__ = [

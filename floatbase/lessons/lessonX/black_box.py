@@ -14,7 +14,8 @@ from floatbase.robots import Robot
 
 @dataclass(frozen=True, eq=False)
 class BlackBox(Value):
-    """The record of a robot that was to stand on four feet and twist. One row for each of n ticks; read-only.
+    """The record of a robot that was to stand on four feet and twist. One row for each of n ticks;
+    read-only.
 
     name: of the case.
     robot: its data sheet, which is right.
@@ -62,9 +63,16 @@ class BlackBox(Value):
 
     @property
     def fell(self) -> bool:
-        """Whether the robot lies at the end: its base tilted by 45° or more, or at half its height or less."""
+        """Whether the robot lies at the end: its base tilted by 45° or more, or at half its height
+        or less.
+        """
         x, y = self.q[-1, 3:5]
-        return bool(1.0 - 2.0 * (x**2 + y**2) < np.cos(np.pi / 4) or self.q[-1, 2] < 0.5 * self.q[0, 2])
+        return bool(
+            1.0 - 2.0 * (x**2 + y**2) < np.cos(np.pi / 4) or self.q[-1, 2] < 0.5 * self.q[0, 2]
+        )
 
     def __repr__(self) -> str:
-        return f"BlackBox({self.name}: {self.robot.name}, {self.time[-1]:.1f} s{', fell' if self.fell else ''})"
+        return (
+            f"BlackBox({self.name}: {self.robot.name}, {self.time[-1]:.1f} "
+            f"s{', fell' if self.fell else ''})"
+        )

@@ -1,4 +1,6 @@
-"""Lesson X, The crash investigation: robots that twist with one fault each, on the physics, until they fall."""
+"""Lesson X, The crash investigation: robots that twist with one fault each, on the physics, until
+they fall.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,11 @@ from floatbase.objectives import Task
 from floatbase.simulation import Actuators, Rollout
 
 MU = 1.2  # friction that controllers are told: rubber on a rough mat
-KP_COM, KP_BASE, FACETS = 6.0, 30.0, 8  # a gentle robot: what the equations get wrong, gains hardly mend
+KP_COM, KP_BASE, FACETS = (
+    6.0,
+    30.0,
+    8,
+)  # a gentle robot: what the equations get wrong, gains hardly mend
 PERIOD, SECONDS = 2e-3, 3.0  # s: of a tick, and of a record
 DRIFT_TIME = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
 LOOPS = 10  # of the twist: more than a record has
@@ -35,8 +41,10 @@ FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors
 class Twist:
     """What a robot was to do and where.
 
-    pitch, yaw: rad, half the widths of the ellipse that its base describes. rate: loops for each second. direction: 1 or -1.
-    tilt: degrees of the ground. heading: rad, where it rises least: the horizontal direction of its normal.
+    pitch, yaw: rad, half the widths of the ellipse that its base describes. rate: loops for each
+        second. direction: 1 or -1.
+    tilt: degrees of the ground. heading: rad, where it rises least: the horizontal direction of its
+        normal.
     """
 
     pitch: float = 0.22
@@ -50,7 +58,10 @@ class Twist:
     def random(rng: np.random.Generator) -> Twist:
         """One by chance."""
         pitch, way = rng.uniform(0.2, 0.25), int(rng.choice([-1, 1]))
-        yaw, rate = 0.44 + 0.6 * (0.25 - pitch), rng.uniform(2.28, 2.32)  # about as fast as friction allows
+        yaw, rate = (
+            0.44 + 0.6 * (0.25 - pitch),
+            rng.uniform(2.28, 2.32),
+        )  # about as fast as friction allows
         return Twist(pitch, yaw, rate, way, rng.uniform(0.0, 4.0), rng.uniform(0.0, 2.0 * np.pi))
 
     @property
@@ -68,9 +79,13 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
 
 
 class TwistController:
-    """A controller that remembers the accelerations it planned, and lets feet give way where nothing holds them."""
+    """A controller that remembers the accelerations it planned, and lets feet give way where
+    nothing holds them.
+    """
 
-    def __init__(self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch):
+    def __init__(
+        self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch
+    ):
         path = elliptic_rotation(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.direction)
         tasks: list[Task] = [
             fb.CoMTask(state.com, kp=KP_COM),
@@ -80,7 +95,9 @@ class TwistController:
         options: dict[str, Any] = {"facets": FACETS, "mismatch": mismatch}
         self.contacts, self.planned = contacts, list[Array]()
         self._firm = fb.WholeBodyController(state.robot, contacts, tasks, **options)
-        self._soft = fb.WholeBodyController(state.robot, contacts, tasks, contact_weight=SOFT_CONTACT_WEIGHT, **options)
+        self._soft = fb.WholeBodyController(
+            state.robot, contacts, tasks, contact_weight=SOFT_CONTACT_WEIGHT, **options
+        )
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:
         try:
@@ -92,7 +109,9 @@ class TwistController:
 
 
 class SwappedMotors:
-    """Two motors whose cables were swapped: each does what the other is told. `first`, `second`: their numbers."""
+    """Two motors whose cables were swapped: each does what the other is told. `first`, `second`:
+    their numbers.
+    """
 
     def __init__(self, d: int, first: int, second: int):
         self.order = np.arange(d)
@@ -108,8 +127,9 @@ class InjectedFault:
     """What was wrong; by default nothing.
 
     kind: its name.
-    size: of "friction" the true coefficient, of "normal" degrees between the one told and the true one, of "mass" the believed
-        one as a multiple of the true one, of "slow motors" their time constant, ms.
+    size: of "friction" the true coefficient, of "normal" degrees between the one told and the true
+        one, of "mass" the believed one as a multiple of the true one, of "slow motors" their time
+        constant, ms.
     heading: rad, of "normal": to where the one told is turned.
     joints: of "swapped motors", two names.
     """
@@ -143,13 +163,21 @@ def record_box(
     pushes: tuple[fb.Push, ...] = (),
     seconds: float = SECONDS,
 ) -> BlackBox:
-    """The record of go2 that twists while something is wrong, until it falls or so many seconds are over."""
+    """The record of go2 that twists while something is wrong, until it falls or so many seconds are
+    over.
+    """
     robot, fault = fb.load("go2"), injected_fault.kind
     mu = injected_fault.size if fault == "friction" else MU
-    told = tilted(twist.normal, injected_fault.size, injected_fault.heading) if fault == "normal" else twist.normal
+    told = (
+        tilted(twist.normal, injected_fault.size, injected_fault.heading)
+        if fault == "normal"
+        else twist.normal
+    )
     contacts = fb.Contacts.points(robot, MU, normals=told)
     state = standing_on(robot, twist.normal)
-    mismatch = ModelMismatch(mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift")
+    mismatch = ModelMismatch(
+        mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift"
+    )
     pilot = TwistController(state, contacts, twist, mismatch)
     actuators = faulty_motors(robot, injected_fault, pilot(state.q, state.v, 0.0).tau)
     pilot.planned.clear()
@@ -160,7 +188,9 @@ def record_box(
 
 
 def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) -> Actuators | None:
-    """What stands between orders and joints; None where nothing does. tau: (d,) N·m, with which the robot stands at first."""
+    """What stands between orders and joints; None where nothing does. tau: (d,) N·m, with which the
+    robot stands at first.
+    """
     if injected_fault.kind == "slow motors":
         lag = FirstOrderLag(robot, 1e3 / (2.0 * np.pi * injected_fault.size))
         lag.reset(tau)
@@ -172,7 +202,9 @@ def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) ->
 
 
 def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
-    """A level robot above a tilted ground, with each foot on it straight below or above where it stands usually."""
+    """A level robot above a tilted ground, with each foot on it straight below or above where it
+    stands usually.
+    """
     home, centres = robot.standing(), {}
     for foot in robot.feet:
         touch = np.array(home.point(foot.frame))
@@ -184,7 +216,8 @@ def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
 def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
     """What a record leaves to an investigation. qdd: (n, nv), as the controller planned."""
     return BlackBox(
-        name, record.robot, record.contacts, record.time, record.q, record.v, record.measured, record.tau_desired,
+        name, record.robot, record.contacts, record.time, record.q, record.v, record.measured,
+        record.tau_desired,
         record.planned, qdd,
     )  # fmt: skip
 
@@ -193,7 +226,8 @@ def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
 class Case:
     """One case as it was drawn: what the investigation does not know.
 
-    name: of the box. twists: by chance; the first that ends as it `falls` counts. injected_fault: what was wrong. pushes: kicks.
+    name: of the box. twists: by chance; the first that ends as it `falls` counts. injected_fault:
+        what was wrong. pushes: kicks.
     """
 
     name: str
@@ -207,7 +241,9 @@ class Case:
         return bool(self.injected_fault.kind or self.pushes)
 
     def record(self) -> BlackBox:
-        """What it leaves to the investigation. One forgotten drift in twenty is survived by good luck, and is tried again."""
+        """What it leaves to the investigation. One forgotten drift in twenty is survived by good
+        luck, and is tried again.
+        """
         for twist in self.twists:
             box = record_box(self.name, twist, self.injected_fault, self.pushes)
             if box.fell == self.falls:
@@ -216,16 +252,23 @@ class Case:
 
 
 def random_cases(seed: int) -> tuple[Case, ...]:
-    """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a whole number."""
+    """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a
+    whole number.
+    """
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
-    return tuple(Case(name, random_twists(rng), InjectedFault.random(fault, rng)) for name, fault in zip("ABCDEF", order, strict=True))
+    return tuple(
+        Case(name, random_twists(rng), InjectedFault.random(fault, rng))
+        for name, fault in zip("ABCDEF", order, strict=True)
+    )
 
 
 def faultless_cases(seed: int) -> tuple[Case, ...]:
     """Two cases by chance without a fault: in the second somebody kicks the robot over."""
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 2])
-    return Case("N", random_twists(rng), InjectedFault()), Case("K", random_twists(rng), InjectedFault(), (random_kick(rng),))
+    return Case("N", random_twists(rng), InjectedFault()), Case(
+        "K", random_twists(rng), InjectedFault(), (random_kick(rng),)
+    )
 
 
 def random_twists(rng: np.random.Generator) -> tuple[Twist, ...]:
@@ -236,12 +279,15 @@ def random_twists(rng: np.random.Generator) -> tuple[Twist, ...]:
 def random_kick(rng: np.random.Generator) -> fb.Push:
     """A kick by chance, hard enough to fell go2."""
     angle, force = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(260.0, 320.0)
-    return fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), start=float(rng.uniform(0.4, 0.8)))
+    return fb.Push(
+        force * np.array([np.cos(angle), np.sin(angle), 0.0]), start=float(rng.uniform(0.4, 0.8))
+    )
 
 
 @lru_cache(maxsize=8)
 def black_boxes(seed: int) -> tuple[BlackBox, ...]:
-    """The black boxes of six falls, A to F, each with one fault of `FAULTS`; other seeds, other boxes.
+    """The black boxes of six falls, A to F, each with one fault of `FAULTS`; other seeds, other
+    boxes.
 
     seed: a whole number.
     """
@@ -250,7 +296,9 @@ def black_boxes(seed: int) -> tuple[BlackBox, ...]:
 
 @lru_cache(maxsize=8)
 def faultless_boxes(seed: int) -> tuple[BlackBox, ...]:
-    """The black boxes of two robots without a fault: N twists to the end, K is kicked over. seed: a whole number."""
+    """The black boxes of two robots without a fault: N twists to the end, K is kicked over. seed: a
+    whole number.
+    """
     return tuple(case.record() for case in faultless_cases(seed))
 
 

@@ -11,7 +11,9 @@ from floatbase._validation import Array, cross
 from floatbase.lessons.lessonX.black_box import BlackBox
 
 _MIN_LOAD = 5.0  # N of a foot that bears on the ground
-_MIN_SLIP_SPEED = 0.3  # m/s of a contact point: the soft contacts of the physics let feet that hold creep by less
+_MIN_SLIP_SPEED = (
+    0.3  # m/s of a contact point: the soft contacts of the physics let feet that hold creep by less
+)
 
 
 def accelerations(box: BlackBox) -> Array:
@@ -22,8 +24,8 @@ def accelerations(box: BlackBox) -> Array:
 def required_forces(box: BlackBox) -> Array:
     """(7) M q̈ + h - Jᵀ λ with q̈ and λ as they were, (n - 1, nv): what else must have acted.
 
-    In the last d columns these are the torques of the motors, N·m. In the first six, N and N·m in the base frame, it is zero as
-    long as nobody touches the robot.
+    In the last d columns these are the torques of the motors, N·m. In the first six, N and N·m in
+    the base frame, it is zero as long as nobody touches the robot.
     """
     found = []
     for i, qdd in enumerate(accelerations(box)):
@@ -45,18 +47,23 @@ def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
 
 
 def foot_centres(box: BlackBox, i: int | np.integer[Any]) -> Array:
-    """The centres of the balls at the feet at row i, (4, 3) m: one radius above the ground, whatever its normal."""
+    """The centres of the balls at the feet at row i, (4, 3) m: one radius above the ground,
+    whatever its normal.
+    """
     state = box.state(i)
     return np.array([state.point(foot.frame, foot.centre) for foot in box.robot.feet])
 
 
 def ground_normal(box: BlackBox) -> Array:
-    """The normal of the plane in which the feet stand, (3,): the mean over the rows in the first 0.1 s where all four bear.
+    """The normal of the plane in which the feet stand, (3,): the mean over the rows in the first
+    0.1 s where all four bear.
 
     Where a foot lifts at once, of the first row.
     """
     rows = np.flatnonzero(box.time - box.time[0] < 0.1)
-    bears = [i for i in rows if np.linalg.norm(box.measured[i].reshape(-1, 3), axis=1).min() > _MIN_LOAD]
+    bears = [
+        i for i in rows if np.linalg.norm(box.measured[i].reshape(-1, 3), axis=1).min() > _MIN_LOAD
+    ]
     found = []
     for i in bears or rows[:1]:
         places = foot_centres(box, i)
@@ -67,7 +74,9 @@ def ground_normal(box: BlackBox) -> Array:
 
 
 def sliding_friction_ratios(box: BlackBox, normal: npt.ArrayLike) -> Array:
-    """|λt| / λn of each foot in each row in which it bears and slides, (m,). normal: of the ground, (3,)."""
+    """|λt| / λn of each foot in each row in which it bears and slides, (m,). normal: of the ground,
+    (3,).
+    """
     n, ratios = np.asarray(normal), []
     for i in range(0, len(box), 2):
         state = box.state(i)

@@ -28,12 +28,19 @@ from floatbase.lessons.lessonX.diagnostics import required_forces
 from floatbase.lessons.lessonX.verdicts import COUNTER_EVIDENCE, judge_line, mistaken
 
 KICK_SEED = 5  # seed of the box of exercise X.1
-_UNSEEN_SEEDS = (20611, 20612, 20613, 102, 20615, 20616)  # seeds from which the last exercise takes one fault each
+_UNSEEN_SEEDS = (
+    20611,
+    20612,
+    20613,
+    102,
+    20615,
+    20616,
+)  # seeds from which the last exercise takes one fault each
 _FAULTLESS_SEED = 20617  # and of its two robots without
 _KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
 
 
-# X.1 ----------------------------------------------------------------------------------------------------------------------
+# X.1 ----------------------------------------------------------------------------------------------
 
 
 @cache
@@ -44,7 +51,9 @@ def kicked_box() -> BlackBox:
 
 @cache
 def _residual() -> tuple[Array, Array]:
-    """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the world's."""
+    """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the
+    world's.
+    """
     box = kicked_box()
     found = required_forces(box)[:, :3]
     rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _KICK_FORCE)
@@ -66,8 +75,12 @@ def _impulse() -> Array:
 def _momentum() -> Array:
     """How the robot's momentum changed while it was kicked."""
     box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
-    first, last = (int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0))
-    return np.asarray(box.robot.mass * (box.state(last).com_velocity - box.state(first).com_velocity))
+    first, last = (
+        int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0)
+    )
+    return np.asarray(
+        box.robot.mass * (box.state(last).com_velocity - box.state(first).com_velocity)
+    )
 
 
 def _kicks() -> dict[str, Callable[[], Any]]:
@@ -75,24 +88,38 @@ def _kicks() -> dict[str, Callable[[], Any]]:
         "zero": lambda: np.zeros(3),
         "base_axes": lambda: 0.002 * _residual()[0].sum(axis=0),
         "no_duration": lambda: _residual()[1].sum(axis=0),
-        "fall": lambda: 0.002 * np.sum([_turned(i, row) for i, row in enumerate(required_forces(kicked_box())[:, :3])], axis=0),
+        "fall": lambda: (
+            0.002
+            * np.sum(
+                [_turned(i, row) for i, row in enumerate(required_forces(kicked_box())[:, :3])],
+                axis=0,
+            )
+        ),
         "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
         "momentum": _momentum,
     }
 
 
-# X.2 ----------------------------------------------------------------------------------------------------------------------
+# X.2 ----------------------------------------------------------------------------------------------
 
 
 def _judge_report(answer: Any) -> Verdict:
     """A seed, and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: the report is a list of lines.", "no_answer")
-    if not isinstance(answer, list | tuple) or not answer or not all(isinstance(line, str) for line in answer):
-        return Verdict(False, 'The report is a list of lines of text, such as "A: mass 0.93".', "no_lines")
+    if (
+        not isinstance(answer, list | tuple)
+        or not answer
+        or not all(isinstance(line, str) for line in answer)
+    ):
+        return Verdict(
+            False, 'The report is a list of lines of text, such as "A: mass 0.93".', "no_lines"
+        )
     seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
     if not seed or int(seed[1]) > LARGEST_SEED:
-        return Verdict(False, 'The first line says which boxes these are, as in "seed 7".', "no_seed")
+        return Verdict(
+            False, 'The first line says which boxes these are, as in "seed 7".', "no_seed"
+        )
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
     told = {name: line for name, line in lines.items() if line.strip(" ?.")}
     return _report_of(int(seed[1]), told)
@@ -102,66 +129,106 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     """told: name of a box -> what is said of it."""
     cases = {case.name: case for case in random_cases(seed)}
     if unknown := sorted(set(told) - set(cases)):
-        return Verdict(False, f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.", "no_such_box")
+        return Verdict(
+            False,
+            f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.",
+            "no_such_box",
+        )
     if not told:
         return Verdict(
-            False, 'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".', "nothing_said"
+            False,
+            'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".',
+            "nothing_said",
         )
     boxes = {box.name: box for box in black_boxes(seed)}
-    verdicts = {name: judge_line(cases[name], boxes[name], line) for name, line in sorted(told.items())}
+    verdicts = {
+        name: judge_line(cases[name], boxes[name], line) for name, line in sorted(told.items())
+    }
     wrong = [f"{name}: {verdict.text}" for name, verdict in verdicts.items() if not verdict.right]
     solved = [name for name, verdict in verdicts.items() if verdict.right]
     left = [name for name in cases if name not in verdicts]
     if not wrong and not left:
         return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
-    parts = [f"Solved: {', '.join(solved)}." if solved else "", *wrong, f"Open: {', '.join(left)}." if left else ""]
+    parts = [
+        f"Solved: {', '.join(solved)}." if solved else "",
+        *wrong,
+        f"Open: {', '.join(left)}." if left else "",
+    ]
     hint = next((verdict.hint for verdict in verdicts.values() if not verdict.right), "open")
     return Verdict(False, "\n".join(part for part in parts if part), hint)
 
 
-# X.3 ----------------------------------------------------------------------------------------------------------------------
+# X.3 ----------------------------------------------------------------------------------------------
 
 
 @cache
 def _unseen_case(i: int) -> tuple[Case, BlackBox]:
     """One of the cases of the last exercise: six with a fault, then two without."""
     if i < len(FAULTS):
-        case = next(case for case in random_cases(_UNSEEN_SEEDS[i]) if case.injected_fault.kind == FAULTS[i])
+        case = next(
+            case for case in random_cases(_UNSEEN_SEEDS[i]) if case.injected_fault.kind == FAULTS[i]
+        )
         return case, replace(case.record(), name="unseen")
     sound = i - len(FAULTS)
-    return faultless_cases(_FAULTLESS_SEED)[sound], replace(faultless_boxes(_FAULTLESS_SEED)[sound], name="unseen")
+    return faultless_cases(_FAULTLESS_SEED)[sound], replace(
+        faultless_boxes(_FAULTLESS_SEED)[sound], name="unseen"
+    )
 
 
 def _judge_program(answer: Any) -> Verdict:
     """A function of a box, tried on boxes of each kind that nobody has seen."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: give your function, without brackets.", "no_answer")
+        return Verdict(
+            False, "There is no answer yet: give your function, without brackets.", "no_answer"
+        )
     if not callable(answer):
-        return Verdict(False, f"The answer is a function, written with def; this is {type(answer).__name__}.", "no_function")
+        return Verdict(
+            False,
+            f"The answer is a function, written with def; this is {type(answer).__name__}.",
+            "no_function",
+        )
     for i in range(len(FAULTS) + 2):
         if wrong := _tried(answer, *_unseen_case(i)):
             return wrong
-    return Verdict(True, "Six faults found in boxes it had never seen, each with its evidence, and no innocent accused.")
+    return Verdict(
+        True,
+        "Six faults found in boxes it had never seen, each with its evidence, and no innocent "
+        "accused.",
+    )
 
 
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
     """What is wrong with a program's word about a box; None where it is right."""
-    what = f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
+    what = (
+        f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
+    )
     what += " that was kicked over" if case.pushes else ""
     try:
         line = program(box)
     except Exception as error:  # whatever a learner's function raises
-        return Verdict(False, f"Of {what}: your function stops with {type(error).__name__}: {error}", "stops")
+        return Verdict(
+            False, f"Of {what}: your function stops with {type(error).__name__}: {error}", "stops"
+        )
     if not isinstance(line, str):
-        said = f'Return a line of text, such as "mass 0.93" or "nothing"; this is {type(line).__name__}.'
+        said = (
+            f'Return a line of text, such as "mass 0.93" or "nothing"; this is '
+            f"{type(line).__name__}."
+        )
         return Verdict(False, said, "no_text")
     verdict = judge_line(case, box, line)
-    return None if verdict.right else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
+    return (
+        None
+        if verdict.right
+        else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
+    )
 
 
 def _reports() -> list[Example]:
     """On the boxes of seed 1."""
-    boxes, found = black_boxes(1), {box.name: investigation.investigate(box) for box in black_boxes(1)}
+    boxes, found = (
+        black_boxes(1),
+        {box.name: investigation.investigate(box) for box in black_boxes(1)},
+    )
     cases = {str(case.injected_fault.kind): case for case in random_cases(1)}
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
@@ -173,26 +240,41 @@ def _reports() -> list[Example]:
     right, wrong = cases["swapped motors"].injected_fault.joints, set(boxes[0].robot.joint_names)
     other, another = sorted(wrong - set(right))[:2]
     made: list[Example] = [
-        (report, ""), ([f" {line} " for line in report], ""), (but("mass", found[cases["mass"].name].upper()), ""),
-        (but("swapped motors", " and ".join(["swapped motors", *right[::-1]])), ""), (report[1:], "no_seed"),
-        (["seed 1"], "nothing_said"), (["seed 1", "G: mass 0.9"], "no_such_box"), ("seed 1", "no_lines"),
-        (report[:-1], "open"), (but("mass", "the cat"), "no_fault"), (but("friction", "friction"), "no_evidence"),
+        (report, ""), ([f" {line} " for line in report], ""),
+        (but("mass", found[cases["mass"].name].upper()), ""),
+        (but("swapped motors", " and ".join(["swapped motors", *right[::-1]])), ""),
+        (report[1:], "no_seed"),
+        (["seed 1"], "nothing_said"), (["seed 1", "G: mass 0.9"], "no_such_box"),
+        ("seed 1", "no_lines"),
+        (report[:-1], "open"), (but("mass", "the cat"), "no_fault"),
+        (but("friction", "friction"), "no_evidence"),
         (but("swapped motors", f"swapped motors {right[0]} {other}"), "one_joint"),
         (but("swapped motors", f"swapped motors {another} {other}"), "no_joint"),
         (but("swapped motors", f"swapped motors {right[0]}"), "not_two_joints"),
         (but("swapped motors", "swapped motors tail_joint"), "no_such_joint"),
     ]  # fmt: skip
     for fault, case in cases.items():
-        made += [(but(fault, f"{said} 0.9"), f"not {said}") for said in COUNTER_EVIDENCE if said != fault]
-        made += [(but(fault, line), hint) for hint, line in mistaken(case, boxes["ABCDEF".index(case.name)]).items()]
-        made += [(but(fault, f"{fault} 987"), "not_two_joints" if fault == "swapped motors" else "evidence")]
+        made += [
+            (but(fault, f"{said} 0.9"), f"not {said}") for said in COUNTER_EVIDENCE if said != fault
+        ]
+        made += [
+            (but(fault, line), hint)
+            for hint, line in mistaken(case, boxes["ABCDEF".index(case.name)]).items()
+        ]
+        made += [
+            (
+                but(fault, f"{fault} 987"),
+                "not_two_joints" if fault == "swapped motors" else "evidence",
+            )
+        ]
     return made
 
 
 def _programs() -> list[Example]:
     found = investigation.investigate
     return [
-        (found, ""), (lambda box: "nothing", "not nothing"), (lambda box: "friction 0.55", "evidence"),
+        (found, ""), (lambda box: "nothing", "not nothing"),
+        (lambda box: "friction 0.55", "evidence"),
         (lambda box: found(box).replace("nothing", "friction 0.9"), "innocent"),
         (lambda box: found(box).split()[0], "no_evidence"), (lambda box: ("mass", 0.9), "no_text"),
         (lambda box: box.fault, "stops"), (lambda: "nothing", "stops"), ("nothing", "no_function"),
@@ -202,7 +284,8 @@ def _programs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="X.1",
-        statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of a robot without a fault.",
+        statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of "
+        "a robot without a fault.",
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
         solution="missed = required_forces(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
@@ -212,28 +295,38 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_impulse,
-                praise="Nobody recorded the kick, and you know how hard it was and where it came from.",
+                praise="Nobody recorded the kick, and you know how hard it was and where it came "
+                "from.",
                 mistakes=_kicks(),
                 hints={
-                    "zero": "There is nothing there yet: the first three columns of what (7) misses, summed up over time.",
-                    "base_axes": "Those are the base's axes, which turn: take each row into the world's by R before you sum "
+                    "zero": "There is nothing there yet: the first three columns of what (7) "
+                    "misses, summed up over time.",
+                    "base_axes": "Those are the base's axes, which turn: take each row into the "
+                    "world's by R before you sum "
                     "up.",
                     "no_duration": "A sum of forces is no impulse yet: each row lasts 2 ms.",
-                    "fall": "The blows of the fall are in it, too: take the time of the kick alone.",
+                    "fall": "The blows of the fall are in it, too: take the time of the kick "
+                    "alone.",
                     "force": "That is the force, N. How long did it last?",
-                    "momentum": "That is what the robot's momentum gained. The ground has its part in that.",
+                    "momentum": "That is what the robot's momentum gained. The ground has its part "
+                    "in that.",
                 },
                 tolerance=0.02,
             ),
-            {(): "Three numbers: an impulse has a direction.", (6,): "The force alone, three numbers, without its moment."},
+            {
+                (): "Three numbers: an impulse has a direction.",
+                (6,): "The force alone, three numbers, without its moment.",
+            },
         ),
         examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
-        explanation="Who touches the robot is missing in (7). The first rows have no motor that could have done it.",
+        explanation="Who touches the robot is missing in (7). The first rows have no motor that "
+        "could have done it.",
         namespace=lambda: {"kicked": kicked_box(), "required_forces": required_forces},
     ),
     Exercise(
         name="X.2",
-        statement="The report on your six boxes: the seed, and for each box a fault with its evidence.",
+        statement="The report on your six boxes: the seed, and for each box a fault with its "
+        "evidence.",
         stub="report = [\n"
         '    f"seed {seed}",\n'
         '    "A: ?",  # a fault and its evidence, such as "A: mass 0.93"\n'
@@ -249,11 +342,14 @@ EXERCISES = (
     ),
     Exercise(
         name="X.3",
-        statement="A program that sees only a box, and names its fault with the evidence, or nothing.",
-        stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as in your report',
+        statement="A program that sees only a box, and names its fault with the evidence, or "
+        "nothing.",
+        stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as '
+        "in your report",
         solution=inspect.getsource(investigation),
         judge=_judge_program,
         examples=_programs,
-        explanation="The plan first, then the motors, then the ground: each question has an answer of its own.",
+        explanation="The plan first, then the motors, then the ground: each question has an answer "
+        "of its own.",
     ),
 )

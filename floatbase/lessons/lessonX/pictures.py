@@ -1,4 +1,6 @@
-"""Lesson X, The crash investigation: films of black boxes, moments of them, orders beside the torques that were needed."""
+"""Lesson X, The crash investigation: films of black boxes, moments of them, orders beside the
+torques that were needed.
+"""
 
 from __future__ import annotations
 
@@ -25,27 +27,36 @@ def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None
     """Play a box: measured and planned forces, cones as they were told. speed: 1 for real time."""
     places = np.array([box.contacts.positions(box.state(i)) for i in range(len(box))])
     record = Rollout(
-        box.robot, box.contacts, box.time, box.q, box.v, np.full_like(box.tau, np.nan), box.tau, box.planned, box.measured,
+        box.robot, box.contacts, box.time, box.q, box.v, np.full_like(box.tau, np.nan), box.tau,
+        box.planned, box.measured,
         places, (), "fell" if box.fell else "completed",
     )  # fmt: skip
     return view.play(record, speed=speed, com=False, title=title)
 
 
 def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
-    """Draw one row of a box; what was planned, what was measured, and what (7) misses there, as text.
+    """Draw one row of a box; what was planned, what was measured, and what (7) misses there, as
+    text.
 
     missed: (n - 1, nv), as of `required_forces`. time: s.
     """
     i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
     view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
     gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
-    told = ", ".join(f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True))
+    told = ", ".join(
+        f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True)
+    )
     left = float(np.linalg.norm(missed[i, :3]))
-    return f"planned and measured forces differ by {told} N; (7) misses {left if left >= _MIN_TOLERANCE else 0:.0f} N on the base"
+    return (
+        f"planned and measured forces differ by {told} N; (7) misses "
+        f"{left if left >= _MIN_TOLERANCE else 0:.0f} N on the base"
+    )
 
 
 def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
-    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as of `required_forces`."""
+    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as
+    of `required_forces`.
+    """
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
     ax.axhline(box.robot.weight, color=hex_code(GREYS[1]), linestyle="--", label="weight")
@@ -58,22 +69,29 @@ def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
 
 
 def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> str:
-    """Ordered and needed torque of a joint, as HTML, the order after a first-order lag; how well the two fit.
+    """Ordered and needed torque of a joint, as HTML, the order after a first-order lag; how well
+    the two fit.
 
-    got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of the lag.
+    got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of
+        the lag.
     """
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
     told = box.tau[: len(got)]
     orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
-    drawn = frame.ticks() + frame.curve(times, got[:, joint], f'stroke="{hex_code(GREYS[2])}" stroke-width="6"')
+    drawn = frame.ticks() + frame.curve(
+        times, got[:, joint], f'stroke="{hex_code(GREYS[2])}" stroke-width="6"'
+    )
     drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
     off = float(np.median(np.abs(orders - got)))
     words = (
         f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
-        f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in the median",
+        f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in "
+        f"the median",
     )
-    text = "".join(f"<div>{line}</div>" for line in words)  # not in the drawing, which shrinks on a narrow page
+    text = "".join(
+        f"<div>{line}</div>" for line in words
+    )  # not in the drawing, which shrinks on a narrow page
     size = f'viewBox="0 0 {WIDTH} {HEIGHT + 32}" style="max-width: 100%; width: {WIDTH}px"'
     return f'<svg {size} fill="currentColor">{drawn}</svg>{text}'
 
@@ -88,26 +106,43 @@ class _PlotFrame:
     high: float
 
     def across(self, times: npt.ArrayLike) -> Array:
-        return np.asarray(EDGE + (WIDTH - 2 * EDGE) * (np.asarray(times) - self.begin) / (self.end - self.begin))
+        return np.asarray(
+            EDGE + (WIDTH - 2 * EDGE) * (np.asarray(times) - self.begin) / (self.end - self.begin)
+        )
 
     def up(self, torques: npt.ArrayLike) -> Array:
-        return np.asarray(10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low))
+        return np.asarray(
+            10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low)
+        )
 
     def curve(self, times: Array, torques: Array, style: str) -> str:
-        points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(self.across(times), self.up(torques), strict=True))
+        points = " ".join(
+            f"{x:.1f},{y:.1f}" for x, y in zip(self.across(times), self.up(torques), strict=True)
+        )
         return f'<polyline points="{points}" fill="none" {style}/>'
 
     def ticks(self) -> str:
         """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
-        drawn = f'<text x="{EDGE - 6}" y="{HEIGHT + 27}" font-size="11" text-anchor="end">N·m</text>'
+        drawn = (
+            f'<text x="{EDGE - 6}" y="{HEIGHT + 27}" font-size="11" text-anchor="end">N·m</text>'
+        )
         for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
             if self.low <= torque <= self.high:
                 y, width = float(self.up(torque)), 0.2 if torque else 0.5
                 ends = f'x1="{EDGE}" y1="{y:.1f}" x2="{WIDTH - EDGE}" y2="{y:.1f}"'
                 drawn += f'<line {ends} stroke="currentColor" stroke-width="{width}"/>'
-                drawn += f'<text x="{EDGE - 6}" y="{y + 4:.1f}" font-size="11" text-anchor="end">{torque:g}</text>'
+                drawn += (
+                    f'<text x="{EDGE - 6}" y="{y + 4:.1f}" font-size="11" '
+                    f'text-anchor="end">{torque:g}</text>'
+                )
         for tenth in range(int(np.ceil(10 * self.begin)), int(10 * self.end) + 1):
             x = float(self.across(tenth / 10))
-            drawn += f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" stroke-width="0.2"/>'
-            drawn += f'<text x="{x:.1f}" y="{HEIGHT + 12}" font-size="11" text-anchor="middle">{tenth / 10:.1f} s</text>'
+            drawn += (
+                f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" '
+                f'stroke-width="0.2"/>'
+            )
+            drawn += (
+                f'<text x="{x:.1f}" y="{HEIGHT + 12}" font-size="11" '
+                f'text-anchor="middle">{tenth / 10:.1f} s</text>'
+            )
         return drawn

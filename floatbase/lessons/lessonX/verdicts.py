@@ -24,17 +24,25 @@ EVIDENCE = {
 }
 # what speaks against a fault in every box that has another
 COUNTER_EVIDENCE = {
-    "friction": "feet that slide get no less friction than the controller was told: |λt| / λn of the measured forces.",
+    "friction": "feet that slide get no less friction than the controller was told: |λt| / λn of "
+    "the measured forces.",
     "normal": "the feet stand in a plane, and its normal is the one that was told.",
-    "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) in every row.",
+    "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) "
+    "in every row.",
     "drift": "A q̈ of the plan is b, which is not zero, while all feet hold.",
     "slow motors": "no lag brings the orders much nearer to the torques that the motion needed.",
-    "swapped motors": "no exchange of two orders brings them nearer to the torques that the motion needed.",
-    NOTHING: "a sound robot twists like that to the end, and the first six rows say that nobody touched this one.",
+    "swapped motors": "no exchange of two orders brings them nearer to the torques that the motion "
+    "needed.",
+    NOTHING: "a sound robot twists like that to the end, and the first six rows say that nobody "
+    "touched this one.",
 }
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 _JOINT = re.compile(r"\w+_joint")
-_EVIDENCE_TOLERANCES = {"friction": 0.04, "normal": 1.5, "mass": 0.02}  # how far evidence may be off
+_EVIDENCE_TOLERANCES = {
+    "friction": 0.04,
+    "normal": 1.5,
+    "mass": 0.02,
+}  # how far evidence may be off
 _RELATIVE_TOLERANCE = 0.1  # of it, for the others
 _MIN_TOLERANCE = 3.0  # ms that a time constant may be off
 _RIGHT = Verdict(True, "")
@@ -42,7 +50,8 @@ _RIGHT = Verdict(True, "")
 
 @dataclass(frozen=True)
 class _Evidence:
-    """A number that is evidence. off: how far it may be. known: hint -> the number of this mistake, and what is said of it.
+    """A number that is evidence. off: how far it may be. known: hint -> the number of this mistake,
+    and what is said of it.
 
     otherwise: what is said of other numbers.
     """
@@ -66,7 +75,9 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
     if said != fault and fault == NOTHING:
-        known = "this robot had no fault: it " + ("was kicked." if case.falls else "did not even fall.")
+        known = "this robot had no fault: it " + (
+            "was kicked." if case.falls else "did not even fall."
+        )
         return Verdict(False, known, "innocent")
     if said != fault:
         return Verdict(False, f"not {said}: {COUNTER_EVIDENCE[said]}", f"not {said}")
@@ -76,7 +87,9 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
         return _joints(case, box, line)
     number = _NUMBER.search(line.casefold().split(said, 1)[1])
     if number is None:
-        return Verdict(False, f"{said} it is. The evidence is missing: {EVIDENCE[said]}.", "no_evidence")
+        return Verdict(
+            False, f"{said} it is. The evidence is missing: {EVIDENCE[said]}.", "no_evidence"
+        )
     return _judge_number(said, float(number[0]), _NUMBERS[said](case, box))
 
 
@@ -86,7 +99,11 @@ def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
     if fault not in _NUMBERS:
         return {}
     evidence = _NUMBERS[fault](case, box)
-    numbers = {hint: number for hint, (number, _) in evidence.known.items() if abs(number - evidence.right) > evidence.off}
+    numbers = {
+        hint: number
+        for hint, (number, _) in evidence.known.items()
+        if abs(number - evidence.right) > evidence.off
+    }
     return {hint: f"{fault} {number!r}" for hint, number in numbers.items()}
 
 
@@ -94,12 +111,21 @@ def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
     given, right = set(_JOINT.findall(line)), set(case.injected_fault.joints)
     unknown = sorted(given - set(box.robot.joint_names))
     if unknown:
-        return Verdict(False, f"there is no {unknown[0]}; box.robot.joint_names lists them.", "no_such_joint")
+        return Verdict(
+            False, f"there is no {unknown[0]}; box.robot.joint_names lists them.", "no_such_joint"
+        )
     if len(given) != 2:
-        told = f"swapped motors it is. The evidence is {EVIDENCE['swapped motors']}; there are {len(given)}."
+        told = (
+            f"swapped motors it is. The evidence is {EVIDENCE['swapped motors']}; there are "
+            f"{len(given)}."
+        )
         return Verdict(False, told, "not_two_joints")
     if given & right:
-        return _RIGHT if given == right else _wrong("swapped motors", "one_joint", "one of these two is right.")
+        return (
+            _RIGHT
+            if given == right
+            else _wrong("swapped motors", "one_joint", "one of these two is right.")
+        )
     return _wrong("swapped motors", "no_joint", "neither of these two is one of them.")
 
 
@@ -109,7 +135,10 @@ def _friction(case: Case, box: BlackBox) -> _Evidence:
         "believed": (MU, "that is the friction that was told; which did the feet get?"),
         "share": (mu / MU, "that is a share of what was told; give the coefficient."),
         "difference": (MU - mu, "that is a difference; give the coefficient."),
-        "angle": (float(np.rad2deg(np.arctan(mu))), "that is the angle of the cone; give its tangent."),
+        "angle": (
+            float(np.rad2deg(np.arctan(mu))),
+            "that is the angle of the cone; give its tangent.",
+        ),
     }
     otherwise = "take feet that slide and bear, and forces along and across the ground."
     return _Evidence(mu, _EVIDENCE_TOLERANCES["friction"], known, otherwise)
@@ -120,10 +149,23 @@ def _normal(case: Case, box: BlackBox) -> _Evidence:
     slope, believed = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, told))
     known = {
         "radians": (float(np.deg2rad(case.injected_fault.size)), "in degrees, please."),
-        "slope": (slope, "that is how steep the ground is; what counts is the angle to the normal that was told."),
-        "believed": (believed, "that is how steep the ground was believed to be; what counts is the angle to its normal."),
+        "slope": (
+            slope,
+            "that is how steep the ground is; what counts is the angle to the normal that was "
+            "told.",
+        ),
+        "believed": (
+            believed,
+            "that is how steep the ground was believed to be; what counts is the angle to its "
+            "normal.",
+        ),
     }
-    return _Evidence(case.injected_fault.size, _EVIDENCE_TOLERANCES["normal"], known, "four feet that bear span the plane, before they slide.")
+    return _Evidence(
+        case.injected_fault.size,
+        _EVIDENCE_TOLERANCES["normal"],
+        known,
+        "four feet that bear span the plane, before they slide.",
+    )
 
 
 def _mass(case: Case, box: BlackBox) -> _Evidence:
@@ -133,10 +175,15 @@ def _mass(case: Case, box: BlackBox) -> _Evidence:
         "kilograms": (k * m, "that is the believed mass in kg; divide it by the data sheet's."),
         "difference_kilograms": ((k - 1.0) * m, "that is a difference in kg; give the factor."),
         "difference": (k - 1.0, "that is how much it is off; give the factor, near 1."),
-        "difference_percent": (100.0 * (k - 1.0), "that is how much it is off, in percent; give the factor, near 1."),
+        "difference_percent": (
+            100.0 * (k - 1.0),
+            "that is how much it is off, in percent; give the factor, near 1.",
+        ),
         "percent": (100.0 * k, "that is in percent; give the factor, near 1."),
     }
-    return _Evidence(k, _EVIDENCE_TOLERANCES["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan.")
+    return _Evidence(
+        k, _EVIDENCE_TOLERANCES["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan."
+    )
 
 
 def _drift(case: Case, box: BlackBox) -> _Evidence:
@@ -145,9 +192,19 @@ def _drift(case: Case, box: BlackBox) -> _Evidence:
     right, of_feet = float(np.abs(b).max()), np.linalg.norm(b.reshape(len(b), -1, 3), axis=2)
     known = {
         "planned": (0.0, "that is what the plan asked of the feet; what should it have asked?"),
-        "of_one_foot": (float(of_feet.max()), "that is the length of a foot's three; give one entry."),
-        "of_all_feet": (float(np.linalg.norm(b, axis=1).max()), "that is the length of all of b; give its largest entry."),
-        "late": (late, "that is of the whole record; in the fall everything is large. Take the first half second."),
+        "of_one_foot": (
+            float(of_feet.max()),
+            "that is the length of a foot's three; give one entry.",
+        ),
+        "of_all_feet": (
+            float(np.linalg.norm(b, axis=1).max()),
+            "that is the length of all of b; give its largest entry.",
+        ),
+        "late": (
+            late,
+            "that is of the whole record; in the fall everything is large. Take the first half "
+            "second.",
+        ),
     }
     otherwise = "b of box.equations(i), the largest entry while t < 0.5 s, without sign."
     return _Evidence(right, _RELATIVE_TOLERANCE * right, known, otherwise)
@@ -157,9 +214,15 @@ def _slow(case: Case, box: BlackBox) -> _Evidence:
     ms = case.injected_fault.size
     known = {
         "seconds": (ms / 1e3, "in ms, please."),
-        "bandwidth": (1e3 / (2.0 * np.pi * ms), "that is the bandwidth in Hz; give the time constant in ms."),
+        "bandwidth": (
+            1e3 / (2.0 * np.pi * ms),
+            "that is the bandwidth in Hz; give the time constant in ms.",
+        ),
         "inverse": (1e3 / ms, "that is 1/T; give T in ms."),
-        "rows": (ms / (1e3 * float(box.time[1] - box.time[0])), "that is in rows of the record; give ms."),
+        "rows": (
+            ms / (1e3 * float(box.time[1] - box.time[0])),
+            "that is in rows of the record; give ms.",
+        ),
     }
     otherwise = "try time constants, and take the one whose lagged orders fit best."
     return _Evidence(ms, max(_MIN_TOLERANCE, _RELATIVE_TOLERANCE * ms), known, otherwise)
@@ -175,7 +238,9 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
 
 
 def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
-    """Right for what is near enough, else the hint for the nearest of the numbers that a known mistake leads to."""
+    """Right for what is near enough, else the hint for the nearest of the numbers that a known
+    mistake leads to.
+    """
     if abs(x - evidence.right) <= evidence.off:
         return _RIGHT
     apart = {hint: (abs(x - wrong), abs(wrong)) for hint, (wrong, _) in evidence.known.items()}

@@ -4,13 +4,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from floatbase.lessons.publish.contents import README, lesson_table, readme_with_table, title_of
-from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook, run_and_store, with_solutions, write_solutions
+from floatbase.lessons.publish.notebooks import (
+    execute_notebook,
+    read_notebook,
+    run_and_store,
+    with_solutions,
+    write_solutions,
+)
 from floatbase.lessons.publish.workspace import MY_FOLDER, NOTEBOOKS, prepare_workspace
 
 if TYPE_CHECKING:
     from floatbase.lessons.publish import conventions, equations, grades, pictures, site
 
-_LAZY_MODULES = ("conventions", "equations", "grades", "pictures", "site")  # imported at first use; the last needs the extra `site`
+_LAZY_MODULES = (
+    "conventions",
+    "equations",
+    "grades",
+    "pictures",
+    "site",
+)  # imported at first use; the last needs the extra `site`
 
 __all__ = [
     "MY_FOLDER",

@@ -1,4 +1,6 @@
-"""`python -m floatbase.lessons.publish`: run, map and publish the lessons, and prepare a learner's copy of them."""
+"""`python -m floatbase.lessons.publish`: run, map and publish the lessons, and prepare a learner's
+copy of them.
+"""
 
 from __future__ import annotations
 
@@ -7,33 +9,80 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from floatbase.errors import InputError
-from floatbase.lessons.publish import NOTEBOOKS, README, prepare_workspace, readme_with_table, run_and_store, write_solutions
+from floatbase.lessons.publish import (
+    NOTEBOOKS,
+    README,
+    prepare_workspace,
+    readme_with_table,
+    run_and_store,
+    write_solutions,
+)
 
 SOLUTIONS = Path("build/solutions")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command. arguments: those of the command line by default."""
-    parser = argparse.ArgumentParser(prog="python -m floatbase.lessons.publish", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m floatbase.lessons.publish", description=__doc__
+    )
     commands = parser.add_subparsers(dest="command", required=True)
 
     stored = commands.add_parser("run", help="run lessons and store what they print")
-    stored.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default")
-    commands.add_parser("map", help="write equations.md, conventions.md and the README's table of lessons")
+    stored.add_argument(
+        "lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default"
+    )
+    commands.add_parser(
+        "map", help="write equations.md, conventions.md and the README's table of lessons"
+    )
     shown = commands.add_parser("site", help="run the lessons and build the web site")
-    shown.add_argument("lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="those that it has; all by default")
-    shown.add_argument("--stored", action="store_true", help="run none; show what the notebooks hold")
-    shown.add_argument("--to", type=Path, metavar="FOLDER", help="where to write, build/site by default")
-    measured = commands.add_parser("push-recovery", help="measure the push roses of lessons, such as 05, anew")
+    shown.add_argument(
+        "lessons",
+        nargs="*",
+        type=Path,
+        metavar="NOTEBOOK",
+        help="those that it has; all by default",
+    )
+    shown.add_argument(
+        "--stored", action="store_true", help="run none; show what the notebooks hold"
+    )
+    shown.add_argument(
+        "--to", type=Path, metavar="FOLDER", help="where to write, build/site by default"
+    )
+    measured = commands.add_parser(
+        "push-recovery", help="measure the push roses of lessons, such as 05, anew"
+    )
     measured.add_argument("lessons", nargs="+", metavar="LESSON")
-    keys = commands.add_parser("solutions", help="write the lessons with solutions in place of exercises, for teachers")
-    keys.add_argument("--to", type=Path, default=SOLUTIONS, metavar="FOLDER", help=f"where to write, {SOLUTIONS} by default")
-    graded = commands.add_parser("grade", help="judge the answers in files that learners wrote by hand_in(…)")
+    keys = commands.add_parser(
+        "solutions", help="write the lessons with solutions in place of exercises, for teachers"
+    )
+    keys.add_argument(
+        "--to",
+        type=Path,
+        default=SOLUTIONS,
+        metavar="FOLDER",
+        help=f"where to write, {SOLUTIONS} by default",
+    )
+    graded = commands.add_parser(
+        "grade", help="judge the answers in files that learners wrote by hand_in(…)"
+    )
     graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
-    graded.add_argument("--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too")
-    graded.add_argument("--code", action="store_true", help="print code that was handed in, to be read")
-    laid = commands.add_parser("workspace", help="bring the learner's copy of the course up to date")
-    laid.add_argument("--to", type=Path, default=None, metavar="FOLDER", help="where that is, notebooks/my by default")
+    graded.add_argument(
+        "--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too"
+    )
+    graded.add_argument(
+        "--code", action="store_true", help="print code that was handed in, to be read"
+    )
+    laid = commands.add_parser(
+        "workspace", help="bring the learner's copy of the course up to date"
+    )
+    laid.add_argument(
+        "--to",
+        type=Path,
+        default=None,
+        metavar="FOLDER",
+        help="where that is, notebooks/my by default",
+    )
 
     given = parser.parse_args(arguments)
     try:

@@ -1,4 +1,6 @@
-"""The table of contents: the lessons that exist, read from their notebooks, and those that are planned."""
+"""The table of contents: the lessons that exist, read from their notebooks, and those that are
+planned.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,24 @@ _END = "<!-- end of lessons -->\n"
 def lesson_table(folder: Path = NOTEBOOKS) -> str:
     """The lessons as a table of Markdown: number, title, equations, ready or planned.
 
-    folder: of the notebooks, whose names start with their number, as in 02_equations_of_motion.ipynb.
+    folder: of the notebooks, whose names start with their number, as in
+        02_equations_of_motion.ipynb.
     """
-    rows = {number: f"| {number} | {title} | {equations} | planned |" for number, (title, equations) in PLANNED.items()}
+    rows = {
+        number: f"| {number} | {title} | {equations} | planned |"
+        for number, (title, equations) in PLANNED.items()
+    }
     for path in folder.glob("*.ipynb"):
         number = path.name.split("_")[0]
         title = title_of(path).split(" · ")[-1]
-        rows[number] = f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} | ready |"
-    lines = ["| | lesson | equations | |", "|---|---|---|---|", *(rows[number] for number in sorted(rows))]
+        rows[number] = (
+            f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} | ready |"
+        )
+    lines = [
+        "| | lesson | equations | |",
+        "|---|---|---|---|",
+        *(rows[number] for number in sorted(rows)),
+    ]
     return "\n".join(lines).replace("|  |", "| |") + "\n"
 
 
@@ -48,7 +60,10 @@ def readme_with_table(text: str) -> str:
 def title_of(source: Path) -> str:
     """The first heading of a lesson or of a text in Markdown."""
     if source.suffix == ".ipynb":
-        text = next((cell.source for cell in read_notebook(source).cells if cell.cell_type == "markdown"), "")
+        text = next(
+            (cell.source for cell in read_notebook(source).cells if cell.cell_type == "markdown"),
+            "",
+        )
     else:
         text = source.read_text(encoding="utf-8")
     heading = re.search(r"^# (.+)$", text, re.MULTILINE)
@@ -56,15 +71,28 @@ def title_of(source: Path) -> str:
 
 
 def equations_taught(lesson: Path) -> set[str]:
-    """The equations and appendices of the course text that a lesson teaches, "(9)" or "App. A": what its cells say as metadata."""
-    return {equation for cell in read_notebook(lesson).cells for equation in cell.metadata.get("teaches", [])}
+    """The equations and appendices of the course text that a lesson teaches, "(9)" or "App. A":
+    what its cells say as metadata.
+    """
+    return {
+        equation
+        for cell in read_notebook(lesson).cells
+        for equation in cell.metadata.get("teaches", [])
+    }
 
 
 def equation_ranges(lesson: Path) -> str:
     """The equations that a lesson teaches, in short: "(8)-(13), (16), App. A"; none is ""."""
     taught = equations_taught(lesson)
-    numbers = sorted(int(equation.strip("()")) for equation in taught if not equation.startswith("App."))
+    numbers = sorted(
+        int(equation.strip("()")) for equation in taught if not equation.startswith("App.")
+    )
     first = [n for n in numbers if n - 1 not in numbers]
     last = [n for n in numbers if n + 1 not in numbers]
-    spans = [f"({a})-({b})" if b > a + 1 else f"({a}), ({b})" if b > a else f"({a})" for a, b in zip(first, last, strict=True)]
-    return ", ".join([*spans, *sorted(equation for equation in taught if equation.startswith("App."))])
+    spans = [
+        f"({a})-({b})" if b > a + 1 else f"({a}), ({b})" if b > a else f"({a})"
+        for a, b in zip(first, last, strict=True)
+    ]
+    return ", ".join(
+        [*spans, *sorted(equation for equation in taught if equation.startswith("App."))]
+    )

@@ -1,4 +1,6 @@
-"""The page of conventions: the text of `floatbase.conventions`, and every tolerance with its reason."""
+"""The page of conventions: the text of `floatbase.conventions`, and every tolerance with its
+reason.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +12,23 @@ import floatbase
 from floatbase import conventions
 
 _PACKAGE = Path(floatbase.__file__).parent
-_SKIPPED_PACKAGES = ("lessons", "viewer")  # their numbers choose what is drawn, not what is answered
+_SKIPPED_PACKAGES = (
+    "lessons",
+    "viewer",
+)  # their numbers choose what is drawn, not what is answered
 # NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int()
-_TOLERANCE = re.compile(r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE)
+_TOLERANCE = re.compile(
+    r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE
+)
 
 
 def page() -> str:
     """The page of conventions as Markdown."""
     first, *rest = _with_symbol_table(conventions.__doc__ or "").split("\n", 1)
-    rows = [f"| {package} | `{name}` | {value} | {reason} |" for package, name, value, reason in tolerances()]
+    rows = [
+        f"| {package} | `{name}` | {value} | {reason} |"
+        for package, name, value, reason in tolerances()
+    ]
     return "\n".join(
         [
             "# Conventions",
@@ -28,7 +38,8 @@ def page() -> str:
             "",
             "Tolerances",
             "----------",
-            "Every number that decides a case, where it stands, and why it is what it is. Made from the code by",
+            "Every number that decides a case, where it stands, and why it is what it is. Made "
+            "from the code by",
             "`python -m floatbase.lessons.publish map`; do not edit.",
             "",
             "| file | name | value | meaning and reason |",
@@ -40,7 +51,9 @@ def page() -> str:
 
 
 def _with_symbol_table(text: str) -> str:
-    """The text with its indented lines, which are symbols and their meaning, as a table of Markdown."""
+    """The text with its indented lines, which are symbols and their meaning, as a table of
+    Markdown.
+    """
     lines: list[str] = []
     symbol = re.compile(r"^    (\S.*?)\s{2,}(.+)$")
     for line in text.splitlines():
@@ -57,7 +70,9 @@ def _with_symbol_table(text: str) -> str:
 
 
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
-    """File, name, value and reason of every numeric constant of the package, each as its source states it."""
+    """File, name, value and reason of every numeric constant of the package, each as its source
+    states it.
+    """
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
         if place.parts[0] not in _SKIPPED_PACKAGES:

@@ -1,8 +1,9 @@
-"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; the formulas stand in `formulas`.
+"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; the
+formulas stand in `formulas`.
 
-A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as in "App. A: …", stands for
-them. Public is what a package exports. A test counts where it names that function, a lesson where the metadata of a cell says that
-it teaches the equation.
+A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as
+in "App. A: …", stands for them. Public is what a package exports. A test counts where it names that
+function, a lesson where the metadata of a cell says that it teaches the equation.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ _SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # packages that show an
 class Entry:
     """One public thing that implements equations.
 
-    path: as users import it, package and name, such as "dynamics.forces_from_torques". equations: their numbers, such as "(9)".
+    path: as users import it, package and name, such as "dynamics.forces_from_torques". equations:
+        their numbers, such as "(9)".
     tests: those that name it, as "file::test".
     """
 
@@ -42,9 +44,11 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Everything public whose docstring starts with an equation number or an appendix, with its tests.
+    """Everything public whose docstring starts with an equation number or an appendix, with its
+    tests.
 
-    A class is tested where it is named or where a function that returns it is; a member where both it and its class are.
+    A class is tested where it is named or where a function that returns it is; a member where both
+    it and its class are.
     """
     named = _tests_by_name()
     found = []
@@ -65,21 +69,28 @@ def table() -> str:
     lines = [
         "# The map: equation → function → test → lesson",
         "",
-        "Every equation of the course text *Controlling Floating-Based Robots* that the course follows, section by section, in",
-        "our own words. Made from docstrings, tests and lessons by `python -m floatbase.lessons.publish map`; do not edit. A",
-        "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics import forces_from_torques`.",
+        "Every equation of the course text *Controlling Floating-Based Robots* that the course "
+        "follows, section by section, in",
+        "our own words. Made from docstrings, tests and lessons by `python -m "
+        "floatbase.lessons.publish map`; do not edit. A",
+        "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics "
+        "import forces_from_torques`.",
     ]
     for section in SECTIONS:
         lines += ["", f"## {section.number} {section.title}", "", section.summary]
         for formula in (formula for formula in FORMULAS if formula.section == section.number):
             lessons = [name for name, those in taught.items() if formula.number in those]
-            lines += _equation_lines(formula, [entry for entry in found if formula.number in entry.equations], lessons)
+            lines += _equation_lines(
+                formula, [entry for entry in found if formula.number in entry.equations], lessons
+            )
     lines += ["", "## Notes of the course text", "", "The lessons name some of them by number.", ""]
     return "\n".join([*lines, *(f"{number}. {note}" for number, note in NOTES.items())]) + "\n"
 
 
 def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
-    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix has one, unnumbered."""
+    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix
+    has one, unnumbered.
+    """
     appendix = formula.number == formula.section
     tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
     tag = "" if appendix else f" \\tag{{{formula.number.strip('()')}}}"
@@ -93,25 +104,33 @@ def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) ->
 
 
 def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
-    """Path, docstring and the names that make it, of every public function, class, method and property, each once."""
+    """Path, docstring and the names that make it, of every public function, class, method and
+    property, each once.
+    """
     own = list(_exported_objects())
     for package, name, value in own:
         makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
         yield f"{package}.{name}", inspect.getdoc(value) or "", makers
-        for member, thing in vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ():
+        for member, thing in (
+            vars(value).items() if inspect.isclass(value) and not _is_protocol(value) else ()
+        ):
             if not member.startswith("_"):
                 yield f"{package}.{name}.{member}", inspect.getdoc(thing) or "", makers
 
 
 def _exported_objects() -> Iterator[tuple[str, str, object]]:
-    """Package, name and value of every function and class that a package exports and defines itself."""
+    """Package, name and value of every function and class that a package exports and defines
+    itself.
+    """
     for found in pkgutil.iter_modules(floatbase.__path__):
         if found.name.startswith("_") or found.name in _SKIPPED_PACKAGES:
             continue
         package = import_module(f"floatbase.{found.name}")
         for name in getattr(package, "__all__", vars(package)):
             value, home = getattr(package, name), f"{package.__name__}."
-            if not name.startswith("_") and f"{getattr(value, '__module__', None)}.".startswith(home):
+            if not name.startswith("_") and f"{getattr(value, '__module__', None)}.".startswith(
+                home
+            ):
                 yield found.name, name, value
 
 
@@ -126,7 +145,9 @@ def _returns(value: object) -> str:
 
 
 def _tests_by_name() -> dict[str, set[str]]:
-    """For every name that a test uses, directly or through a helper of its file, the tests that use it."""
+    """For every name that a test uses, directly or through a helper of its file, the tests that use
+    it.
+    """
     found: dict[str, set[str]] = {}
     for path in sorted(_TESTS.rglob("test_*.py")):
         functions = {
@@ -136,9 +157,13 @@ def _tests_by_name() -> dict[str, set[str]]:
         }
         for test, names in functions.items():
             if test.startswith("test_"):
-                helpers = set().union(*(functions[name] for name in names if name in functions), names)
+                helpers = set().union(
+                    *(functions[name] for name in names if name in functions), names
+                )
                 for name in helpers:
-                    found.setdefault(name, set()).add(f"{path.relative_to(_TESTS).as_posix()}::{test}")
+                    found.setdefault(name, set()).add(
+                        f"{path.relative_to(_TESTS).as_posix()}::{test}"
+                    )
     return found
 
 

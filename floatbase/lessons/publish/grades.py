@@ -1,4 +1,6 @@
-"""What learners have handed in, judged again: a line for each of them, and a table of all marks. No code of theirs is run."""
+"""What learners have handed in, judged again: a line for each of them, and a table of all marks. No
+code of theirs is run.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,8 @@ _FORMULA_STARTS = tuple("=+-@\t\r\n＝＋－＠")  # a spreadsheet may run a tex
 class ExerciseResult:
     """What came of one exercise of one learner.
 
-    exercise: its name. tries: how many. result: "right", "wrong", "to be read" for code that the learner's own check judged,
+    exercise: its name. tries: how many. result: "right", "wrong", "to be read" for code that the
+        learner's own check judged,
     or "·" where it was not tried. feedback: what the check says now, or the code to be read.
     """
 
@@ -43,7 +46,8 @@ class ExerciseResult:
 
 @dataclass(frozen=True)
 class Submission:
-    """What a file of `hand_in` is worth. file: its name. name: the learner's. time: when it was written.
+    """What a file of `hand_in` is worth. file: its name. name: the learner's. time: when it was
+    written.
 
     results: of every exercise. predicted: how many predictions were made.
     """
@@ -56,7 +60,8 @@ class Submission:
 
 
 def grade_file(path: str | Path) -> Submission:
-    """Judge every answer of a file that `hand_in` wrote again: what it claims does not count, and none of its code is run.
+    """Judge every answer of a file that `hand_in` wrote again: what it claims does not count, and
+    none of its code is run.
 
     Raises `InputError` where the file is none of `hand_in`.
     """
@@ -79,10 +84,14 @@ def _read(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError):
         found = None
-    if not isinstance(found, dict) or not all(isinstance(found.get(key), kind) for key, kind in _REQUIRED_KEYS.items()):
+    if not isinstance(found, dict) or not all(
+        isinstance(found.get(key), kind) for key, kind in _REQUIRED_KEYS.items()
+    ):
         found = {}
     if found.get("form") != FILE_FORMAT:
-        raise InputError(f"{path} is not a file that hand_in(…) wrote, or it was cut short. Ask for it again.")
+        raise InputError(
+            f"{path} is not a file that hand_in(…) wrote, or it was cut short. Ask for it again."
+        )
     return found
 
 
@@ -100,8 +109,12 @@ def _exercise_results(entries: dict[str, Any]) -> Iterator[ExerciseResult]:
         try:
             with np.errstate(all="ignore"):
                 verdict = exercise.judge(progress.from_json(kept))
-        except Exception as error:  # a file may hold anything, and one answer must not end the others' judgement
-            yield ExerciseResult(name, tries, "wrong", f"The answer cannot be judged: {_one_line(error)}")
+        except (
+            Exception
+        ) as error:  # a file may hold anything, and one answer must not end the others' judgement
+            yield ExerciseResult(
+                name, tries, "wrong", f"The answer cannot be judged: {_one_line(error)}"
+            )
         else:
             yield ExerciseResult(name, tries, "right" if verdict.right else "wrong", verdict.text)
 
@@ -112,7 +125,8 @@ def _one_line(value: Any) -> str:
 
 
 def grade_files(files: Sequence[Path]) -> list[Submission]:
-    """Judge the files, in their order. One that `hand_in` did not write is told on the error stream and left out.
+    """Judge the files, in their order. One that `hand_in` did not write is told on the error stream
+    and left out.
 
     Raises `InputError` where none is left.
     """
@@ -128,7 +142,9 @@ def grade_files(files: Sequence[Path]) -> list[Submission]:
 
 
 def overview(submissions: Sequence[Submission]) -> str:
-    """A line for each learner: exercises that are right, lesson by lesson, and all; how much code there is to read."""
+    """A line for each learner: exercises that are right, lesson by lesson, and all; how much code
+    there is to read.
+    """
     lessons = sorted({mark.exercise.split(".")[0] for mark in submissions[0].results})
     names = [one.name for one in submissions]
     rows = [("", *lessons, "all", "to be read", "predictions")]
@@ -137,15 +153,34 @@ def overview(submissions: Sequence[Submission]) -> str:
         unread = sum(mark.result == "to be read" for mark in one.results)
         counts = [rights.count(lesson) for lesson in lessons]
         name = one.name if names.count(one.name) == 1 else f"{one.name} ({one.file})"
-        rows.append((name, *map(str, counts), f"{len(rights)} of {len(one.results)}", str(unread), str(one.predicted)))
+        rows.append(
+            (
+                name,
+                *map(str, counts),
+                f"{len(rights)} of {len(one.results)}",
+                str(unread),
+                str(one.predicted),
+            )
+        )
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(f"{part:<{width}}" for part, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+    return "\n".join(
+        "  ".join(f"{part:<{width}}" for part, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
 
 
 def code_to_read(submissions: Sequence[Submission]) -> str:
     """All code that was handed in, indented: what a check cannot judge without running it."""
-    found = [(one.name, mark) for one in submissions for mark in one.results if mark.result == "to be read"]
-    return "\n".join(f"--- {name}, {mark.exercise}\n{indent(_printable(mark.feedback), _INDENT)}" for name, mark in found)
+    found = [
+        (one.name, mark)
+        for one in submissions
+        for mark in one.results
+        if mark.result == "to be read"
+    ]
+    return "\n".join(
+        f"--- {name}, {mark.exercise}\n{indent(_printable(mark.feedback), _INDENT)}"
+        for name, mark in found
+    )
 
 
 def _printable(code: str) -> str:
@@ -154,8 +189,14 @@ def _printable(code: str) -> str:
 
 
 def write_table(submissions: Sequence[Submission], path: Path) -> None:
-    """Write a row for each learner and exercise, as CSV. Raises `InputError` where the file cannot be written."""
-    rows = [(one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback) for one in submissions for m in one.results]
+    """Write a row for each learner and exercise, as CSV. Raises `InputError` where the file cannot
+    be written.
+    """
+    rows = [
+        (one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback)
+        for one in submissions
+        for m in one.results
+    ]
     try:
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)

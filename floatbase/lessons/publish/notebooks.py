@@ -1,4 +1,6 @@
-"""The lessons as files: run them and store what they print, without pictures; put solutions in place of stubs."""
+"""The lessons as files: run them and store what they print, without pictures; put solutions in
+place of stubs.
+"""
 
 from __future__ import annotations
 
@@ -34,20 +36,26 @@ def with_solutions(notebook: Any) -> Any:
 def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
     """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised.
 
-    settings: more of the kernel's environment. FLOATBASE_HOME is a new folder, so that what the notebook answers is not
+    settings: more of the kernel's environment. FLOATBASE_HOME is a new folder, so that what the
+        notebook answers is not
     counted as a learner's progress.
     """
     from nbclient import NotebookClient
 
-    quiet = ["--IPKernelApp.log_level=40"]  # its warning that this machine's loopback is not encrypted says nothing here
+    quiet = [
+        "--IPKernelApp.log_level=40"
+    ]  # its warning that this machine's loopback is not encrypted says nothing here
     where = {"metadata": {"path": str(folder)}}
-    client = NotebookClient(notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True)
+    client = NotebookClient(
+        notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True
+    )
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
         return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
 
 
 def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
-    """Write lessons with the solution of each exercise in its place, and why it is right below; returns the files.
+    """Write lessons with the solution of each exercise in its place, and why it is right below;
+    returns the files.
 
     folder: made if need be. sources: the lessons, all of the course by default.
     """
@@ -70,7 +78,9 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
 
 
 def run_and_store(path: Path) -> None:
-    """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so they are not stored."""
+    """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so
+    they are not stored.
+    """
     import nbformat
 
     notebook = execute_notebook(read_notebook(path), path.parent)
@@ -80,6 +90,8 @@ def run_and_store(path: Path) -> None:
         cell.metadata.pop("execution", None)  # times of day
         picture = "picture" in cell.metadata.get("tags", [])
         # what went to the error stream is about this run, not the lesson
-        cell.outputs = [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
+        cell.outputs = (
+            [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
+        )
     notebook.metadata.pop("widgets", None)
     nbformat.write(notebook, path)

@@ -1,7 +1,9 @@
-"""Pictures, recordings and panels of a site: what outputs hold of them as HTML, and the files that a browser draws them from.
+"""Pictures, recordings and panels of a site: what outputs hold of them as HTML, and the files that
+a browser draws them from.
 
-All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the viewer's is named after
-what it holds, so files of an earlier build still fit. They are scripts, which a browser also loads where there is no server.
+All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the
+viewer's is named after what it holds, so files of an earlier build still fit. They are scripts,
+which a browser also loads where there is no server.
 """
 
 from __future__ import annotations
@@ -27,14 +29,18 @@ _NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
-    """The pictures of a site. folder: that of pictures.js in the built site; the files come into `pictures` inside it."""
+    """The pictures of a site. folder: that of pictures.js in the built site; the files come into
+    `pictures` inside it.
+    """
 
     def __init__(self, folder: Path):
         self._folder = folder / _FOLDER
         self._placed: dict[str, tuple[dict[str, Any], list[bytes]]] = {}
 
     def place(self, data: Mapping[str, Any]) -> str | None:
-        """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None where it holds none."""
+        """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None
+        where it holds none.
+        """
         if static_export.MIME not in data:
             return None
         description = dict(data[static_export.MIME])
@@ -47,7 +53,9 @@ class Pictures:
     def write(self) -> None:
         """Write the files, after all pictures have been placed."""
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._folder.joinpath("viewer.html").write_text(pages.embedded_page("viewer.js"), encoding="utf-8")
+        self._folder.joinpath("viewer.html").write_text(
+            pages.embedded_page("viewer.js"), encoding="utf-8"
+        )
         self._folder.joinpath("viewer.js").write_bytes(pages.viewer_code())
         groups = self._shared_files()
         for name, commands in groups.items():
@@ -56,19 +64,36 @@ class Pictures:
         for name, (description, commands) in self._placed.items():
             shared = sorted({at[command] for command in commands if command in at})
             own = [command for command in commands if command not in at]
-            numbers = {c: i for i, c in enumerate([*(c for group in shared for c in groups[group]), *own])}
-            kept = {name: description[name] for name in ("keys", "first", "stops", "notes", "together")}
+            numbers = {
+                c: i for i, c in enumerate([*(c for group in shared for c in groups[group]), *own])
+            }
+            kept = {
+                name: description[name] for name in ("keys", "first", "stops", "notes", "together")
+            }
             head = {**kept, "shared": shared, "at": [numbers[command] for command in commands]}
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _shared_files(self) -> dict[str, list[bytes]]:
         """Large commands that several pictures have, name of a file -> commands.
 
-        There is a file for all robots, and for each robot one of what its pictures usually have and one of the rest.
+        There is a file for all robots, and for each robot one of what its pictures usually have and
+        one of the rest.
         """
-        pictures = [(set(description["names"]), set(commands)) for description, commands in self._placed.values()]
-        uses = Counter(command for _, commands in pictures for command in commands if len(command) >= _MIN_SHARED_SIZE)
-        robots = {c: set.union(*(names for names, has in pictures if c in has)) for c, times in uses.items() if times > 1}
+        pictures = [
+            (set(description["names"]), set(commands))
+            for description, commands in self._placed.values()
+        ]
+        uses = Counter(
+            command
+            for _, commands in pictures
+            for command in commands
+            if len(command) >= _MIN_SHARED_SIZE
+        )
+        robots = {
+            c: set.union(*(names for names, has in pictures if c in has))
+            for c, times in uses.items()
+            if times > 1
+        }
         found: dict[str, list[bytes]] = {}
         for command in sorted(robots):
             (robot,) = robots[command] if len(robots[command]) == 1 else ("robots",)
@@ -88,20 +113,37 @@ def _file_name(begin: str, *parts: bytes) -> str:
 
 
 def _figure_html(name: str, description: dict[str, Any]) -> str:
-    """The figure as it is until its script comes: images of the first moment, its note, and controls that do not move yet."""
+    """The figure as it is until its script comes: images of the first moment, its note, and
+    controls that do not move yet.
+    """
     scenes = "".join(
-        f'<div class="floatbase-scene" style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
-        f'<div><img alt="3-D picture of {html.escape(robot)}" src="data:image/png;base64,{image}"></div></div>'
+        f'<div class="floatbase-scene" '
+        f'style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
+        f'<div><img alt="3-D picture of {html.escape(robot)}" '
+        f'src="data:image/png;base64,{image}"></div></div>'
         for height, robot, image, title in zip(
-            description["heights"], description["names"], description["stills"], description["titles"] or [""] * len(description["names"]), strict=True
+            description["heights"],
+            description["names"],
+            description["stills"],
+            description["titles"] or [""] * len(description["names"]),
+            strict=True,
         )
     )
     first = ",".join(str(control["first"]) for control in description["controls"])
-    note = description["notes"][description["stops"][first][0]] if first in description["stops"] else ""
+    note = (
+        description["notes"][description["stops"][first][0]]
+        if first in description["stops"]
+        else ""
+    )
     controls = "".join(map(_control_html, description["controls"]))
-    words = f'<p class="floatbase-words">{html.escape(description["words"])}</p>' if description["words"] else ""
+    words = (
+        f'<p class="floatbase-words">{html.escape(description["words"])}</p>'
+        if description["words"]
+        else ""
+    )
     return (
-        f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" data-picture="{name}">'
+        f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
+        f'data-picture="{name}">'
         f'<div class="floatbase-seen">{f"""<div class="floatbase-scenes">{scenes}</div>""" if scenes else ""}'
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
         f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>'
@@ -109,19 +151,32 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
 
 
 def _control_html(control: dict[str, Any]) -> str:
-    """A control as the browser's own element. Its value is the number of a stop, its text what that is called."""
+    """A control as the browser's own element. Its value is the number of a stop, its text what that
+    is called.
+    """
     name, unit, first = html.escape(control["name"]), html.escape(control["unit"]), control["first"]
     named = f"{name} [{unit}]" if unit else name
     if control["kind"] == "switch":
-        return f'<label class="floatbase-switch"><input type="checkbox" disabled{" checked" if first else ""}>{named}</label>'
+        return (
+            f'<label class="floatbase-switch"><input type="checkbox" '
+            f"disabled{' checked' if first else ''}>{named}</label>"
+        )
     if control["kind"] == "choice":
         texts = [html.escape(value) for value in control["values"]]
-        options = "".join(f"<option{' selected' if i == first else ''}>{text}</option>" for i, text in enumerate(texts))
-        return f'<label class="floatbase-choice"><span>{named}</span><select disabled>{options}</select></label>'
+        options = "".join(
+            f"<option{' selected' if i == first else ''}>{text}</option>"
+            for i, text in enumerate(texts)
+        )
+        return (
+            f'<label class="floatbase-choice"><span>{named}</span><select '
+            f"disabled>{options}</select></label>"
+        )
     values = html.escape(json.dumps(control["values"], ensure_ascii=False))
     now = html.escape(control["values"][first])
     last = len(control["values"]) - 1
     return (
-        f'<label><span>{named}</span><input type="range" min="0" max="{last}" value="{first}" disabled aria-label="{named}" '
-        f'aria-valuetext="{now} {unit}" data-unit="{unit}" data-values="{values}"><output>{now}</output></label>'
+        f'<label><span>{named}</span><input type="range" min="0" max="{last}" value="{first}" '
+        f'disabled aria-label="{named}" '
+        f'aria-valuetext="{now} {unit}" data-unit="{unit}" '
+        f'data-values="{values}"><output>{now}</output></label>'
     )

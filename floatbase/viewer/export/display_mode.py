@@ -1,4 +1,6 @@
-"""What a viewer displays in a notebook: a live picture, or what a program that stores notebooks asks for."""
+"""What a viewer displays in a notebook: a live picture, or what a program that stores notebooks
+asks for.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,13 @@ from collections.abc import Callable
 from typing import Any
 
 VARIABLE = "FLOATBASE_VIEWER"  # in the environment
-# display mode -> what makes the mimebundle of a viewer in that mode; programs that publish notebooks add theirs
+# display mode -> what makes the mimebundle of a viewer in that mode; programs that publish
+# notebooks add theirs
 MIMEBUNDLES: dict[str, Callable[[Any], dict[str, Any]]] = {}
 
 
 def display_mode() -> str:
-    """What displays are to be: "live" by default; "static" scenes that need no kernel; or a key of `MIMEBUNDLES`."""
+    """What displays are to be: "live" by default; "static" scenes that need no kernel; or a key of
+    `MIMEBUNDLES`.
+    """
     return os.environ.get(VARIABLE) or "live"

@@ -21,14 +21,32 @@ from floatbase.errors import InputError, ViewerError
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FRAME_RATES = {".png": 0, ".mp4": 30, ".gif": 20}  # pictures a second of each kind of file; 0: only the first one
+FRAME_RATES = {
+    ".png": 0,
+    ".mp4": 30,
+    ".gif": 20,
+}  # pictures a second of each kind of file; 0: only the first one
 _MAX_DURATION = 120.0  # s
 _MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
-_FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
+_BROWSERS = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "msedge",
+)
+_FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+]
 _TIMEOUT_MS = 60_000  # ms until the page must have drawn
 _REQUIREMENTS = (
-    'that needs a browser (Chromium or Chrome) and two packages: pip install "floatbase[video]". A name in .html needs none.'
+    "that needs a browser (Chromium or Chrome) and two packages: pip install "
+    '"floatbase[video]". A name in .html needs none.'
 )
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _PREPARE_JS = """() => {
@@ -47,24 +65,31 @@ _SEEK_JS = """t => {
 
 def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
     """Width and height of films, checked: films have even ones."""
-    width, height = (int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels"))
+    width, height = (
+        int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels")
+    )
     if not (_MIN_PIXELS <= width <= _MAX_PIXELS and _MIN_PIXELS <= height <= _MAX_PIXELS):
         raise InputError(
-            f"size is {short_repr(size)}; width and height must be even numbers of pixels from {_MIN_PIXELS} to {_MAX_PIXELS}."
+            f"size is {short_repr(size)}; width and height must be even numbers of pixels from "
+            f"{_MIN_PIXELS} to {_MAX_PIXELS}."
         )
     return width, height
 
 
 def capture(page: str, target: Path, size: tuple[int, int]) -> None:
-    """Write what a page with a scene shows: its recording as .mp4 or .gif, its first picture as .png.
+    """Write what a page with a scene shows: its recording as .mp4 or .gif, its first picture as
+    .png.
 
     page: its HTML. size: width and height in pixels, see `checked_size`.
-    Raises `ViewerError` where browser or packages are missing, and for a recording that is too long.
+    Raises `ViewerError` where browser or packages are missing, and for a recording that is too
+    long.
     """
     unfinished = target.with_name(f"{target.stem}.part{target.suffix}")
     unfinished.touch()  # an `OSError` now, and not after the work
     try:
-        with ThreadPoolExecutor(1) as thread:  # playwright refuses one that has an event loop, such as a notebook's
+        with ThreadPoolExecutor(
+            1
+        ) as thread:  # playwright refuses one that has an event loop, such as a notebook's
             thread.submit(_capture, page, unfinished, size).result()
         unfinished.replace(target)
     finally:
@@ -84,12 +109,16 @@ def _capture(page: str, target: Path, size: tuple[int, int]) -> None:
 
 
 def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
-    """The recording at `rate` pictures a second of film, played at its speed, or the first picture alone."""
+    """The recording at `rate` pictures a second of film, played at its speed, or the first picture
+    alone.
+    """
     try:
         from PIL import Image
         from playwright.sync_api import Error, sync_playwright
     except ImportError as error:
-        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}") from None
+        raise ViewerError(
+            f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}"
+        ) from None
     path = next(filter(None, map(shutil.which, _BROWSERS)), None)
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
         file = Path(folder, "scene.html")
@@ -98,7 +127,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
         except Error as error:
             raise ViewerError(
-                f"no browser starts, so no film can be made; {_REQUIREMENTS} ({str(error).splitlines()[0]})"
+                f"no browser starts, so no film can be made; {_REQUIREMENTS} "
+                f"({str(error).splitlines()[0]})"
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})
@@ -107,7 +137,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             duration = window.evaluate(_PREPARE_JS)
             if rate and duration > _MAX_DURATION:
                 raise ViewerError(
-                    f"the film would last {duration:.0f} s, and may last {_MAX_DURATION:g} s: play less, or faster."
+                    f"the film would last {duration:.0f} s, and may last {_MAX_DURATION:g} s: play "
+                    f"less, or faster."
                 )
             times = np.arange(0.0, duration + 1e-9, 1.0 / rate) if rate else np.zeros(1)
             for t in tqdm(times, desc="film", unit="picture", leave=False, disable=not rate):
@@ -119,19 +150,26 @@ def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
     from PIL.Image import Dither, Quantize
 
     none = Dither.NONE
-    # one palette for all, since a palette for each flickers; the octree keeps the colour of a small thing, such as an arrow
+    # one palette for all, since a palette for each flickers; the octree keeps the colour of a small
+    # thing, such as an arrow
     first = next(pictures).quantize(method=Quantize.FASTOCTREE, dither=none)
     rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
-    first.save(target, save_all=True, append_images=rest, duration=1000 // FRAME_RATES[".gif"], loop=0)
+    first.save(
+        target, save_all=True, append_images=rest, duration=1000 // FRAME_RATES[".gif"], loop=0
+    )
 
 
 def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -> None:
     try:
         import av
     except ImportError as error:
-        raise ViewerError(f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}") from None
+        raise ViewerError(
+            f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}"
+        ) from None
     with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
-        stream = film.add_stream("libx264", rate=Fraction(FRAME_RATES[".mp4"]), options={"crf": "20"})
+        stream = film.add_stream(
+            "libx264", rate=Fraction(FRAME_RATES[".mp4"]), options={"crf": "20"}
+        )
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"  # what browsers and slides play
         for picture in pictures:

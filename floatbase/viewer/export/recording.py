@@ -10,7 +10,16 @@ import numpy as np
 import numpy.typing as npt
 import umsgpack
 
-from floatbase._validation import Array, as_array, as_bool, as_instance, as_integer, as_positive, as_string, short_repr
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_bool,
+    as_instance,
+    as_integer,
+    as_positive,
+    as_string,
+    short_repr,
+)
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
@@ -21,7 +30,9 @@ if TYPE_CHECKING:
 
 REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
 _MAX_RATE = 1e4  # a second: more than any record has rows
-MIN_CHANGE = 1e-7  # m, and 1 for colours and quaternions: what changes less gets no track; single precision would not show it
+# m, and 1 for colours and quaternions: what changes less gets no track; single precision would not
+# show it
+MIN_CHANGE = 1e-7
 SMOOTHING_TIME = 0.3  # s, standard deviation of the weights over which a followed place is a mean
 _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 
@@ -30,7 +41,8 @@ _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 class Animation:
     """Pictures in time.
 
-    first: every item that ever appears, as it first appears. command: the command that moves them. duration: s.
+    first: every item that ever appears, as it first appears. command: the command that moves them.
+        duration: s.
     """
 
     first: Picture
@@ -42,8 +54,10 @@ class Animation:
 class _ItemHistory:
     """One item in n pictures.
 
-    item: as it first appears. present: (n,), whether the picture shows it. matrices: (n, 4, 4). colours: (n, 4), or None.
-    Where it is not present, matrices and colours are those of the last picture before that shows it, else of the first.
+    item: as it first appears. present: (n,), whether the picture shows it. matrices: (n, 4, 4).
+        colours: (n, 4), or None.
+    Where it is not present, matrices and colours are those of the last picture before that shows
+    it, else of the first.
     """
 
     item: Item
@@ -53,7 +67,11 @@ class _ItemHistory:
 
 
 def animate(
-    times: npt.ArrayLike, pictures: Sequence[Picture], root: str, speed: float = 1.0, paused: bool = False
+    times: npt.ArrayLike,
+    pictures: Sequence[Picture],
+    root: str,
+    speed: float = 1.0,
+    paused: bool = False,
 ) -> Animation:
     """The animation of some pictures.
 
@@ -63,8 +81,15 @@ def animate(
     speed: 1 for real time.
     paused: whether the reader must press play first.
     """
-    if not isinstance(pictures, Sequence) or not all(isinstance(picture, dict) for picture in pictures) or not pictures:
-        raise InputError(f"pictures must be a list of one picture or more, path -> item each, not {short_repr(pictures)}.")
+    if (
+        not isinstance(pictures, Sequence)
+        or not all(isinstance(picture, dict) for picture in pictures)
+        or not pictures
+    ):
+        raise InputError(
+            f"pictures must be a list of one picture or more, path -> item each, not "
+            f"{short_repr(pictures)}."
+        )
     t, root = as_array("times", times, (len(pictures),), "s"), as_string("root", root)
     t, speed, paused = t - t[0], as_positive("speed", speed), as_bool("paused", paused)
     histories = _item_histories(list(pictures))
@@ -72,15 +97,26 @@ def animate(
     for path, history in histories.items():
         tracks = list(_tracks(history, t))
         if tracks:
-            clips.append({"path": root + path, "clip": {"fps": 1, "name": "default", "tracks": tracks}})
+            clips.append(
+                {"path": root + path, "clip": {"fps": 1, "name": "default", "tracks": tracks}}
+            )
     options = {"play": True, "repetitions": REPETITIONS, "speed": speed, "paused": paused}
-    command = protocol.encode({"type": "set_animation", "path": "", "animations": clips, "options": options})
-    return Animation({path: history.item for path, history in histories.items()}, command, float(t[-1]))
+    command = protocol.encode(
+        {"type": "set_animation", "path": "", "animations": clips, "options": options}
+    )
+    return Animation(
+        {path: history.item for path, history in histories.items()}, command, float(t[-1])
+    )
 
 
 def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
-    """The rows of a record to draw: the first, the last, and `rate` rows a second between. times: (n,), s, of all rows."""
-    t, rate = as_array("times", times, (None,), "s"), as_positive("rate", rate, "1/s", maximum=_MAX_RATE)
+    """The rows of a record to draw: the first, the last, and `rate` rows a second between. times:
+    (n,), s, of all rows.
+    """
+    t, rate = (
+        as_array("times", times, (None,), "s"),
+        as_positive("rate", rate, "1/s", maximum=_MAX_RATE),
+    )
     if not t.size:
         raise InputError("times holds no time, so there is nothing to draw.")
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
@@ -88,20 +124,25 @@ def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
 
 
 def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
-    """Places without what lasts less than a stride: weighted means over about a second around each time; straight ways stay.
+    """Places without what lasts less than a stride: weighted means over about a second around each
+    time; straight ways stay.
 
     times: (n,), s, evenly spaced. places: (n, 3), m, world.
     """
     t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
-        raise InputError(f"there are {len(t)} times and {len(x)} places; each place needs one time.")
+        raise InputError(
+            f"there are {len(t)} times and {len(x)} places; each place needs one time."
+        )
     if len(t) < 3 or not t[-1] > t[0]:
         return x
     width = SMOOTHING_TIME * (len(t) - 1) / (t[-1] - t[0])  # in places
     reach = max(1, min(int(3.0 * width), len(t) - 1))
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     wide = np.pad(x, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
-    return np.stack([np.convolve(column, weights / weights.sum(), mode="valid") for column in wide.T], axis=1)
+    return np.stack(
+        [np.convolve(column, weights / weights.sum(), mode="valid") for column in wide.T], axis=1
+    )
 
 
 def as_rollout(rollout: Rollout) -> Rollout:
@@ -112,7 +153,8 @@ def as_rollout(rollout: Rollout) -> Rollout:
 
 
 def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array] | None:
-    """Frame and force (N, world) of the push that acts at a row of a record; None without one. Of several, the newest.
+    """Frame and force (N, world) of the push that acts at a row of a record; None without one. Of
+    several, the newest.
 
     linger: s that a push is still shown after its end.
     """
@@ -125,15 +167,23 @@ def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array
 
 
 def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
-    """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot be drawn."""
+    """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot
+    be drawn.
+    """
     as_instance("contacts", contacts, Contacts)
-    drawn = np.array([contact.k == 3 * len(contact.point_names) for contact in contacts], dtype=bool)
+    drawn = np.array(
+        [contact.k == 3 * len(contact.point_names) for contact in contacts], dtype=bool
+    )
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
-    return contacts.only(*names), np.repeat(drawn, np.array([contact.k for contact in contacts], dtype=int))
+    return contacts.only(*names), np.repeat(
+        drawn, np.array([contact.k for contact in contacts], dtype=int)
+    )
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
-    """Names of the feet that swing at a row of a record: its contacts that the controller does not have then."""
+    """Names of the feet that swing at a row of a record: its contacts that the controller does not
+    have then.
+    """
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
@@ -170,13 +220,20 @@ def _tracks(history: _ItemHistory, t: Array) -> Iterator[dict[str, Any]]:
     yield from _track("quaternion", "quaternion", t, quaternions)
     yield from _track("scale", "vector3", t, scales)
     if not history.present.all():
-        yield {"name": ".visible", "type": "bool", "times": t.tolist(), "values": history.present.tolist()}
+        yield {
+            "name": ".visible",
+            "type": "bool",
+            "times": t.tolist(),
+            "values": history.present.tolist(),
+        }
     if history.colours is not None:
         yield from _track("shape.material.color", "color", t, history.colours[:, :3], _DISCRETE)
         yield from _track("shape.material.opacity", "number", t, history.colours[:, 3:], _DISCRETE)
 
 
-def _track(name: str, kind: str, t: Array, values: Array, interpolation: int = _LINEAR) -> Iterator[dict[str, Any]]:
+def _track(
+    name: str, kind: str, t: Array, values: Array, interpolation: int = _LINEAR
+) -> Iterator[dict[str, Any]]:
     if np.ptp(values, axis=0).max() < MIN_CHANGE:
         return
     yield {
@@ -193,7 +250,9 @@ def _packed_floats(values: Array) -> umsgpack.Ext:
 
 
 def _quaternions(rotations: Array) -> Array:
-    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4); of q and -q the one that is nearer to the one before."""
+    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4); of q and -q the one that is nearer
+    to the one before.
+    """
     from scipy.spatial.transform import Rotation
 
     quaternions = Rotation.from_matrix(rotations).as_quat()

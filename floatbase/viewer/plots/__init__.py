@@ -1,4 +1,6 @@
-"""Plots with matplotlib, in the colours of the scene: of a rollout, and in `push_recovery_plots` of push recovery."""
+"""Plots with matplotlib, in the colours of the scene: of a rollout, and in `push_recovery_plots` of
+push recovery.
+"""
 
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.plots.run_plots import (

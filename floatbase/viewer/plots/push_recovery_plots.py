@@ -1,4 +1,6 @@
-"""Push roses and the compass of the reachable force, as polar plots and drawn on the ground below the robot."""
+"""Push roses and the compass of the reachable force, as polar plots and drawn on the ground below
+the robot.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +26,19 @@ _FILL = 0.15  # opacity of what lies inside the measured curve
 _HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no gap to be seen
 _RING_SIDES = 72  # of a ring
 
-_Curve: TypeAlias = tuple[str, Array, RGB, str]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
+_Curve: TypeAlias = tuple[
+    str, Array, RGB, str
+]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
 
 
-def plot(result: PushRecovery, axis: Axes | None = None, theory: bool = True, previous: PushRecovery | None = None) -> Axes:
-    """The largest pushes that were survived, N, over their directions, seen from above: x points up, y to the left.
+def plot(
+    result: PushRecovery,
+    axis: Axes | None = None,
+    theory: bool = True,
+    previous: PushRecovery | None = None,
+) -> Axes:
+    """The largest pushes that were survived, N, over their directions, seen from above: x points
+    up, y to the left.
 
     result: the record, as from `fb.push_recovery`.
     axis: polar axes to plot on; None for a new figure.
@@ -41,43 +51,65 @@ def plot(result: PushRecovery, axis: Axes | None = None, theory: bool = True, pr
 
 
 def picture(
-    result: PushRecovery, scale: float | None = None, theory: bool = True, previous: PushRecovery | None = None
+    result: PushRecovery,
+    scale: float | None = None,
+    theory: bool = True,
+    previous: PushRecovery | None = None,
 ) -> Picture:
-    """The rose on level ground around the robot, with rings for its scale: items for `extra` of `Viewer.show`.
+    """The rose on level ground around the robot, with rings for its scale: items for `extra` of
+    `Viewer.show`.
 
         view.show(rose.state, rose.contacts, cones=False, extra=push_recovery_plots.picture(rose))
 
     result: the record, as from `fb.push_recovery`.
-    scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the stance.
+    scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the
+        stance.
     theory, previous: as for `plot`.
     """
     middle = result.state.frame_pose(result.frame).translation
     return _picture(
-        result.directions, _curves(result, theory, previous), middle, result.contacts.positions(result.state), scale
+        result.directions,
+        _curves(result, theory, previous),
+        middle,
+        result.contacts.positions(result.state),
+        scale,
     )
 
 
-def plot_horizontal_force_limits(wrenches: WrenchSet, axis: Axes | None = None, n: int = 72) -> Axes:
-    """The horizontal forces that a stance can make at full weight without moment, N, over their directions, seen from above.
+def plot_horizontal_force_limits(
+    wrenches: WrenchSet, axis: Axes | None = None, n: int = 72
+) -> Axes:
+    """The horizontal forces that a stance can make at full weight without moment, N, over their
+    directions, seen from above.
 
     wrenches: of the stance, as from `floatbase.friction.wrench_set`.
     axis: as for `plot`.
     n: number of directions.
-    Raises `InputError` where a force has no end, `InfeasibleError` where the stance cannot carry the weight.
+    Raises `InputError` where a force has no end, `InfeasibleError` where the stance cannot carry
+    the weight.
     """
-    return _plot(*_horizontal_force_curve(wrenches, n), "horizontal force at full weight without moment [N]", axis)
+    return _plot(
+        *_horizontal_force_curve(wrenches, n),
+        "horizontal force at full weight without moment [N]",
+        axis,
+    )
 
 
-def horizontal_force_limits(wrenches: WrenchSet, scale: float | None = None, n: int = 72) -> Picture:
-    """The compass of `plot_horizontal_force_limits` on level ground below the centre of mass, with rings: items for
-    `extra` of `Viewer.show`.
+def horizontal_force_limits(
+    wrenches: WrenchSet, scale: float | None = None, n: int = 72
+) -> Picture:
+    """The compass of `plot_horizontal_force_limits` on level ground below the centre of mass, with
+    rings: items for `extra` of `Viewer.show`.
 
         view.show(state, contacts, extra=push_recovery_plots.horizontal_force_limits(wrench_set(state, contacts)))
 
-    wrenches, n: as for `plot_horizontal_force_limits`. scale: length of a drawn force, m/N; None makes it half as wide
+    wrenches, n: as for `plot_horizontal_force_limits`. scale: length of a drawn force, m/N; None
+        makes it half as wide
     again as the stance.
     """
-    return _picture(*_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale)
+    return _picture(
+        *_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale
+    )
 
 
 def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
@@ -85,11 +117,19 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
     if axis is None:
         axis = plt.subplots(figsize=(6, 6.6), subplot_kw={"projection": "polar"})[1]
     if not isinstance(axis, PolarAxes):
-        raise InputError('a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).')
+        raise InputError(
+            'a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).'
+        )
     axis.set_theta_zero_location("N")
     for kind, values, colour, style in curves:
         axis.plot(
-            _closed(directions), _closed(values), style, color=colour, linewidth=2, markersize=4, label=_legend_text(kind)
+            _closed(directions),
+            _closed(values),
+            style,
+            color=colour,
+            linewidth=2,
+            markersize=4,
+            label=_legend_text(kind),
         )
     _, first, colour, _ = curves[0]
     axis.fill(directions, first, color=colour, alpha=_FILL)
@@ -103,8 +143,12 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
     return axis
 
 
-def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array, scale: float | None) -> Picture:
-    """Curves over directions, rad, around a point, shape (3,), on the ground below, where the feet, shape (n, 3), m, stand."""
+def _picture(
+    directions: Array, curves: list[_Curve], middle: Array, feet: Array, scale: float | None
+) -> Picture:
+    """Curves over directions, rad, around a point, shape (3,), on the ground below, where the feet,
+    shape (n, 3), m, stand.
+    """
     centre = np.array([*middle[:2], feet[:, 2].mean() + _HEIGHT_ABOVE_GROUND])
     span = float(np.linalg.norm((feet - centre)[:, :2], axis=1).max())
     largest = max(float(values.max()) for _, values, _, _ in curves)
@@ -112,14 +156,24 @@ def _picture(directions: Array, curves: list[_Curve], middle: Array, feet: Array
     items: Picture = {}
     for height, (kind, values, colour, _) in enumerate(reversed(curves)):
         tips = scale * values[:, None] * _unit_vectors(directions)
-        items[f"{kind}/line"] = _loop(centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2], tips, 0.015 * span, colour)
-    # a fan from the middle, for a rose is not convex; kind, tips and colour are those of the first curve
-    inside = threejs.mesh(*geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]])), colour, opacity=_FILL, lit=False)
+        items[f"{kind}/line"] = _loop(
+            centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2], tips, 0.015 * span, colour
+        )
+    # a fan from the middle, for a rose is not convex; kind, tips and colour are those of the first
+    # curve
+    inside = threejs.mesh(
+        *geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]])),
+        colour,
+        opacity=_FILL,
+        lit=False,
+    )
     items[f"{kind}/inside"] = Item(inside, transform(centre))
     circle = _unit_vectors(2.0 * np.pi * np.arange(_RING_SIDES) / _RING_SIDES)
     step = round_1_2_5(largest / 3)
     for force in step * np.arange(1, int(largest / step) + 1):
-        items[f"{kind}/ring {force:g} N"] = _loop(centre, scale * force * circle, 0.006 * span, LIMIT)
+        items[f"{kind}/ring {force:g} N"] = _loop(
+            centre, scale * force * circle, 0.006 * span, LIMIT
+        )
         at = centre + scale * force * _unit_vectors(-np.pi / 8)
         items[f"{kind}/label {force:g} N"] = label(at, f"{force:g} N", 0.09 * span)
     return items
@@ -130,7 +184,10 @@ def _curves(result: PushRecovery, theory: bool, previous: PushRecovery | None) -
     curves = [("push_recovery", result.pushes, MEASURED, "o-")]
     if previous is not None:
         if not np.array_equal(previous.directions, result.directions):
-            raise InputError(f"roses of {len(result.directions)} and {len(previous.directions)} directions cannot be compared.")
+            raise InputError(
+                f"roses of {len(result.directions)} and {len(previous.directions)} directions "
+                f"cannot be compared."
+            )
         curves.append(("previous", previous.pushes, LIMIT, "o-"))
     if theory:
         curves += [
@@ -144,7 +201,10 @@ def _horizontal_force_curve(wrenches: WrenchSet, n: int) -> tuple[Array, list[_C
     """Directions, rad, and the one curve."""
     angles, forces = as_instance("wrenches", wrenches, WrenchSet).max_horizontal_forces(n)
     if not np.isfinite(forces).all():
-        raise InputError("the forces of this stance have no end in some direction: give its wrench_set max_normal_force.")
+        raise InputError(
+            "the forces of this stance have no end in some direction: give its wrench_set "
+            "max_normal_force."
+        )
     return angles, [("horizontal_force", forces, COM, "-")]
 
 
@@ -162,8 +222,18 @@ def _closed(values: Array) -> Array:
 
 
 def _loop(centre: Array, corners: Array, radius: float, colour: RGB) -> Item:
-    """A closed line. centre: (3,), m, world. corners: (n, 3), m, from there. radius: half its width, m."""
+    """A closed line. centre: (3,), m, world. corners: (n, 3), m, from there. radius: half its
+    width, m.
+    """
     ends = np.roll(corners, -1, axis=0)
-    rods = [geometry.cylinder(a, b, radius, 8) for a, b in zip(corners, ends, strict=True) if not np.array_equal(a, b)]
-    joints = [(vertices + corner, faces) for corner in corners for vertices, faces in [geometry.sphere(radius, 8)]]
+    rods = [
+        geometry.cylinder(a, b, radius, 8)
+        for a, b in zip(corners, ends, strict=True)
+        if not np.array_equal(a, b)
+    ]
+    joints = [
+        (vertices + corner, faces)
+        for corner in corners
+        for vertices, faces in [geometry.sphere(radius, 8)]
+    ]
     return Item(threejs.mesh(*geometry.merged(rods + joints), colour, lit=False), transform(centre))

@@ -15,21 +15,38 @@ from matplotlib.figure import Figure
 from floatbase._validation import Array, as_instance, numeric_copy, short_repr
 from floatbase.errors import InputError
 from floatbase.viewer.export.recording import as_rollout
-from floatbase.viewer.scene.colours import ALARM, GREYS, LIMIT, MEASURED, PLANNED, PUSH, X_AXIS, Y_AXIS, Z_AXIS
+from floatbase.viewer.scene.colours import (
+    ALARM,
+    GREYS,
+    LIMIT,
+    MEASURED,
+    PLANNED,
+    PUSH,
+    X_AXIS,
+    Y_AXIS,
+    Z_AXIS,
+)
 
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 MIN_LOAD = 0.01  # of the weight: the direction of a smaller force says nothing about friction
 _INSIDE: dict[str, Any] = {"loc": "upper right"}  # where the legend is
-_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "frameon": False}
+_ABOVE: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "ncols": 3,
+    "frameon": False,
+}
 
 
 def plot_run(rollout: Rollout) -> Figure:
     """A figure of four plots: centre of mass, normal forces, friction used, torques."""
     as_rollout(rollout)
     figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
-    for plotted, axis in zip((plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True):
+    for plotted, axis in zip(
+        (plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True
+    ):
         plotted(rollout, axis)
     axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
     for axis in axes[:-1]:
@@ -38,7 +55,9 @@ def plot_run(rollout: Rollout) -> Figure:
 
 
 def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """How far the centre of mass has moved since the start in x, y and z, mm. axis: to plot on; None for a new figure."""
+    """How far the centre of mass has moved since the start in x, y and z, mm. axis: to plot on;
+    None for a new figure.
+    """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
     moved = 1000.0 * (rollout.com - rollout.com[0])
@@ -48,52 +67,96 @@ def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Measured normal force at every contact point, N; behind it, as a wider line, the planned one. axis: as for `plot_com`."""
+    """Measured normal force at every contact point, N; behind it, as a wider line, the planned one.
+    axis: as for `plot_com`.
+    """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
     for i, (planned, measured) in enumerate(
         zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
     ):
-        axis.plot(rollout.time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label="" if i else "planned")
-        axis.plot(rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured")
+        axis.plot(
+            rollout.time,
+            planned,
+            color=PLANNED,
+            linewidth=3.5,
+            alpha=0.6,
+            label="" if i else "planned",
+        )
+        axis.plot(
+            rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured"
+        )
     return _finished(axis, rollout, "normal forces [N]")
 
 
 def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """The gait diagram: a bar for each foot while the controller's stance has it, and a line while the ground carries it.
+    """The gait diagram: a bar for each foot while the controller's stance has it, and a line while
+    the ground carries it.
 
     axis: as for `plot_com`. Raises `InputError` for a record without contacts.
     """
     names = _contact_names(rollout)
     axis = _axes_or_new(axis)
-    rows = enumerate(zip(_stance_rows(rollout), _normal_of_contacts(rollout, rollout.measured), strict=True))
+    rows = enumerate(
+        zip(_stance_rows(rollout), _normal_of_contacts(rollout, rollout.measured), strict=True)
+    )
     for i, (stands, measured) in rows:
         carried = np.where(measured > MIN_LOAD * rollout.robot.weight, float(i), np.nan)
-        bars = axis.broken_barh(_intervals(rollout.time, stands), (i - 0.36, 0.72), color=GREYS[2], alpha=0.6, linewidth=0.0)
+        bars = axis.broken_barh(
+            _intervals(rollout.time, stands),
+            (i - 0.36, 0.72),
+            color=GREYS[2],
+            alpha=0.6,
+            linewidth=0.0,
+        )
         bars.set_label("" if i else "in the controller's stance")
-        axis.plot(rollout.time, carried, color=MEASURED, linewidth=2.5, label="" if i else "measured contact")
+        axis.plot(
+            rollout.time,
+            carried,
+            color=MEASURED,
+            linewidth=2.5,
+            label="" if i else "measured contact",
+        )
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.5, -0.5)
     return _finished(axis, rollout, "", _ABOVE)
 
 
 def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> list[Axes]:
-    """Normal force of each foot through time, N: measured, and behind it, as a wider line, planned. One plot for each contact.
+    """Normal force of each foot through time, N: measured, and behind it, as a wider line, planned.
+    One plot for each contact.
 
-    axes: as many as the record has contacts; None for a new figure. Raises `InputError` for a record without contacts, and for
-        another number of axes.
+    axes: as many as the record has contacts; None for a new figure. Raises `InputError` for a
+        record without contacts, and for another number of axes.
     """
     names = _contact_names(rollout)
     if axes is None:
         size = (8, 1.0 + 1.1 * len(names))
-        grid = plt.subplots(len(names), 1, figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False)[1]
+        grid = plt.subplots(
+            len(names),
+            1,
+            figsize=size,
+            sharex=True,
+            sharey=True,
+            layout="constrained",
+            squeeze=False,
+        )[1]
         axes = list(grid[:, 0])
-    made = [as_instance("one of axes", axis, Axes, "plt.gca()") for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat]
+    made = [
+        as_instance("one of axes", axis, Axes, "plt.gca()")
+        for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat
+    ]
     if len(made) != len(names):
-        raise InputError(f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}.")
-    planned, measured = (_normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured))
+        raise InputError(
+            f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}."
+        )
+    planned, measured = (
+        _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
+    )
     for i, (axis, name) in enumerate(zip(made, names, strict=True)):
-        axis.plot(rollout.time, planned[i], color=PLANNED, linewidth=3.5, alpha=0.6, label="planned")
+        axis.plot(
+            rollout.time, planned[i], color=PLANNED, linewidth=3.5, alpha=0.6, label="planned"
+        )
         axis.plot(rollout.time, measured[i], color=MEASURED, linewidth=1.0, label="measured")
         axis.axhline(0.0, color=LIMIT, linewidth=0.6)
         _finished(axis, rollout, "", {} if i else _ABOVE)
@@ -103,9 +166,11 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
 
 
 def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """(28) ‖f_tangent‖ / (μ f_normal) at every contact point, planned and measured. Above 1 a force is outside its cone.
+    """(28) ‖f_tangent‖ / (μ f_normal) at every contact point, planned and measured. Above 1 a force
+    is outside its cone.
 
-    The curve of a point has gaps where it carries little; see `friction_used`. axis: as for `plot_com`.
+    The curve of a point has gaps where it carries little; see `friction_used`. axis: as for
+    `plot_com`.
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
@@ -114,7 +179,14 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
         (rollout.measured, MEASURED, "measured", 1.2),
     ):
         for i, share in enumerate(friction_used(rollout, forces)):
-            axis.plot(rollout.time, share, color=colour, linewidth=width, alpha=0.7, label="" if i else name)
+            axis.plot(
+                rollout.time,
+                share,
+                color=colour,
+                linewidth=width,
+                alpha=0.7,
+                label="" if i else name,
+            )
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
     return _finished(axis, rollout, "friction used, of μ · normal force")
 
@@ -127,19 +199,25 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
     axis.plot(rollout.time, share, color=GREYS[0], linewidth=0.8, alpha=0.7)
     for limit in (-1.0, 1.0):
-        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else "")
+        axis.axhline(
+            limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
+        )
     return _finished(axis, rollout, "torques, of their limits")
 
 
 def friction_used(rollout: Rollout, forces: Array) -> Array:
-    """‖f_tangent‖ / (μ f_normal) at each contact point and time, shape (k/3, n); NaN where the point carries little.
+    """‖f_tangent‖ / (μ f_normal) at each contact point and time, shape (k/3, n); NaN where the
+    point carries little.
 
     forces: (n, k), N, world, for n times and k/3 points.
     """
     as_rollout(rollout)
     found = numeric_copy(forces)  # NaN stands for none planned
     if found is None or found.shape != rollout.measured.shape:
-        raise InputError(f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got {short_repr(forces)}.")
+        raise InputError(
+            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got "
+            f"{short_repr(forces)}."
+        )
     f = np.reshape(found, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
@@ -151,7 +229,9 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
 
 
 def _normal(rollout: Rollout, forces: Array) -> Array:
-    """Normal force at each contact point and time, shape (k/3, n), N. forces: as for `friction_used`."""
+    """Normal force at each contact point and time, shape (k/3, n), N. forces: as for
+    `friction_used`.
+    """
     f = np.reshape(forces, (len(rollout.time), -1, 3))
     return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
 
@@ -165,8 +245,13 @@ def _contact_names(rollout: Rollout) -> tuple[str, ...]:
 
 
 def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
-    """Normal force of each contact and time, shape (contacts, n), N; of a flat foot that of all its corners."""
-    points, starts = _normal(rollout, forces), np.cumsum([0] + [len(contact.point_names) for contact in rollout.contacts])
+    """Normal force of each contact and time, shape (contacts, n), N; of a flat foot that of all its
+    corners.
+    """
+    points, starts = (
+        _normal(rollout, forces),
+        np.cumsum([0] + [len(contact.point_names) for contact in rollout.contacts]),
+    )
     return np.array([points[a:b].sum(axis=0) for a, b in pairwise(starts)])
 
 
@@ -174,7 +259,10 @@ def _stance_rows(rollout: Rollout) -> npt.NDArray[np.bool_]:
     """Whether the controller's stance had each contact at each time, shape (contacts, n)."""
     if not rollout.stances:
         return np.ones((len(rollout.contacts), len(rollout)), dtype=bool)
-    has = {stance: [name in stance.names for name in rollout.contacts.names] for stance in dict.fromkeys(rollout.stances)}
+    has = {
+        stance: [name in stance.names for name in rollout.contacts.names]
+        for stance in dict.fromkeys(rollout.stances)
+    }
     return np.array([has[stance] for stance in rollout.stances], dtype=bool).T
 
 
@@ -187,14 +275,24 @@ def _intervals(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, 
 
 def _axes_or_new(axis: Axes | None) -> Axes:
     return (
-        plt.subplots(figsize=(8, 3), layout="constrained")[1] if axis is None else as_instance("axis", axis, Axes, "plt.gca()")
+        plt.subplots(figsize=(8, 3), layout="constrained")[1]
+        if axis is None
+        else as_instance("axis", axis, Axes, "plt.gca()")
     )
 
 
-def _finished(axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE) -> Axes:
+def _finished(
+    axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE
+) -> Axes:
     """Add labels, a band for each push, and a legend; {} for none."""
     for i, push in enumerate(rollout.pushes):
-        axis.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.12, label="" if i else "push")
+        axis.axvspan(
+            push.start,
+            push.start + push.duration,
+            color=PUSH,
+            alpha=0.12,
+            label="" if i else "push",
+        )
     axis.set(xlabel="time [s]", ylabel=label)
     axis.grid(alpha=0.25)
     if legend and axis.get_legend_handles_labels()[0]:

@@ -1,8 +1,10 @@
-"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and Ito).
+"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and
+Ito).
 
-Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is inside, orange when the
-force reaches a facet or the surface, vermilion when it is outside, and a faint grey when there is no force. What is neither
-a force nor a cone, as a curve, a place or an entry of a matrix, is grey: greys differ in lightness, which everybody sees.
+Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is
+inside, orange when the force reaches a facet or the surface, vermilion when it is outside, and a
+faint grey when there is no force. What is neither a force nor a cone, as a curve, a place or an
+entry of a matrix, is grey: greys differ in lightness, which everybody sees.
 """
 
 from __future__ import annotations
@@ -29,7 +31,11 @@ LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
 PATCH = _rgb("#444444")
-GREYS = (_rgb("#2B3440"), _rgb("#6F7885"), _rgb("#959EAA"))  # dark, middle, light; the middle one shows on any background
+GREYS = (
+    _rgb("#2B3440"),
+    _rgb("#6F7885"),
+    _rgb("#959EAA"),
+)  # dark, middle, light; the middle one shows on any background
 
 X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
@@ -62,9 +68,11 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("ghost", GHOST, GHOST_NAME),
 )
 
-# how the legend marks what is not a patch of its colour: first part of the item's path -> a class of the page's style
+# how the legend marks what is not a patch of its colour: first part of the item's path -> a class
+# of the page's style
 LEGEND_SYMBOLS = {
-    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line", "cone": "cone", "idle cone": "cone",
+    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
+    "cone": "cone", "idle cone": "cone",
     "support": "tile", "wrench": "curl",
 }  # fmt: skip
 

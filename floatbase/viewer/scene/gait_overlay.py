@@ -1,4 +1,6 @@
-"""What a walk plans, as marks in the picture: footholds, swing paths, capture point and zero-moment point (ZMP)."""
+"""What a walk plans, as marks in the picture: footholds, swing paths, capture point and zero-moment
+point (ZMP).
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,12 @@ from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
 from floatbase.viewer.scene.shapes import Item, Picture, transform
 from floatbase.viewer.scene.threejs import Shape
 
-COLOUR = GREYS[1]  # of all that is neither a force nor the centre of mass; it shows on any background
-_HEIGHT_ABOVE_GROUND = 0.005  # of the robot's size, above the ground: no flicker with its lines and the support region
+COLOUR = GREYS[
+    1
+]  # of all that is neither a force nor the centre of mass; it shows on any background
+_HEIGHT_ABOVE_GROUND = (
+    0.005  # of the robot's size, above the ground: no flicker with its lines and the support region
+)
 _RING_RADIUS, _DIAMOND_SIZE = (
     0.07,
     0.05,
@@ -33,7 +39,9 @@ _SEGMENTS = 24  # of a swing path
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """How marks are drawn. size: of the robot, m. ground: where they lie. colour: RGB of the ZMP, which shows on the page."""
+    """How marks are drawn. size: of the robot, m. ground: where they lie. colour: RGB of the ZMP,
+    which shows on the page.
+    """
 
     size: float
     ground: Plane | Planes = LEVEL
@@ -41,30 +49,40 @@ class Style:
 
 
 def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
-    """What a `Walk` plans now: its footholds and swing paths, the capture point where it is, and the planned ZMP.
+    """What a `Walk` plans now: its footholds and swing paths, the capture point where it is, and
+    the planned ZMP.
 
-    walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot, then. style: of the marks.
+    walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot,
+        then. style: of the marks.
     """
     if as_instance("walk", walk, Walk).plan is None:
         return {}
     assert walk.plan is not None and walk.time is not None
-    yaw_changes = {foot: walk.yaw_rate * max(path.touchdown - walk.time, 0.0) for foot, path in walk.swings.items()}
+    yaw_changes = {
+        foot: walk.yaw_rate * max(path.touchdown - walk.time, 0.0)
+        for foot, path in walk.swings.items()
+    }
     return _capture_point_and_zmp(walk.plan, walk.time, state, style) | _footholds_and_swings(
         walk.footholds, walk.swings, yaw_changes, state, style.size
     )
 
 
 def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Picture:
-    """The same of a stored step, as it was planned when its stance began; the capture point is where it is at time t.
+    """The same of a stored step, as it was planned when its stance began; the capture point is
+    where it is at time t.
 
     step: an entry of `walk.history`. t: s. state: of the robot, then. style: of the marks.
     """
-    marks = _capture_point_and_zmp(as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, style)
+    marks = _capture_point_and_zmp(
+        as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, style
+    )
     return marks | _footholds_and_swings(step.footholds, step.swings, {}, state, style.size)
 
 
 def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
-    """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before the first."""
+    """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before
+    the first.
+    """
     i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
     return steps[i - 1] if i else None
 
@@ -72,13 +90,18 @@ def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
 def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
     """The steps as a list, after checking that they are some."""
     if not isinstance(steps, Iterable):
-        raise InputError(f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}.")
+        raise InputError(
+            f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}."
+        )
     return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 
 
 def _capture_point_and_zmp(plan: LIPM, t: float, state: State, style: Style) -> Picture:
     """Capture point and ZMP. t: s."""
-    dcm, zmp = capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega), plan.zmp(t)
+    dcm, zmp = (
+        capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega),
+        plan.zmp(t),
+    )
     lift = _HEIGHT_ABOVE_GROUND * style.size
     ring = transform([*dcm, style.ground.height(dcm) + lift], scale=_RING_RADIUS * style.size)
     diamond = transform([*zmp, style.ground.height(zmp) + lift], scale=_DIAMOND_SIZE * style.size)
@@ -101,7 +124,10 @@ def _footholds_and_swings(
     yaw = float(np.arctan2(forward_y, forward_x))
     for name, place in footholds.items():
         foot, path = _foot(state.robot, name), name.replace("/", "_")
-        rotation, offset = _rotation_about_z(yaw + yaw_changes.get(name, 0.0)), _offset_to_ground(foot, state.robot.standing())
+        rotation, offset = (
+            _rotation_about_z(yaw + yaw_changes.get(name, 0.0)),
+            _offset_to_ground(foot, state.robot.standing()),
+        )
         picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
         if name in swings:
             picture[f"swing/{path}"] = _swing_path(swings[name], rotation @ offset)
@@ -116,13 +142,18 @@ def _foot(robot: Robot, name: str) -> Foot:
 
 
 def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
-    """Where a foot is to stand. at: (3,), m, world, below its middle. rotation: (3, 3), of the robot on the ground."""
+    """Where a foot is to stand. at: (3,), m, world, below its middle. rotation: (3, 3), of the
+    robot on the ground.
+    """
     at = at + [0.0, 0.0, _HEIGHT_ABOVE_GROUND * size]
     if foot.corners is None:
         radius = max(2.0 * foot.radius, 0.04 * size)
         return Item(_ring(COLOUR, 0.72), transform(at, rotation, radius))
     corners = np.round(foot.corners[:, :2] - foot.corners[:, :2].mean(axis=0), 4)
-    return Item(_foot_outline(tuple(map(tuple, corners.tolist())), round(_OUTLINE_WIDTH * size, 4)), transform(at, rotation))
+    return Item(
+        _foot_outline(tuple(map(tuple, corners.tolist())), round(_OUTLINE_WIDTH * size, 4)),
+        transform(at, rotation),
+    )
 
 
 def _offset_to_ground(foot: Foot, standing: State) -> Array:
@@ -136,7 +167,8 @@ def _offset_to_ground(foot: Foot, standing: State) -> Array:
 def _swing_path(swing: Swing, offset: Array) -> Item:
     """The path of a swing as a line, moved by an offset, (3,), m.
 
-    It is one curve, stretched; so a path that is aimed elsewhere at every tick costs a matrix, and no new shape.
+    It is one curve, stretched; so a path that is aimed elsewhere at every tick costs a matrix, and
+    no new shape.
     """
     step_vector = swing.end - swing.start
     length = float(np.linalg.norm(step_vector))
@@ -144,7 +176,10 @@ def _swing_path(swing: Swing, offset: Array) -> Item:
     y = np.cross([0.0, 0.0, 1.0], x)
     y /= max(float(np.linalg.norm(y)), _MIN_LENGTH)
     scale = (max(length, _MIN_LENGTH), 1.0, max(swing.height, _MIN_LENGTH))
-    return Item(_unit_swing_path(), transform(swing.start + offset, np.stack([x, y, np.cross(x, y)], axis=1), scale))
+    return Item(
+        _unit_swing_path(),
+        transform(swing.start + offset, np.stack([x, y, np.cross(x, y)], axis=1), scale),
+    )
 
 
 def _rotation_about_z(yaw: float) -> Array:
@@ -155,14 +190,22 @@ def _rotation_about_z(yaw: float) -> Array:
 @lru_cache(maxsize=8)
 def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
     """A flat ring around z, of radius 1. inner: its inner radius."""
-    return threejs.mesh(*geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36), colour, lit=False, on_top=on_top)
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36),
+        colour,
+        lit=False,
+        on_top=on_top,
+    )
 
 
 @lru_cache(maxsize=8)
 def _diamond(colour: RGB) -> Shape:
     """An octahedron that stands on its tip, which looks like a diamond from all around."""
     return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4), colour, lit=False, on_top=True
+        *geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4),
+        colour,
+        lit=False,
+        on_top=True,
     )
 
 

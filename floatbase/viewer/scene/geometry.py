@@ -1,4 +1,6 @@
-"""Triangle meshes of simple shapes. A mesh is vertices, shape (n, 3), and faces, shape (m, 3): indices of the vertices."""
+"""Triangle meshes of simple shapes. A mesh is vertices, shape (n, 3), and faces, shape (m, 3):
+indices of the vertices.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,8 @@ def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
 def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
     """A surface of revolution around the z axis.
 
-    profile: (radius, height) of its corners; listed upwards, the surface faces outwards. sides: number of sides of a circle.
+    profile: (radius, height) of its corners; listed upwards, the surface faces outwards. sides:
+        number of sides of a circle.
     Each piece of the profile has its own vertices, so that its edges look sharp.
     """
     angles = 2.0 * np.pi * np.arange(sides) / sides
@@ -37,7 +40,9 @@ def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 2
 
 
 def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
-    """Faces between two circles. low, high: whether the lower and the upper circle have a radius above 0."""
+    """Faces between two circles. low, high: whether the lower and the upper circle have a radius
+    above 0.
+    """
     i = np.arange(sides)
     j = (i + 1) % sides
     up = np.stack([i, j, j + sides], axis=1) if low else np.zeros((0, 3), int)
@@ -50,7 +55,11 @@ def sphere(radius: float, sides: int = 20) -> Mesh:
     heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
     angles = 2.0 * np.pi * np.arange(sides) / sides
     rings = [
-        radius * np.stack([np.cos(h) * np.cos(angles), np.cos(h) * np.sin(angles), np.full(sides, np.sin(h))], axis=1)
+        radius
+        * np.stack(
+            [np.cos(h) * np.cos(angles), np.cos(h) * np.sin(angles), np.full(sides, np.sin(h))],
+            axis=1,
+        )
         for h in heights
     ]
     bands = [_band(sides, k > 0, k < len(rings) - 2) + k * sides for k in range(len(rings) - 1)]
@@ -66,7 +75,9 @@ def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
-    vertices, faces = surface_of_revolution([(0, 0), (radius, 0), (radius, length), (0, length)], sides)
+    vertices, faces = surface_of_revolution(
+        [(0, 0), (radius, 0), (radius, length), (0, length)], sides
+    )
     return (vertices @ rotation_with_z_axis((b - a) / length).T + a).astype(np.float32), faces
 
 
@@ -77,20 +88,31 @@ def rotation_with_z_axis(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
     sign = 1.0 if z >= 0 else -1.0
     a = -1.0 / (sign + z)
     b = x * y * a
-    return np.array([[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]])
+    return np.array(
+        [[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]]
+    )
 
 
 def convex_polygon(corners: npt.ArrayLike) -> Mesh:
-    """A flat convex polygon. corners: (n, 3); it faces the side from which they run counter-clockwise."""
+    """A flat convex polygon. corners: (n, 3); it faces the side from which they run
+    counter-clockwise.
+    """
     points = np.asarray(corners, dtype=np.float32)
     i = np.arange(1, len(points) - 1)
     return points, np.stack([np.zeros_like(i), i, i + 1], axis=1).astype(np.uint32)
 
 
 def pyramid(rays: npt.ArrayLike) -> Mesh:
-    """The sides of a pyramid with its tip at the origin. rays: (n, 3), its edges. Each side has its own vertices."""
+    """The sides of a pyramid with its tip at the origin. rays: (n, 3), its edges. Each side has its
+    own vertices.
+    """
     ends = np.asarray(rays, dtype=np.float32)
-    return merged([convex_polygon([np.zeros(3), a, b]) for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)])
+    return merged(
+        [
+            convex_polygon([np.zeros(3), a, b])
+            for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)
+        ]
+    )
 
 
 def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:
@@ -104,6 +126,9 @@ def torus_arc(radius: float, tube: float, start: float, end: float, sides: int =
     around = np.linspace(start, end, sides + 1)
     across = 2.0 * np.pi * np.arange(10) / 10
     reach = radius + tube * np.cos(across)
-    rings = [np.stack([reach * np.cos(a), reach * np.sin(a), tube * np.sin(across)], axis=1) for a in around]
+    rings = [
+        np.stack([reach * np.cos(a), reach * np.sin(a), tube * np.sin(across)], axis=1)
+        for a in around
+    ]
     bands = [_band(10, True, True)[:, ::-1] + k * 10 for k in range(sides)]
     return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)

@@ -13,9 +13,14 @@ from floatbase.viewer.scene import threejs
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.shapes import Item, grid_lines, ground_grid, transform
 
-MIN_VERTICAL = 0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
-GRID_JUMP = 2.5  # m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody sees it
-HEIGHT_STEP = 0.01  # m; the height of the ground is rounded to this, so that it does not tremble with the feet
+MIN_VERTICAL = (
+    0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
+)
+# m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody
+# sees it
+GRID_JUMP = 2.5
+# m; the height of the ground is rounded to this, so that it does not tremble with the feet
+HEIGHT_STEP = 0.01
 
 
 class Plane(NamedTuple):
@@ -35,13 +40,21 @@ class Plane(NamedTuple):
         return (self.offset - x * float(point[0]) - y * float(point[1])) / z
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """The lines of the plane's grid, which reach at least 3 m around a point, shape (3,), m; None for the origin."""
-        i, j = (0, 0) if around is None else np.round(_tangents(self) @ around / GRID_JUMP).astype(int).tolist()
+        """The lines of the plane's grid, which reach at least 3 m around a point, shape (3,), m;
+        None for the origin.
+        """
+        i, j = (
+            (0, 0)
+            if around is None
+            else np.round(_tangents(self) @ around / GRID_JUMP).astype(int).tolist()
+        )
         return _lines(self, colour, i, j)
 
 
 class Planes(NamedTuple):
-    """Several planes that all are solid below, as the two sides of a valley: what is seen of each lies above the others."""
+    """Several planes that all are solid below, as the two sides of a valley: what is seen of each
+    lies above the others.
+    """
 
     planes: tuple[Plane, ...]
 
@@ -50,7 +63,9 @@ class Planes(NamedTuple):
         return max(plane.height(point) for plane in self.planes)
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """The lines of all planes' grids around the origin, each as far as it is seen. around: does not count."""
+        """The lines of all planes' grids around the origin, each as far as it is seen. around: does
+        not count.
+        """
         return _visible_lines(self, colour)
 
 
@@ -64,10 +79,11 @@ def displacement(ground: Plane | Planes, start: Array, end: Array) -> Array:
 
 
 def plane_under(normals: Array, positions: Array) -> Plane:
-    """The slope on which contact points stand. normals: (n, 3), unit, world. positions: (n, 3), m, world.
+    """The slope on which contact points stand. normals: (n, 3), unit, world. positions: (n, 3), m,
+    world.
 
-    It is level, through the origin, when there are no points, when their normals differ, when they do not lie in one plane,
-    and when they stand on a wall.
+    It is level, through the origin, when there are no points, when their normals differ, when they
+    do not lie in one plane, and when they stand on a wall.
     """
     if not len(normals) or np.ptp(normals, axis=0).max() > 1e-6 or normals[0, 2] < MIN_VERTICAL:
         return LEVEL
@@ -106,11 +122,15 @@ def _visible_lines(ground: Planes, colour: RGB) -> Item:
 
 
 def _parts_above(plane: Plane, ends: Array) -> Array:
-    """The parts of lines above a plane. ends: shape (n, 2, 3), m, world; so is the answer, with fewer lines or as many."""
+    """The parts of lines above a plane. ends: shape (n, 2, 3), m, world; so is the answer, with
+    fewer lines or as many.
+    """
     clear = ends @ np.array(plane.normal) - plane.offset
     seen = clear.max(axis=1) > 0.0
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
-    fraction = low / np.where(low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0)  # part of the line, at each end
+    fraction = low / np.where(
+        low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0
+    )  # part of the line, at each end
     return np.asarray(lines + fraction[:, :, None] * (lines[:, ::-1] - lines))
 
 

@@ -20,7 +20,8 @@ _SUBSCRIPT_SCALE = 0.68  # size of a subscript, over that of the text
 def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     """Grey and alpha of a line of text, shape (height, width, 2), 0-255.
 
-    text: the text; braces make a subscript: "f{c}". plate: whether a plate lies behind it. colour: RGB.
+    text: the text; braces make a subscript: "f{c}". plate: whether a plate lies behind it. colour:
+        RGB.
     """
     # re.split with a group returns text and subscripts in turn
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
@@ -31,7 +32,9 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     draw = ImageDraw.Draw(image)
     grey = round(255 * sum(colour) / 3)
     if plate:
-        draw.rounded_rectangle((0, 0, size[0] - 1, size[1] - 1), margin, fill=(255 if grey < 128 else 30, 215))
+        draw.rounded_rectangle(
+            (0, 0, size[0] - 1, size[1] - 1), margin, fill=(255 if grey < 128 else 30, 215)
+        )
     x = float(margin)
     for (part, is_subscript), width in zip(parts, widths, strict=True):
         base = margin + FONT_SIZE + (0.25 * FONT_SIZE if is_subscript else 0.0)
@@ -42,11 +45,19 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
 
 @cache
 def font(is_subscript: bool = False) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """matplotlib's DejaVu Sans, which has Greek letters and mathematical signs; without it, Pillow's font."""
+    """matplotlib's DejaVu Sans, which has Greek letters and mathematical signs; without it,
+    Pillow's font.
+    """
     size = FONT_SIZE * (_SUBSCRIPT_SCALE if is_subscript else 1.0)
     spec = find_spec("matplotlib")
     if spec is not None and spec.submodule_search_locations:
-        font = Path(spec.submodule_search_locations[0]) / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
+        font = (
+            Path(spec.submodule_search_locations[0])
+            / "mpl-data"
+            / "fonts"
+            / "ttf"
+            / "DejaVuSans.ttf"
+        )
         if font.is_file():
             return ImageFont.truetype(str(font), size)
     return ImageFont.load_default(size)

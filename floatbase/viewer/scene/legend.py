@@ -11,7 +11,9 @@ Entry = tuple[str, RGB, str]  # kind of items, colour, meaning
 
 
 @lru_cache(maxsize=64)  # most pictures show what the one before did
-def command(shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tuple[Entry, ...] = ()) -> protocol.Update:
+def command(
+    shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tuple[Entry, ...] = ()
+) -> protocol.Update:
     """The command for the legend of these kinds of items.
 
     shown: the kinds. ghost_name: what the ghost is called.
@@ -20,7 +22,11 @@ def command(shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tup
     """
     colours = dict.fromkeys(("push", "multiplier", "zmp"), text)
     items = [
-        [hex_code(colours.get(kind, colour)), ghost_name if kind == "ghost" else meaning, LEGEND_SYMBOLS.get(kind, "patch")]
+        [
+            hex_code(colours.get(kind, colour)),
+            ghost_name if kind == "ghost" else meaning,
+            LEGEND_SYMBOLS.get(kind, "patch"),
+        ]
         for kind, colour, meaning in (*LEGEND, *user_entries)
         if kind in shown
     ]

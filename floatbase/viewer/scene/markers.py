@@ -29,19 +29,29 @@ from floatbase.viewer.scene.shapes import (
 )
 from floatbase.viewer.scene.threejs import Shape
 
-_CONE_CONSTRAINTS = ("friction", "normal force", "largest normal force")  # kinds of the rows whose prices are shown
+_CONE_CONSTRAINTS = (
+    "friction",
+    "normal force",
+    "largest normal force",
+)  # kinds of the rows whose prices are shown
 _LEAST_SHOWN = 1e-3  # part of the dearest row's price below which a label would only hide others
 OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
 
 
-def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike, size: float, colour: RGB = COM) -> Picture:
-    """A force as a straight arrow, and a moment as a curled arrow around its axis, drawn over the robot, in which it would
-    hide. Either may be zero, and is left out.
+def wrench(
+    position: npt.ArrayLike,
+    force: npt.ArrayLike,
+    moment: npt.ArrayLike,
+    size: float,
+    colour: RGB = COM,
+) -> Picture:
+    """A force as a straight arrow, and a moment as a curled arrow around its axis, drawn over the
+    robot, in which it would hide. Either may be zero, and is left out.
 
     position: (3,), m, world, where both begin.
     force: (3,), m, world: the force times the picture's scale (m/N).
-    moment: (3,), m, world: the moment times the scale, over `size`. So the radius of the curled arrow is the length of a
-        force that has this moment at a lever of `size` m.
+    moment: (3,), m, world: the moment times the scale, over `size`. So the radius of the curled
+        arrow is the length of a force that has this moment at a lever of `size` m.
     size: size of the robot, m.
     colour: RGB of both.
     """
@@ -53,7 +63,9 @@ def wrench(position: npt.ArrayLike, force: npt.ArrayLike, moment: npt.ArrayLike,
     return picture
 
 
-def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM, on_top: bool = False) -> Item:
+def curled_arrow(
+    position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM, on_top: bool = False
+) -> Item:
     """An arrow that turns around an axis by the right-hand rule.
 
     position: (3,), m, world, its centre.
@@ -62,13 +74,21 @@ def curled_arrow(position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = C
     on_top: whether it is drawn over what is in front of it.
     """
     moment, radius = vector_and_length("a curled arrow", moment)
-    return Item(_unit_curled_arrow(colour, on_top), transform(position, geometry.rotation_with_z_axis(moment / radius), radius))
+    return Item(
+        _unit_curled_arrow(colour, on_top),
+        transform(position, geometry.rotation_with_z_axis(moment / radius), radius),
+    )
 
 
 def push(
-    position: npt.ArrayLike, vector: npt.ArrayLike, size: float, colour: RGB = PUSH, outline: RGB = (1.0, 1.0, 1.0)
+    position: npt.ArrayLike,
+    vector: npt.ArrayLike,
+    size: float,
+    colour: RGB = PUSH,
+    outline: RGB = (1.0, 1.0, 1.0),
 ) -> Item:
-    """A push: an arrow that ends where the push acts. It is drawn over the robot, with an outline that sets it off.
+    """A push: an arrow that ends where the push acts. It is drawn over the robot, with an outline
+    that sets it off.
 
     position: (3,), m, world, where the push acts.
     vector: (3,), m, world, from the arrow's start to its end.
@@ -79,13 +99,19 @@ def push(
     width = arrow_width(length, size)
     rotation = geometry.rotation_with_z_axis(vector / length)
     shape = _outlined_arrow(colour, outline, max(round(2.0 * length / width), 1))
-    return Item(shape, transform(np.asarray(position) - vector, rotation, (width / 2, width / 2, length)))
+    return Item(
+        shape, transform(np.asarray(position) - vector, rotation, (width / 2, width / 2, length))
+    )
 
 
-def support_region(positions: npt.ArrayLike, height_above_ground: float, ground: Plane | Planes = LEVEL) -> Picture:
-    """The convex hull of contact points, seen from above; nothing for fewer than three points, or for points on a line.
+def support_region(
+    positions: npt.ArrayLike, height_above_ground: float, ground: Plane | Planes = LEVEL
+) -> Picture:
+    """The convex hull of contact points, seen from above; nothing for fewer than three points, or
+    for points on a line.
 
-    positions: (n, 3), m, world. height_above_ground: m, how far above the ground it is drawn. ground: where its corners lie.
+    positions: (n, 3), m, world. height_above_ground: m, how far above the ground it is drawn.
+        ground: where its corners lie.
     """
     points = np.asarray(positions, dtype=np.float64)[:, :2]
     try:
@@ -98,11 +124,14 @@ def support_region(positions: npt.ArrayLike, height_above_ground: float, ground:
     return {"": Item(flat_polygon(flat, CALM, 0.22), transform([0.0, 0.0, height_above_ground]))}
 
 
-def multiplier_labels(positions: npt.ArrayLike, contacts: Contacts, solution: Solution, height: float, size: float) -> Picture:
-    """The multiplier of each active friction and normal-force row, two significant digits, at the middle of its facet.
+def multiplier_labels(
+    positions: npt.ArrayLike, contacts: Contacts, solution: Solution, height: float, size: float
+) -> Picture:
+    """The multiplier of each active friction and normal-force row, two significant digits, at the
+    middle of its facet.
 
-    A normal-force row has no facet: its label stands on the cone's axis, at the top. Prices below a thousandth of the dearest
-    one shown get no label.
+    A normal-force row has no facet: its label stands on the cone's axis, at the top. Prices below a
+    thousandth of the dearest one shown get no label.
     positions: (n, 3), m, world, of the n contact points.
     contacts: the contacts that the problem was made for.
     solution: of a `QP` with a block of forces; its rows say where their facets are.
@@ -111,10 +140,21 @@ def multiplier_labels(positions: npt.ArrayLike, contacts: Contacts, solution: So
     """
     qp, found = solution.qp, solution.multipliers
     forces = qp.blocks.get("forces", slice(0, 0))
-    rows = [row for row in zip(qp.inequality_names, qp.G[:, forces], strict=True) if row[0] in found]
-    labels = [(name, row) for name, row in rows if isinstance(name, ConstraintLabel) and name.kind in _CONE_CONSTRAINTS]
-    if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(contacts.point_names):
-        raise InputError("the solution is not one of these contacts: give contacts and solution of the same command.")
+    rows = [
+        row for row in zip(qp.inequality_names, qp.G[:, forces], strict=True) if row[0] in found
+    ]
+    labels = [
+        (name, row)
+        for name, row in rows
+        if isinstance(name, ConstraintLabel) and name.kind in _CONE_CONSTRAINTS
+    ]
+    if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(
+        contacts.point_names
+    ):
+        raise InputError(
+            "the solution is not one of these contacts: give contacts and solution of the same "
+            "command."
+        )
     picture: Picture = {}
     least = _LEAST_SHOWN * max((found[name] for name, _ in labels), default=0.0)
     for name, row in labels:
@@ -122,17 +162,28 @@ def multiplier_labels(positions: npt.ArrayLike, contacts: Contacts, solution: So
             continue
         i = contacts.point_names.index(name.owner)
         normal, own = contacts.normals[i], row[3 * i : 3 * i + 3]
-        across = own - normal * (normal @ own)  # the tangent that the facet faces, times the row's length
-        to_facet = normal - across * (normal @ own) / (across @ across) if name.kind == "friction" else 1.5 * normal
-        at = np.asarray(positions)[i] + height / 1.5 * to_facet  # the centroid of a triangle with its tip in the point
-        picture[f"/{name.replace('/', '_')}"] = label(at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size)
+        across = own - normal * (
+            normal @ own
+        )  # the tangent that the facet faces, times the row's length
+        to_facet = (
+            normal - across * (normal @ own) / (across @ across)
+            if name.kind == "friction"
+            else 1.5 * normal
+        )
+        at = (
+            np.asarray(positions)[i] + height / 1.5 * to_facet
+        )  # the centroid of a triangle with its tip in the point
+        picture[f"/{name.replace('/', '_')}"] = label(
+            at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size
+        )
     return picture
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
     """The axes of a frame as three rods, x vermilion, y green, z blue, drawn over the robot.
 
-    pose: (4, 4), homogeneous, world. length: of the rods, m. name: a label; without one there is none.
+    pose: (4, 4), homogeneous, world. length: of the rods, m. name: a label; without one there is
+        none.
     """
     matrix = np.array(as_array("pose of a frame", pose, (4, 4)))
     matrix[:3, :3] *= as_positive("length of a frame's axes", length, "m")
@@ -144,7 +195,9 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
 @lru_cache(maxsize=64)
 def _unit_curled_arrow(colour: RGB, on_top: bool) -> Shape:
-    """Three quarters of a ring of radius 1 around z, with a head at its end and two before: one is seen from anywhere."""
+    """Three quarters of a ring of radius 1 around z, with a head at its end and two before: one is
+    seen from anywhere.
+    """
     end = 1.5 * np.pi - 0.3
     ring = geometry.torus_arc(1.0, 0.055, 0.0, end)
     heads = [_arrow_head(angle) for angle in (end / 3.0, 2.0 * end / 3.0, end)]
@@ -170,10 +223,19 @@ def _outlined_arrow(colour: RGB, outline: RGB, slenderness: int) -> Shape:
     top = tip + OUTLINE * math.hypot(1.0, 1.0 / opening) / slenderness
     wide, low = shaft + OUTLINE, neck - back
     around = geometry.surface_of_revolution(
-        [(0.0, -back), (wide, -back), (wide, low), (opening * slenderness * (top - low), low), (0.0, top)]
+        [
+            (0.0, -back),
+            (wide, -back),
+            (wide, low),
+            (opening * slenderness * (top - low), low),
+            (0.0, top),
+        ]
     )
     parts = [around, geometry.surface_of_revolution(ARROW)]
-    colours = [np.tile(np.round(255 * np.array(c)), (len(p), 1)) for c, (p, _) in zip((outline, colour), parts, strict=True)]
+    colours = [
+        np.tile(np.round(255 * np.array(c)), (len(p), 1))
+        for c, (p, _) in zip((outline, colour), parts, strict=True)
+    ]
     return threejs.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, on_top=True)
 
 

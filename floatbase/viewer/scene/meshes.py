@@ -1,4 +1,6 @@
-"""Meshes of robots: the light ones in `assets/`, else those of the URDF, else balls and rods along the kinematic tree."""
+"""Meshes of robots: the light ones in `assets/`, else those of the URDF, else balls and rods along
+the kinematic tree.
+"""
 
 from __future__ import annotations
 
@@ -36,39 +38,60 @@ class JointMesh:
 
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
-    """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to joint 0, the world."""
+    """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to
+    joint 0, the world.
+    """
     asset = _mesh_file(robot.urdf, robot.joint_names)
     if asset is not None:
-        return _merged_by_joint([mesh for part in _mesh_parts(asset) for mesh in _joint_meshes(robot, *part)])
+        return _merged_by_joint(
+            [mesh for part in _mesh_parts(asset) for mesh in _joint_meshes(robot, *part)]
+        )
     try:
         meshes = _from_urdf(robot)
-    except (ImportError, ValueError, OSError):  # no trimesh, or files that it or Pinocchio cannot read
+    except (
+        ImportError,
+        ValueError,
+        OSError,
+    ):  # no trimesh, or files that it or Pinocchio cannot read
         meshes = []
     return meshes or _from_tree(robot)
 
 
 def appearance_digest(urdf: str, moving: Collection[str]) -> str:
-    """What light meshes are made from, as a digest of a URDF's text: the visuals of its links, and how these are welded.
+    """What light meshes are made from, as a digest of a URDF's text: the visuals of its links, and
+    how these are welded.
 
-    moving: names of the joints that move in the robot of the light meshes. Where these are plays no part, nor do bolts: a robot
+    moving: names of the joints that move in the robot of the light meshes. Where these are plays no
+        part, nor do bolts: a robot
     looks the same with joints locked, and without its link "world".
     """
     root, visuals = ElementTree.fromstring(urdf), ElementTree.Element("looks")
     visuals.extend(root.findall("material"))
     for link in root.findall("link"):
-        ElementTree.SubElement(visuals, "link", name=link.get("name", "")).extend(link.findall("visual"))
+        ElementTree.SubElement(visuals, "link", name=link.get("name", "")).extend(
+            link.findall("visual")
+        )
     for joint in root.findall("joint"):
         places = [] if joint.get("name") in moving else joint.findall("origin")
         ends = [*joint.findall("parent"), *joint.findall("child")]
-        ElementTree.SubElement(visuals, "joint", name=joint.get("name", "")).extend([*ends, *places])
-    for bolt in [*visuals.findall("link[@name='world']"), *visuals.findall("joint/parent[@link='world']/..")]:
+        ElementTree.SubElement(visuals, "joint", name=joint.get("name", "")).extend(
+            [*ends, *places]
+        )
+    for bolt in [
+        *visuals.findall("link[@name='world']"),
+        *visuals.findall("joint/parent[@link='world']/.."),
+    ]:
         visuals.remove(bolt)
-    return sha256(ElementTree.canonicalize(ElementTree.tostring(visuals), strip_text=True).encode()).hexdigest()
+    return sha256(
+        ElementTree.canonicalize(ElementTree.tostring(visuals), strip_text=True).encode()
+    ).hexdigest()
 
 
 @lru_cache(maxsize=32)
 def _mesh_file(urdf: str, joints: tuple[str, ...]) -> Path | None:
-    """The file of light meshes that were made from such a URDF, with at least these joints that move; None without one."""
+    """The file of light meshes that were made from such a URDF, with at least these joints that
+    move; None without one.
+    """
     for asset in sorted((assets_root() / "meshes").glob("*.npz")):
         with np.load(asset) as file:
             moving = set(file["moving"].tolist())
@@ -82,7 +105,9 @@ Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[n
 
 @lru_cache(maxsize=8)
 def _mesh_parts(asset: Path) -> list[Part]:
-    """Joint name, vertices, faces and colours of each part in a file. assets/build_meshes.py describes the file."""
+    """Joint name, vertices, faces and colours of each part in a file. assets/build_meshes.py
+    describes the file.
+    """
     parts = []
     with np.load(asset) as file:
         data = {name: file[name] for name in file.files}
@@ -102,9 +127,11 @@ def _joint_meshes(
     faces: npt.NDArray[np.uint32],
     colours: npt.NDArray[np.uint8],
 ) -> list[JointMesh]:
-    """One part as the mesh of its joint, or of the joint above if the joint was locked; none if the model lacks the joint.
+    """One part as the mesh of its joint, or of the joint above if the joint was locked; none if the
+    model lacks the joint.
 
-    Parts of the world and of the base move with the base of a floating robot, and stand still on a fixed one.
+    Parts of the world and of the base move with the base of a floating robot, and stand still on a
+    fixed one.
     """
     model = robot.model
     if joint in ("universe", "root_joint"):
@@ -138,8 +165,12 @@ def _from_urdf(robot: Robot) -> list[JointMesh]:
     meshes = []
     for joint in sorted({piece.joint for piece in pieces}):
         own = [piece for piece in pieces if piece.joint == joint]
-        colours = [np.tile(np.round(255 * piece.colour), (len(piece.mesh.vertices), 1)) for piece in own]
-        vertices, faces = geometry.merged([(piece.mesh.vertices, piece.mesh.faces) for piece in own])
+        colours = [
+            np.tile(np.round(255 * piece.colour), (len(piece.mesh.vertices), 1)) for piece in own
+        ]
+        vertices, faces = geometry.merged(
+            [(piece.mesh.vertices, piece.mesh.faces) for piece in own]
+        )
         meshes.append(JointMesh(joint, vertices, faces, np.vstack(colours).astype(np.uint8)))
     return meshes
 
@@ -147,7 +178,10 @@ def _from_urdf(robot: Robot) -> list[JointMesh]:
 def _from_tree(robot: Robot) -> list[JointMesh]:
     """A ball at every joint and a rod to each of its children."""
     model = robot.model
-    lengths = [float(np.linalg.norm(placement.translation)) for placement in list(model.jointPlacements)[1:]]
+    lengths = [
+        float(np.linalg.norm(placement.translation))
+        for placement in list(model.jointPlacements)[1:]
+    ]
     radius = 0.12 * float(np.median([length for length in lengths if length > 1e-3] or [0.2]))
     meshes = []
     for joint in range(model.njoints):
@@ -156,7 +190,11 @@ def _from_tree(robot: Robot) -> list[JointMesh]:
         if joint == 0 and robot.is_floating:
             continue
         shapes = [geometry.sphere(1.6 * radius)]
-        shapes += [geometry.cylinder(np.zeros(3), end, radius) for end in ends if np.linalg.norm(end) > 1e-6]
+        shapes += [
+            geometry.cylinder(np.zeros(3), end, radius)
+            for end in ends
+            if np.linalg.norm(end) > 1e-6
+        ]
         vertices, faces = geometry.merged(shapes)
         colours = np.tile(np.round(255 * np.array(ROBOT)), (len(vertices), 1)).astype(np.uint8)
         meshes.append(JointMesh(joint, vertices, faces, colours))

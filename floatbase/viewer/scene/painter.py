@@ -1,4 +1,6 @@
-"""The painter: makes a picture of a robot from its state, contacts and forces. It has no effect on any page."""
+"""The painter: makes a picture of a robot from its state, contacts and forces. It has no effect on
+any page.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._validation import Array, as_array, as_instance, as_strings, cached_property, numeric_copy, short_repr
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_instance,
+    as_strings,
+    cached_property,
+    numeric_copy,
+    short_repr,
+)
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
@@ -22,13 +32,17 @@ from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.shapes import Item, Picture
 
-CORNER_RADIUS = 0.48  # radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not meet
+# radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not
+# meet
+CORNER_RADIUS = 0.48
 MIN_FORCE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor judged
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3) each, N, world, or None."""
+    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3)
+    each, N, world, or None.
+    """
 
     measured: Array | None
     planned: Array | None
@@ -53,7 +67,8 @@ class Painter:
     facets: number of facets of the friction polyhedra; None draws round cones.
     inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
     ground: the ground; None for the plane that the contacts stand on.
-    line_colour, text_colour, background_colour: of the ground's lines, of text, and of the background.
+    line_colour, text_colour, background_colour: of the ground's lines, of text, and of the
+        background.
     """
 
     robot: Robot
@@ -87,7 +102,8 @@ class Painter:
     ) -> Picture:
         """The picture, path -> item, of everything that the arguments ask for.
 
-        swing_feet: names of contacts that do not touch the ground just now: they have no patch and no cone, and do not
+        swing_feet: names of contacts that do not touch the ground just now: they have no patch and
+            no cone, and do not
         count for
             the support region.
         The other arguments are those of `Viewer.show`.
@@ -98,38 +114,71 @@ class Painter:
         both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
-        picture = {"ground": ground.lines(self.line_colour, state.com)} | self._robot(state, "robot", self._shapes)
+        picture = {"ground": ground.lines(self.line_colour, state.com)} | self._robot(
+            state, "robot", self._shapes
+        )
         if contacts is not None and contacts.n_points:
-            stands = [contact.name not in swing_feet for contact in contacts for _ in contact.point_names]
+            stands = [
+                contact.name not in swing_feet for contact in contacts for _ in contact.point_names
+            ]
             picture |= self._contacts(contacts, positions, both, cones, stands, arrows)
             if support:
-                picture |= prefixed("support", markers.support_region(positions[stands], 0.004 * self.size, ground))
+                picture |= prefixed(
+                    "support", markers.support_region(positions[stands], 0.004 * self.size, ground)
+                )
             if labels:
                 picture |= self._labels(state, contacts, positions)
         if com:
-            picture |= prefixed("com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size))
+            picture |= prefixed(
+                "com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
+            )
         if wrench is not None:
             picture |= self._wrench(state, wrench)
         if push is not None:
             if not isinstance(push, Sequence) or isinstance(push, str) or len(push) != 2:
-                raise InputError(f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not {short_repr(push)}.')
+                raise InputError(
+                    f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not '
+                    f"{short_repr(push)}."
+                )
             picture |= self._push(state, *push)
         if ghost is not None:
             self._check_state(ghost)
             picture |= self._robot(ghost, "ghost", self._ghost_shapes)
         for frame in as_strings("frames", frames):
             pose = state.frame_pose(frame).homogeneous
-            picture |= prefixed(f"frame/{path_part(frame)}", markers.frame_axes(pose, 0.25 * self.size, frame))
-        if any(path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench") for path in picture):
+            picture |= prefixed(
+                f"frame/{path_part(frame)}", markers.frame_axes(pose, 0.25 * self.size, frame)
+            )
+        if any(
+            path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench")
+            for path in picture
+        ):
             picture |= self._scale_bar(ground)
-        if not isinstance(extra, Mapping | None) or not all(isinstance(item, Item) for item in (extra or {}).values()):
-            raise InputError(f"extra must be a picture, path -> item, as shapes and marks make them, not {short_repr(extra)}.")
+        if not isinstance(extra, Mapping | None) or not all(
+            isinstance(item, Item) for item in (extra or {}).values()
+        ):
+            raise InputError(
+                f"extra must be a picture, path -> item, as shapes and marks make them, not "
+                f"{short_repr(extra)}."
+            )
         return picture | dict(extra or {})
 
     def replace(self, **changes: Any) -> Painter:
-        """A painter with other facets or another ground. It shares what this one has computed for the robot."""
+        """A painter with other facets or another ground. It shares what this one has computed for
+        the robot.
+        """
         other = replace(self, **changes)
-        for name in ("home", "box", "feet_box", "size", "scale", "_meshes", "_shapes", "_ghosts", "_scale_bars"):
+        for name in (
+            "home",
+            "box",
+            "feet_box",
+            "size",
+            "scale",
+            "_meshes",
+            "_shapes",
+            "_ghosts",
+            "_scale_bars",
+        ):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -152,22 +201,34 @@ class Painter:
     def box(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the standing robot's bounding box, m, world."""
         poses = self.standing.joint_transforms
-        points = [mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3] for mesh in self._meshes]
+        points = [
+            mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3]
+            for mesh in self._meshes
+        ]
         together = np.vstack(points)
         return np.min(together, axis=0), np.max(together, axis=0)
 
     @cached_property
     def feet_box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of a box around the standing robot's feet and their cones, m, world.
+        """Lowest and highest corner of a box around the standing robot's feet and their cones, m,
+        world.
 
         A robot without feet has the box of the whole robot.
         """
         feet = [(foot, self.standing.frame_pose(foot.frame)) for foot in self.robot.feet]
-        points = [pose.act(p) for foot, pose in feet for p in ([foot.centre] if foot.corners is None else foot.corners)]
+        points = [
+            pose.act(p)
+            for foot, pose in feet
+            for p in ([foot.centre] if foot.corners is None else foot.corners)
+        ]
         if not points:
             return self.box
         around = 0.2 * self.size * np.array([1.0, 1.0, 0.0])
-        return np.min(points, axis=0) - around, np.max(points, axis=0) + around + [0.0, 0.0, 0.35 * self.size]
+        return np.min(points, axis=0) - around, np.max(points, axis=0) + around + [
+            0.0,
+            0.0,
+            0.35 * self.size,
+        ]
 
     @cached_property
     def size(self) -> float:
@@ -177,18 +238,32 @@ class Painter:
 
     @cached_property
     def scale(self) -> float:
-        """Length of a drawn force, m/N: as requested, else 1, 2 or 5 times a power of ten that makes the weight about twice as
-        long as the centre of mass is high."""
+        """Length of a drawn force, m/N: as requested, else 1, 2 or 5 times a power of ten that
+        makes the weight about twice as long as the centre of mass is high.
+        """
         if self.requested_scale is not None:
             return self.requested_scale
-        return round_1_2_5(2.0 * max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size) / self.robot.weight)
+        return round_1_2_5(
+            2.0
+            * max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size)
+            / self.robot.weight
+        )
 
     def cone_height(self, contacts: Contacts) -> float:
-        """Height of the friction cones, m: that of 1.5 times the normal force at rest, but not so high that the cones hide the
-        robot, or that cones at the corners of one foot meet."""
-        height = min(self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size)
-        feet = (contact for contact in contacts if isinstance(contact, FlatFootContact) and contact.mu > 0)
-        return min([height] + [CORNER_RADIUS * float(pdist(foot.corners).min()) / foot.mu for foot in feet])
+        """Height of the friction cones, m: that of 1.5 times the normal force at rest, but not so
+        high that the cones hide the robot, or that cones at the corners of one foot meet.
+        """
+        height = min(
+            self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size
+        )
+        feet = (
+            contact
+            for contact in contacts
+            if isinstance(contact, FlatFootContact) and contact.mu > 0
+        )
+        return min(
+            [height] + [CORNER_RADIUS * float(pdist(foot.corners).min()) / foot.mu for foot in feet]
+        )
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
@@ -196,16 +271,23 @@ class Painter:
 
     @cached_property
     def _shapes(self) -> list[threejs.Shape]:
-        return [threejs.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes]
+        return [
+            threejs.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes
+        ]
 
     @cached_property
     def _ghost_shapes(self) -> list[threejs.Shape]:
-        return [threejs.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, hide_back=True) for mesh in self._meshes]
+        return [
+            threejs.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, hide_back=True)
+            for mesh in self._meshes
+        ]
 
     @cached_property
     def _paths(self) -> list[tuple[int, str]]:
         """For every mesh, the number of its joint, and the joint's name as part of a path."""
-        return [(mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes]
+        return [
+            (mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes
+        ]
 
     def _robot(self, state: State, root: str, shapes_of_joints: list[threejs.Shape]) -> Picture:
         poses = state.joint_transforms
@@ -215,7 +297,13 @@ class Painter:
         }
 
     def _contacts(
-        self, contacts: Contacts, positions: Array, forces: Forces, cones: bool, stands: list[bool], arrows: bool
+        self,
+        contacts: Contacts,
+        positions: Array,
+        forces: Forces,
+        cones: bool,
+        stands: list[bool],
+        arrows: bool,
     ) -> Picture:
         """Forces at every point, and patches and cones at the points that stand on the ground."""
         picture: Picture = {}
@@ -227,28 +315,48 @@ class Painter:
                 picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
             if cones and stands[i]:
                 force = None if forces.cone_forces is None else forces.cone_forces[i]
-                picture |= prefixed(f"cone/{at}", self._cone(position, normal, float(mu), height, force))
+                picture |= prefixed(
+                    f"cone/{at}", self._cone(position, normal, float(mu), height, force)
+                )
             for kind, vectors, colour in forces.kinds if arrows else ():
                 if vectors is not None and not self._is_negligible(vectors[i]):
                     vector = self.scale * vectors[i]
-                    picture[f"{kind}/{at}"] = shapes.arrow(position, vector, colour, self.size, halo=kind == "planned")
+                    picture[f"{kind}/{at}"] = shapes.arrow(
+                        position, vector, colour, self.size, halo=kind == "planned"
+                    )
         return picture
 
-    def _cone(self, position: Array, normal: Array, mu: float, height: float, force: Array | None) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it; without a force it is grey and faint."""
+    def _cone(
+        self, position: Array, normal: Array, mu: float, height: float, force: Array | None
+    ) -> Picture:
+        """A cone or polyhedron in the colour that the force gives it; without a force it is grey
+        and faint.
+        """
         judged_force = None if force is None or self._is_negligible(force) else force
         if self.facets is None:
-            status = "idle" if judged_force is None else _friction_cone(tuple(normal.tolist()), mu).status(judged_force)
+            status = (
+                "idle"
+                if judged_force is None
+                else _friction_cone(tuple(normal.tolist()), mu).status(judged_force)
+            )
             made = {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-            return made | self._outside_rim(position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status)
-        polyhedron = _polyhedron(tuple(normal.tolist()), mu, self.facets, self.inner_approximation, self.facet_rotation)
+            return made | self._outside_rim(
+                position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status
+            )
+        polyhedron = _polyhedron(
+            tuple(normal.tolist()), mu, self.facets, self.inner_approximation, self.facet_rotation
+        )
         status = "idle" if judged_force is None else polyhedron.status(judged_force)
-        status = "inside" if status == "active" else status  # an active facet has a colour of its own
+        status = (
+            "inside" if status == "active" else status
+        )  # an active facet has a colour of its own
         active = () if judged_force is None else polyhedron.active_facets(judged_force)
         made = shapes.friction_polyhedron(position, polyhedron, height, status, active)
         return made | self._outside_rim(position, polyhedron, height, status)
 
-    def _outside_rim(self, position: Array, polyhedron: FrictionPolyhedron, height: float, status: str) -> Picture:
+    def _outside_rim(
+        self, position: Array, polyhedron: FrictionPolyhedron, height: float, status: str
+    ) -> Picture:
         """What tells a force outside its cone from others by more than a hue."""
         if status != "outside":
             return {}
@@ -263,25 +371,33 @@ class Painter:
         return (MIN_FORCE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every contact, beside it and away from the robot; of a flat foot also the numbers of its corners."""
+        """The name of every contact, beside it and away from the robot; of a flat foot also the
+        numbers of its corners.
+        """
         picture: Picture = {}
         for contact in contacts:
             rows = [list(contacts.point_names).index(name) for name in contact.point_names]
             middle = positions[rows].mean(axis=0)
             away = (middle - state.com) * [1.0, 1.0, 0.0]
             towards = away / max(float(np.linalg.norm(away)), 1e-6)
-            beyond = 0.12 * self.size + float(np.linalg.norm(positions[rows] - middle, axis=1).max())
+            beyond = 0.12 * self.size + float(
+                np.linalg.norm(positions[rows] - middle, axis=1).max()
+            )
             picture[f"label/{path_part(contact.name)}"] = shapes.label(
                 middle + beyond * towards, contact.name, 0.06 * self.size
             )
             for i, row in enumerate(rows if len(rows) > 1 else ()):
                 at = positions[row] + 0.25 * (positions[row] - middle)
-                picture[f"label/{path_part(contacts.point_names[row])}"] = shapes.label(at, str(i), 0.035 * self.size)
+                picture[f"label/{path_part(contacts.point_names[row])}"] = shapes.label(
+                    at, str(i), 0.035 * self.size
+                )
         return picture
 
     def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:
         six = as_array("wrench", value, (6,), "N and N·m")
-        drawn = markers.wrench(state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size)
+        drawn = markers.wrench(
+            state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size
+        )
         return prefixed("wrench", drawn)
 
     def _push(self, state: State, frame: str, value: npt.ArrayLike) -> Picture:
@@ -289,7 +405,11 @@ class Painter:
         if self._is_negligible(force):
             return {}
         at = state.frame_pose(frame).translation
-        return {"push": markers.push(at, self.scale * force, self.size, self.text_colour, self.background_colour)}
+        return {
+            "push": markers.push(
+                at, self.scale * force, self.size, self.text_colour, self.background_colour
+            )
+        }
 
     @cached_property
     def _patch_radius(self) -> float:
@@ -305,7 +425,8 @@ class Painter:
         return {}
 
     def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
-        """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the left of the feet.
+        """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the
+        left of the feet.
 
         It starts behind a tall robot, because the picture of one shows little ground in front.
         """
@@ -326,16 +447,26 @@ class Painter:
         self.check_robot("state", as_instance("state", state, State).robot)
 
     def check_robot(self, what: str, robot: Robot) -> None:
-        """Raise `InputError` where `what` belongs to a robot of another name or, as with joints locked, with other joints."""
+        """Raise `InputError` where `what` belongs to a robot of another name or, as with joints
+        locked, with other joints.
+        """
         identities = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
         if identities[0] != identities[1]:
-            raise InputError(f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer for that robot.")
+            raise InputError(
+                f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer "
+                f"for that robot."
+            )
 
 
 def legend_kinds(picture: Picture) -> set[str]:
-    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a force is an "idle cone"."""
+    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a
+    force is an "idle cone".
+    """
     idle = shapes.cone_colour("idle")
-    return {"idle cone" if item.colour == idle else path.strip("/").split("/")[0] for path, item in picture.items()}
+    return {
+        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
+        for path, item in picture.items()
+    }
 
 
 @lru_cache(maxsize=256)
@@ -346,7 +477,11 @@ def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
 
 @lru_cache(maxsize=256)
 def _polyhedron(
-    normal: tuple[float, ...], mu: float, facets: int, inner_approximation: bool, facet_rotation: float
+    normal: tuple[float, ...],
+    mu: float,
+    facets: int,
+    inner_approximation: bool,
+    facet_rotation: float,
 ) -> FrictionPolyhedron:
     """The polyhedron with these values. There are few different ones, so each is made once."""
     return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)
@@ -369,18 +504,26 @@ def path_part(name: str) -> str:
 
 
 def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
-    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any other number of forces."""
+    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any
+    other number of forces.
+    """
     if value is None:
         return None
     if contacts is None:
-        raise InputError(f"{name} were given without contacts, so it is not known where they act; pass contacts=… too.")
+        raise InputError(
+            f"{name} were given without contacts, so it is not known where they act; pass "
+            f"contacts=… too."
+        )
     array = numeric_copy(value)
     n = contacts.n_points
     if array is None:
-        raise InputError(f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}.")
+        raise InputError(
+            f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}."
+        )
     if array.shape not in ((3 * n,), (n, 3)):
         raise InputError(
-            f"{name} has shape {array.shape}; {n} contact points ({', '.join(contacts.point_names)}) need shape "
+            f"{name} has shape {array.shape}; {n} contact points "
+            f"({', '.join(contacts.point_names)}) need shape "
             f"({3 * n},) or ({n}, 3)."
         )
     return as_array(name, array.reshape(n, 3), (n, 3), "N")

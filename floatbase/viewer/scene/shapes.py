@@ -1,7 +1,8 @@
 """Force arrows, friction cones, contact patches, the centre of mass, the ground, labels.
 
-Each function returns items. An item is a shape of unit size, and a matrix that scales and places it. So a force that changes
-costs one matrix, and the matrix tells how long an arrow is and how wide a cone opens.
+Each function returns items. An item is a shape of unit size, and a matrix that scales and places
+it. So a force that changes costs one matrix, and the matrix tells how long an arrow is and how wide
+a cone opens.
 """
 
 from __future__ import annotations
@@ -18,20 +19,38 @@ from floatbase._validation import Array, as_array, as_positive, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs
-from floatbase.viewer.scene.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, WARNING, with_alpha
+from floatbase.viewer.scene.colours import (
+    COM,
+    CONE,
+    CONE_ALPHA,
+    PATCH,
+    RGB,
+    RGBA,
+    WARNING,
+    with_alpha,
+)
 from floatbase.viewer.scene.threejs import Shape
 
 _RIM = 0.025  # thickness of a rim, over the radius of the mouth
 FACET_ALPHA = 0.75
-ARROW_SLENDERNESS = 0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+ARROW_SLENDERNESS = (
+    0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+)
 ARROW_LENGTH = 0.2  # m
-ARROW = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.78), (2.1, 0.78), (0.0, 1.0))  # (radius, height), 1 long, its shaft of radius 1
+ARROW = (
+    (0.0, 0.0),
+    (1.0, 0.0),
+    (1.0, 0.78),
+    (2.1, 0.78),
+    (0.0, 1.0),
+)  # (radius, height), 1 long, its shaft of radius 1
 
 
 class Item(NamedTuple):
     """One object in a picture.
 
-    shape: what it looks like. matrix: (4, 4), its pose and scale in the world. colour: RGBA if it may change, else None.
+    shape: what it looks like. matrix: (4, 4), its pose and scale in the world. colour: RGBA if it
+        may change, else None.
     """
 
     shape: Shape
@@ -46,7 +65,8 @@ Picture = dict[str, Item]
 
 
 def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
-    """The picture with every path in one spelling: parts with a slash between them, as "com/ball" is for "/com//ball".
+    """The picture with every path in one spelling: parts with a slash between them, as "com/ball"
+    is for "/com//ball".
 
     Raises `InputError` for a path without a name, because its matrix would move the whole picture.
     """
@@ -57,14 +77,20 @@ def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
 def _normal_path(path: str) -> str:
     normal = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
     if not normal:
-        raise InputError(f"the path {path!r} in a picture has no name; give it one, as prefixed('a name', items) does.")
+        raise InputError(
+            f"the path {path!r} in a picture has no name; give it one, as prefixed('a name', "
+            f"items) does."
+        )
     return normal
 
 
-def transform(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0) -> Array:
+def transform(
+    position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0
+) -> Array:
     """The matrix, (4, 4), that scales a shape, then turns it, then places it.
 
-    position: (3,), m, world. rotation: (3, 3); None for the identity. scale: one number, or (3,) along the shape's own axes.
+    position: (3,), m, world. rotation: (3, 3); None for the identity. scale: one number, or (3,)
+        along the shape's own axes.
     Raises `InputError` for a position of another shape, and for numbers that are not finite.
     """
     matrix = np.zeros((4, 4))
@@ -77,7 +103,10 @@ def transform(position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, sc
         raise
     if not math.isfinite(matrix.sum()):
         as_array("position in the picture", position, (3,), "m")
-        raise InputError(f"axes or size of a shape at {position!r} are not finite numbers: {matrix[:3, :3].tolist()}.")
+        raise InputError(
+            f"axes or size of a shape at {position!r} are not finite numbers: "
+            f"{matrix[:3, :3].tolist()}."
+        )
     return matrix
 
 
@@ -94,19 +123,26 @@ def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     return array, length
 
 
-def arrow(start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False) -> Item:
+def arrow(
+    start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False
+) -> Item:
     """An arrow.
 
     start: (3,), m, world.
     vector: (3,), m, world, from its start to its tip.
     colour: RGB.
-    size: size of the robot, m. The width of the shaft grows with the square roots of `size` and of the arrow's length.
-    halo: whether it is wider and translucent, so that it is seen around another arrow at the same place.
+    size: size of the robot, m. The width of the shaft grows with the square roots of `size` and of
+        the arrow's length.
+    halo: whether it is wider and translucent, so that it is seen around another arrow at the same
+        place.
     """
     vector, length = vector_and_length("an arrow", vector)
     width = arrow_width(length, size) * (1.8 if halo else 1.0)
     rotation = geometry.rotation_with_z_axis(vector / length)
-    return Item(_unit_arrow(colour, 0.6 if halo else 1.0), transform(start, rotation, (width / 2, width / 2, length)))
+    return Item(
+        _unit_arrow(colour, 0.6 if halo else 1.0),
+        transform(start, rotation, (width / 2, width / 2, length)),
+    )
 
 
 def arrow_width(length: float, size: float) -> float:
@@ -114,7 +150,9 @@ def arrow_width(length: float, size: float) -> float:
     return min(ARROW_SLENDERNESS * math.sqrt(length * ARROW_LENGTH * size), 0.35 * length)
 
 
-def friction_cone(position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str) -> Item:
+def friction_cone(
+    position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str
+) -> Item:
     """(28) The cone ‖f_tangent‖ ≤ μ f_normal.
 
     position: (3,), m, world, its tip.
@@ -150,14 +188,21 @@ def friction_polyhedron(
     """
     as_positive("height of a friction polyhedron", height, "m")
     matrix = transform(position, _contact_axes(polyhedron.normal), height)
-    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inner_approximation), float(polyhedron.facet_rotation))
+    key = (
+        float(polyhedron.mu),
+        int(polyhedron.facets),
+        bool(polyhedron.inner_approximation),
+        float(polyhedron.facet_rotation),
+    )
     picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
     return picture
 
 
-def cone_rim(position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, is_round: bool = False) -> Item:
+def cone_rim(
+    position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, is_round: bool = False
+) -> Item:
     """A dark rim around the mouth of a cone, so that a force outside it is told by more than a hue.
 
     position, polyhedron, height: as for `friction_polyhedron`.
@@ -165,15 +210,26 @@ def cone_rim(position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: fl
     """
     frame = _contact_axes(polyhedron.normal)
     if is_round:
-        return Item(_round_rim(), transform(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)))
-    key = (float(polyhedron.mu), int(polyhedron.facets), bool(polyhedron.inner_approximation), float(polyhedron.facet_rotation))
+        return Item(
+            _round_rim(),
+            transform(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)),
+        )
+    key = (
+        float(polyhedron.mu),
+        int(polyhedron.facets),
+        bool(polyhedron.inner_approximation),
+        float(polyhedron.facet_rotation),
+    )
     return Item(_polygonal_rim(*key), transform(position, frame, height))
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
     """A disc at a contact. position: (3,), m, world. normal: (3,), unit, world. radius: m."""
     as_positive("radius of a contact patch", radius, "m")
-    return Item(_unit_disc(PATCH), transform(position, _contact_axes(normal), (radius, radius, 0.12 * radius)))
+    return Item(
+        _unit_disc(PATCH),
+        transform(position, _contact_axes(normal), (radius, radius, 0.12 * radius)),
+    )
 
 
 def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
@@ -186,12 +242,23 @@ def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Pictu
     foot = np.array([x, y, ground])
     return {
         "/ball": Item(_unit_sphere(COM, True), transform([x, y, z], scale=radius)),
-        "/line": Item(_unit_cylinder(COM), transform(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4)))),
-        "/projection": Item(_unit_disc(COM), transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius))),
+        "/line": Item(
+            _unit_cylinder(COM),
+            transform(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4))),
+        ),
+        "/projection": Item(
+            _unit_disc(COM), transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius))
+        ),
     }
 
 
-def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13, 0.13, 0.13), plate: bool = True) -> Item:
+def label(
+    position: npt.ArrayLike,
+    text: str,
+    height: float,
+    colour: RGB = (0.13, 0.13, 0.13),
+    plate: bool = True,
+) -> Item:
     """Text that always faces the reader.
 
     position: (3,), m, world, its centre.
@@ -200,10 +267,15 @@ def label(position: npt.ArrayLike, text: str, height: float, colour: RGB = (0.13
     colour: RGB of the text.
     plate: whether a plate lies behind it.
     """
-    return Item(_label(text, as_positive("height of a label's letters", height, "m"), plate, colour), transform(position))
+    return Item(
+        _label(text, as_positive("height of a label's letters", height, "m"), plate, colour),
+        transform(position),
+    )
 
 
-def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB) -> Picture:
+def scale_bar(
+    position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB
+) -> Picture:
     """A bar along x which shows how long a force is drawn.
 
     position: (3,), m, world, where it starts.
@@ -215,16 +287,28 @@ def scale_bar(position: npt.ArrayLike, force: float, length: float, size: float,
     start = np.asarray(position, dtype=np.float64)
     along = geometry.rotation_with_z_axis([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])  # beside it: from its end the bar is short
-    picture = {"/bar": Item(_unit_cylinder(colour), transform(start, along, (thick / 2, thick / 2, length)))}
+    text_at = start + np.array(
+        [length / 2, 0.17 * size, 0.03 * size]
+    )  # beside it: from its end the bar is short
+    picture = {
+        "/bar": Item(
+            _unit_cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
+        )
+    }
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
-        picture[end] = Item(_unit_cylinder(colour), transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
-    words = _label(f"{force:g} N", 0.055 * size, True, colour, False)  # behind the robot where the bar is
+        picture[end] = Item(
+            _unit_cylinder(colour), transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2))
+        )
+    words = _label(
+        f"{force:g} N", 0.055 * size, True, colour, False
+    )  # behind the robot where the bar is
     return picture | {"/label": Item(words, transform(text_at))}
 
 
-def rod(start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB) -> Item:
+def rod(
+    start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB
+) -> Item:
     """A rod.
 
     start: (3,), m, world.
@@ -237,7 +321,9 @@ def rod(start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: fl
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
-    """A flat convex polygon, seen from both sides. corners: (n, 3), m. colour: RGB. opacity: from 0 to 1."""
+    """A flat convex polygon, seen from both sides. corners: (n, 3), m. colour: RGB. opacity: from 0
+    to 1.
+    """
     points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
         raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
@@ -250,14 +336,17 @@ def invisible_point(position: npt.ArrayLike) -> Item:
 
 
 def ground_grid(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
-    """A square grid of lines on the plane z = 0. colour: RGB. step: m between lines. half: half its side, m."""
+    """A square grid of lines on the plane z = 0. colour: RGB. step: m between lines. half: half its
+    side, m.
+    """
     return Item(_grid(colour, step, half), np.eye(4))
 
 
 def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
     """The lines of `ground_grid` in pieces, two ends each, shape (2 n, 3), m. step, half: as there."""
     at = np.arange(-half, half + step / 2, step)
-    # each line in pieces of one step: software renderers lose lines that begin far behind the camera
+    # each line in pieces of one step: software renderers lose lines that begin far behind the
+    # camera
     start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
     points = np.vstack([along_x, along_x[:, ::-1]])
@@ -286,13 +375,19 @@ def _unit_arrow(colour: RGB, opacity: float) -> Shape:
 @lru_cache(maxsize=64)
 def _unit_cylinder(colour: RGB) -> Shape:
     """A rod along z, 1 long, of radius 1."""
-    return threejs.mesh(*geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14), colour)
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14),
+        colour,
+    )
 
 
 @lru_cache(maxsize=64)
 def _unit_disc(colour: RGB) -> Shape:
     """A disc around z, of radius 1 and thickness 1, its middle at 0."""
-    return threejs.mesh(*geometry.surface_of_revolution([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32), colour)
+    return threejs.mesh(
+        *geometry.surface_of_revolution([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32),
+        colour,
+    )
 
 
 @lru_cache(maxsize=64)
@@ -304,20 +399,35 @@ def _unit_sphere(colour: RGB, on_top: bool = False) -> Shape:
 def _unit_cone() -> Shape:
     """A cone around z, its tip at 0, 1 high, its opening of radius 1."""
     return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 1.0)], 48), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"]
+        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 1.0)], 48),
+        (1.0, 1.0, 1.0),
+        opacity=CONE_ALPHA["inside"],
     )
 
 
 @lru_cache(maxsize=64)
-def _unit_polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
-    return threejs.mesh(*geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True)
+def _unit_polyhedron(
+    mu: float, facets: int, inner_approximation: bool, facet_rotation: float
+) -> Shape:
+    rays = FrictionPolyhedron(
+        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
+    ).rays
+    return threejs.mesh(
+        *geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True
+    )
 
 
 @lru_cache(maxsize=64)
-def _polygonal_rim(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
-    edges = [geometry.cylinder(a, b, _RIM * mu) for a, b in zip(rays, np.roll(rays, -1, axis=0), strict=True)]
+def _polygonal_rim(
+    mu: float, facets: int, inner_approximation: bool, facet_rotation: float
+) -> Shape:
+    rays = FrictionPolyhedron(
+        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
+    ).rays
+    edges = [
+        geometry.cylinder(a, b, _RIM * mu)
+        for a, b in zip(rays, np.roll(rays, -1, axis=0), strict=True)
+    ]
     return threejs.mesh(*geometry.merged(edges), PATCH)
 
 
@@ -328,9 +438,13 @@ def _round_rim() -> Shape:
 
 
 @lru_cache(maxsize=256)
-def _facet(mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int) -> Shape:
+def _facet(
+    mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int
+) -> Shape:
     """One side of the polyhedron: facet i lies between rays i - 1 and i."""
-    rays = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation).rays
+    rays = FrictionPolyhedron(
+        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
+    ).rays
     corners = [np.zeros(3), rays[facet - 1], rays[facet]]
     return threejs.mesh(*geometry.convex_polygon(corners), WARNING, opacity=FACET_ALPHA, flat=True)
 

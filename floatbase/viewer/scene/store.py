@@ -9,15 +9,24 @@ from typing import Any
 import umsgpack
 
 from floatbase.errors import ViewerError
-from floatbase.viewer.scene.protocol import ANIMATION, Key, Update, checked_control_value, delete, encode, no_animation
+from floatbase.viewer.scene.protocol import (
+    ANIMATION,
+    Key,
+    Update,
+    checked_control_value,
+    delete,
+    encode,
+    no_animation,
+)
 
 
 class Scene:
     """The newest command of every key, each with the number of the change that brought it.
 
-    A page that has seen change n is brought up to date by `since(n)`, whatever it missed. Any thread may write. A change is
-    one assignment under a lock, so an interrupt during a write loses at most that write. No loop stands under the lock itself:
-    where a loop jumps back from an `if`, Python 3.12 and 3.13 leave the lock locked when an interrupt comes just there.
+    A page that has seen change n is brought up to date by `since(n)`, whatever it missed. Any
+    thread may write. A change is one assignment under a lock, so an interrupt during a write loses
+    at most that write. No loop stands under the lock itself: where a loop jumps back from an `if`,
+    Python 3.12 and 3.13 leave the lock locked when an interrupt comes just there.
     """
 
     def __init__(self) -> None:
@@ -32,7 +41,8 @@ class Scene:
             return self._store(updates)
 
     def set_control_value(self, name: object, value: Any, page: str) -> Any:
-        """Store the value that a page reports for a control, for all pages to show, and return it as the control allows it.
+        """Store the value that a page reports for a control, for all pages to show, and return it
+        as the control allows it.
 
         page: a name of that page, which the command has, so that the page knows its own report.
         Raises `ViewerError` where there is no such control, or when it cannot have such a value.
@@ -42,17 +52,25 @@ class Scene:
             raise ViewerError(f"there is no control {name!r}.")
         value = checked_control_value(control, value)
         if value is not None:
-            self.put([encode({"type": "set_control_value", "name": name, "value": value, "by": page})])
+            self.put(
+                [encode({"type": "set_control_value", "name": name, "value": value, "by": page})]
+            )
         return value
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
-        """The number of the newest change, and in order the commands that came after change `number`."""
+        """The number of the newest change, and in order the commands that came after change
+        `number`.
+        """
         with self._lock:
             newest, entries = self.newest, list(self._entries.values())
-        return newest, [command for _, command in sorted(entry for entry in entries if entry[0] > number)]
+        return newest, [
+            command for _, command in sorted(entry for entry in entries if entry[0] > number)
+        ]
 
     def copy(self) -> Scene:
-        """A copy that later changes do not affect. The two share their commands, so a copy is small."""
+        """A copy that later changes do not affect. The two share their commands, so a copy is
+        small.
+        """
         other = Scene()
         with self._lock:
             other.newest, other._entries = self.newest, dict(self._entries)
@@ -61,7 +79,8 @@ class Scene:
     def commands_from(self, displayed: Scene) -> list[bytes]:
         """The commands after which a page that shows the scene `displayed` shows this one.
 
-        They draw every object anew, but set only the settings that differ: a view that the reader has turned stays.
+        They draw every object anew, but set only the settings that differ: a view that the reader
+        has turned stays.
         """
         with displayed._lock:
             old = dict(displayed._entries)
@@ -86,7 +105,9 @@ class Scene:
         return {key: umsgpack.unpackb(command) for key, command in self._sorted_entries()}
 
     def file_commands(self) -> list[bytes]:
-        """The commands that a file can hold: all but those of the panel, which needs a program that answers it."""
+        """The commands that a file can hold: all but those of the panel, which needs a program that
+        answers it.
+        """
         return [command for _, command in self.file_entries()]
 
     def file_entries(self) -> list[tuple[Key, bytes]]:
@@ -94,7 +115,9 @@ class Scene:
         return [
             entry
             for entry in self._sorted_entries()
-            if not entry[0][1].endswith(("_control", "_control_value", "set_text", "add_plot_point"))
+            if not entry[0][1].endswith(
+                ("_control", "_control_value", "set_text", "add_plot_point")
+            )
         ]
 
     def __len__(self) -> int:
@@ -107,9 +130,13 @@ class Scene:
             return not any(kind == "set_object" for _, kind, _ in self._entries)
 
     def _sorted_entries(self) -> list[tuple[Key, bytes]]:
-        """Keys and commands, oldest first, without those that only report that an object of ours was deleted."""
+        """Keys and commands, oldest first, without those that only report that an object of ours
+        was deleted.
+        """
         with self._lock:
-            entries = sorted((number, key, command) for key, (number, command) in self._entries.items())
+            entries = sorted(
+                (number, key, command) for key, (number, command) in self._entries.items()
+            )
         return [(key, command) for _, key, command in entries if not _is_deletion(key)]
 
     def _store(self, updates: Iterable[Update]) -> int:
@@ -121,7 +148,9 @@ class Scene:
         return self.newest
 
     def _drop_below(self, path: str, number: int) -> None:
-        """Drop the entries that the deletion `number` of `path` makes void, and deletions that every page has carried out."""
+        """Drop the entries that the deletion `number` of `path` makes void, and deletions that
+        every page has carried out.
+        """
         below = "/" if path == "/" else path + "/"
         for key, (when, _) in list(self._entries.items()):
             is_void = when < number and (key[0] == path or key[0].startswith(below))
@@ -131,5 +160,7 @@ class Scene:
 
 
 def _is_deletion(key: Key) -> bool:
-    """Whether the entry deletes an object of ours. (The page's own grid and axes lie elsewhere: new pages must be told.)"""
+    """Whether the entry deletes an object of ours. (The page's own grid and axes lie elsewhere: new
+    pages must be told.)
+    """
     return key[1] == "delete" and key[0].startswith("/meshcat")

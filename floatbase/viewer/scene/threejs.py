@@ -16,13 +16,27 @@ from floatbase._validation import cached_property
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.label_image import FONT_SIZE, text_image
 
-_EXT = {"Uint8Array": 0x12, "Int16Array": 0x13, "Uint16Array": 0x14, "Uint32Array": 0x16, "Float32Array": 0x17}
-_TYPES = {"Uint8Array": "u1", "Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4", "Float32Array": "<f4"}
+_EXT = {
+    "Uint8Array": 0x12,
+    "Int16Array": 0x13,
+    "Uint16Array": 0x14,
+    "Uint32Array": 0x16,
+    "Float32Array": 0x17,
+}
+_TYPES = {
+    "Uint8Array": "u1",
+    "Int16Array": "<i2",
+    "Uint16Array": "<u2",
+    "Uint32Array": "<u4",
+    "Float32Array": "<f4",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A three.js object as plain data. The object is named "shape", so that animations find its material."""
+    """A three.js object as plain data. The object is named "shape", so that animations find its
+    material.
+    """
 
     data: dict[str, Any]
     name: str = ""
@@ -35,11 +49,23 @@ class Shape:
 
 def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False) -> dict[str, Any]:
     raw = np.ascontiguousarray(values, dtype=_TYPES[kind]).tobytes()
-    return {"itemSize": size, "type": kind, "array": umsgpack.Ext(_EXT[kind], raw), "normalized": normalized}
+    return {
+        "itemSize": size,
+        "type": kind,
+        "array": umsgpack.Ext(_EXT[kind], raw),
+        "normalized": normalized,
+    }
 
 
-def _object(kind: str, geometry: dict[str, Any] | None, material: dict[str, Any], scale: float = 1.0) -> dict[str, Any]:
-    object_data: dict[str, Any] = {"uuid": "object", "type": kind, "name": "shape", "material": "material"}
+def _object(
+    kind: str, geometry: dict[str, Any] | None, material: dict[str, Any], scale: float = 1.0
+) -> dict[str, Any]:
+    object_data: dict[str, Any] = {
+        "uuid": "object",
+        "type": kind,
+        "name": "shape",
+        "material": "material",
+    }
     object_data["matrix"] = [float(x) for x in np.diag([scale, scale, scale, 1.0]).ravel()]
     data: dict[str, Any] = {"metadata": {"version": 4.5, "type": "Object"}}
     if geometry is not None:
@@ -116,7 +142,13 @@ def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
     return Shape(_object("LineSegments", {"attributes": attributes}, material))
 
 
-def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.13, 0.13), on_top: bool = True) -> Shape:
+def label(
+    text: str,
+    height: float,
+    plate: bool = True,
+    colour: RGB = (0.13, 0.13, 0.13),
+    on_top: bool = True,
+) -> Shape:
     """Text that always faces the reader.
 
     text: the text; braces make a subscript: "f{c}".
@@ -127,14 +159,33 @@ def label(text: str, height: float, plate: bool = True, colour: RGB = (0.13, 0.1
     """
     image_data = text_image(text, plate, colour)
     tall, wide = image_data.shape[:2]
-    image = {"type": "Uint8Array", "width": wide, "height": tall, "data": umsgpack.Ext(0x12, image_data[::-1].tobytes())}
-    material = {"type": "SpriteMaterial", "map": "texture", "transparent": True, "depthTest": not on_top, "depthWrite": False}
+    image = {
+        "type": "Uint8Array",
+        "width": wide,
+        "height": tall,
+        "data": umsgpack.Ext(0x12, image_data[::-1].tobytes()),
+    }
+    material = {
+        "type": "SpriteMaterial",
+        "map": "texture",
+        "transparent": True,
+        "depthTest": not on_top,
+        "depthWrite": False,
+    }
     data = _object("Sprite", None, material)
     data["images"] = [{"uuid": "image", "url": image}]
     # 1025: two bytes a pixel, grey and alpha; 1006: smooth when scaled
-    texture = {"uuid": "texture", "image": "image", "format": 1025, "minFilter": 1006, "magFilter": 1006}
+    texture = {
+        "uuid": "texture",
+        "image": "image",
+        "format": 1025,
+        "minFilter": 1006,
+        "magFilter": 1006,
+    }
     data["textures"] = [texture | {"generateMipmaps": False}]
     size = height / FONT_SIZE
-    data["object"]["matrix"] = [float(x) for x in np.diag([wide * size, tall * size, 1.0, 1.0]).ravel()]
+    data["object"]["matrix"] = [
+        float(x) for x in np.diag([wide * size, tall * size, 1.0, 1.0]).ravel()
+    ]
     data["object"]["renderOrder"] = 10
     return Shape(data, text)

@@ -1,7 +1,9 @@
-"""The visuals that a robot's URDF names. The light meshes are made from them, and robots without light meshes show them.
+"""The visuals that a robot's URDF names. The light meshes are made from them, and robots without
+light meshes show them.
 
-meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with wrong triangles. So
-trimesh reads the files here, material by material. Needs trimesh, and pycollada for .dae files.
+meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with
+wrong triangles. So trimesh reads the files here, material by material. Needs trimesh, and pycollada
+for .dae files.
 """
 
 from __future__ import annotations
@@ -43,13 +45,17 @@ class VisualMesh:
 
 
 def urdf_visuals(robot: Robot) -> list[VisualMesh]:
-    """All pieces of the URDF's visuals, one for each material. Raises `ImportError` without trimesh."""
+    """All pieces of the URDF's visuals, one for each material. Raises `ImportError` without
+    trimesh.
+    """
     import trimesh  # noqa: F401  raises at once if it is missing
 
     folders = [str(folder) for folder in robot.package_dirs]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders)
+        geometry = pin.buildGeomFromUrdfString(
+            robot.model, robot.urdf, pin.VISUAL, package_dirs=folders
+        )
     return [piece for item in geometry.geometryObjects for piece in _pieces(item)]
 
 
@@ -67,12 +73,16 @@ def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
         plain = trimesh.Trimesh(mesh.vertices, mesh.faces)
         plain.apply_scale(np.asarray(item.meshScale).ravel())
         plain.apply_transform(item.placement.homogeneous)
-        pieces.append(VisualMesh(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem))
+        pieces.append(
+            VisualMesh(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem)
+        )
     return pieces
 
 
 def _scene(path: Path) -> trimesh.Scene:
-    """The meshes in a file. If pycollada finds none because a texture is missing, the file is read without textures."""
+    """The meshes in a file. If pycollada finds none because a texture is missing, the file is read
+    without textures.
+    """
     import trimesh
 
     scene = trimesh.load_scene(path)
@@ -91,7 +101,9 @@ def _without_textures(path: Path) -> bytes:
                 parent.remove(child)
             elif child.tag == f"{space}texture":
                 parent.remove(child)
-                ElementTree.SubElement(parent, f"{space}color").text = " ".join(map(str, (*DARK, 1.0)))
+                ElementTree.SubElement(parent, f"{space}color").text = " ".join(
+                    map(str, (*DARK, 1.0))
+                )
     return ElementTree.tostring(root)
 
 

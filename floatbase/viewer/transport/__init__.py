@@ -1,3 +1,5 @@
-"""How a scene gets to a page: the window and its server, the notebook's widget, and the connections to the pages."""
+"""How a scene gets to a page: the window and its server, the notebook's widget, and the connections
+to the pages.
+"""
 
 __all__: list[str] = []  # its modules are imported by name

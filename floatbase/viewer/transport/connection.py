@@ -1,7 +1,7 @@
 """A page and what it is owed: the rules of all pages, whatever the way to them.
 
-A `Connection` knows what its page shows and has seen, and sends the rest when the way is free. A `Channel` is the way:
-a websocket
+A `Connection` knows what its page shows and has seen, and sends the rest when the way is free. A
+`Channel` is the way: a websocket
 (`server`) or a notebook's own connection (`notebook`).
 """
 
@@ -22,8 +22,12 @@ from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.output_history import OutputHistory
 
 TIMEOUT = 30.0  # s; a page that takes longer over one frame is let go, and connects again by itself
-UNANSWERED_INTERVAL = 0.05  # s from frame to frame for a page whose answers wait until a cell has ended
-MAX_UNANSWERED = 32 << 20  # bytes under way to it: half an hour of a walking robot's frames, or the whole scene many times
+UNANSWERED_INTERVAL = (
+    0.05  # s from frame to frame for a page whose answers wait until a cell has ended
+)
+MAX_UNANSWERED = (
+    32 << 20
+)  # bytes under way to it: half an hour of a walking robot's frames, or the whole scene many times
 
 
 class Host(Protocol):
@@ -41,10 +45,12 @@ class Host(Protocol):
 class Channel:
     """The way to one page.
 
-    max_in_flight: frames that may be under way, not yet drawn by the page. min_interval: least time from one frame to
+    max_in_flight: frames that may be under way, not yet drawn by the page. min_interval: least time
+        from one frame to
     the next, s; 0 leaves it
-    to the server. answers_since: time from which on the page's answers arrive; None while they do not, however well it draws.
-    Then frames go at the pace `UNANSWERED_INTERVAL`, as long as those under way hold fewer bytes than `MAX_UNANSWERED`.
+    to the server. answers_since: time from which on the page's answers arrive; None while they do
+    not, however well it draws. Then frames go at the pace `UNANSWERED_INTERVAL`, as long as those
+    under way hold fewer bytes than `MAX_UNANSWERED`.
     """
 
     max_in_flight = 1
@@ -70,7 +76,8 @@ class Channel:
 class Connection:
     """One page. While frames are under way to it, what changes goes into the next one.
 
-    scene: what the page is to show. displayed: what it shows now. sent: number of the newest change that it was sent.
+    scene: what the page is to show. displayed: what it shows now. sent: number of the newest change
+        that it was sent.
     """
 
     def __init__(self, host: Host, channel: Channel, output: int = 0):
@@ -79,16 +86,23 @@ class Connection:
         self.sent = 0
         self._output = output
         self._frames, self._last = 0, 0.0  # how many were sent, and when the last one
-        self._in_flight: deque[tuple[int, float, int]] = deque()  # number of a frame, when it was sent, bytes
+        self._in_flight: deque[tuple[int, float, int]] = (
+            deque()
+        )  # number of a frame, when it was sent, bytes
         self._requests: list[str] = []
         self._pictures: dict[int, Future[str]] = {}
         host.clients.append(self)
         frozen = host.outputs.frozen(output)
         if frozen is not None:
-            self.scene, self.displayed = frozen, Scene()  # the page shows nothing yet: the first frame is the whole kept scene
+            self.scene, self.displayed = (
+                frozen,
+                Scene(),
+            )  # the page shows nothing yet: the first frame is the whole kept scene
 
     def freeze(self) -> None:
-        """Keep the display's picture when a newer display has opened, unless the reader has made this page live again."""
+        """Keep the display's picture when a newer display has opened, unless the reader has made
+        this page live again.
+        """
         if self.scene is self.host.scene:
             self.scene = self.host.outputs.frozen(self._output) or self.scene
             self.next_frame()
@@ -98,11 +112,15 @@ class Connection:
         if self in self.host.clients:
             self.host.clients.remove(self)
         for picture in self._pictures.values():
-            picture.set_exception(ViewerError("the browser closed before the picture was taken; open it again."))
+            picture.set_exception(
+                ViewerError("the browser closed before the picture was taken; open it again.")
+            )
         self._pictures.clear()
 
     def receive(self, message: str | bytes) -> None:
-        """Deal with what the page says. What no page of ours says is ignored: any program of this machine can connect."""
+        """Deal with what the page says. What no page of ours says is ignored: any program of this
+        machine can connect.
+        """
         try:
             answer = json.loads(message)
         except (ValueError, RecursionError):
@@ -114,13 +132,17 @@ class Connection:
         elif kind == "live":
             self._output, self.scene = 0, self.host.scene
             self.next_frame()
-        elif kind == "image" and isinstance(answer.get("id"), int) and answer["id"] in self._pictures:
+        elif (
+            kind == "image" and isinstance(answer.get("id"), int) and answer["id"] in self._pictures
+        ):
             self._pictures.pop(answer["id"]).set_result(str(answer.get("data")))
         elif kind == "control":
             self._control(answer.get("name"), answer.get("value"), str(answer.get("by"))[:40])
 
     def _drawn(self, number: Any) -> None:
-        """The page has drawn the frames up to `number`, or, when it does not say, the oldest under way."""
+        """The page has drawn the frames up to `number`, or, when it does not say, the oldest under
+        way.
+        """
         if self._in_flight and number is None:
             self._in_flight.popleft()
         while self._in_flight and isinstance(number, int) and self._in_flight[0][0] <= number:
@@ -136,7 +158,9 @@ class Connection:
         try:
             if self.host.on_control is not None:
                 self.host.on_control(name, value)
-        except Exception:  # an error in the user's callback is reported, and must not end the connection
+        except (
+            Exception
+        ):  # an error in the user's callback is reported, and must not end the connection
             logging.getLogger("floatbase.viewer").exception("the control %r failed", name)
 
     def request_picture(self, answer: Future[str]) -> None:
@@ -147,7 +171,9 @@ class Connection:
         self.next_frame()
 
     def next_frame(self) -> float:
-        """Send what the page has not seen, if it may be sent now; s after which to try again, infinite for none."""
+        """Send what the page has not seen, if it may be sent now; s after which to try again,
+        infinite for none.
+        """
         now = time.monotonic()
         wait = self._wait(now)
         if wait > 0.0:
@@ -168,7 +194,10 @@ class Connection:
         """How long the next frame must wait, s. It may let the page go."""
         if not self._frames:
             return 0.0
-        answers_since, rest = self.channel.answers_since, self._last + self.channel.min_interval - now
+        answers_since, rest = (
+            self.channel.answers_since,
+            self._last + self.channel.min_interval - now,
+        )
         if self._in_flight and answers_since is None:
             is_full = sum(size for *_, size in self._in_flight) > MAX_UNANSWERED
             return math.inf if is_full else max(self._last + UNANSWERED_INTERVAL - now, 0.0)

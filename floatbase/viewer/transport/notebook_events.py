@@ -12,7 +12,8 @@ from typing import Any
 class CellEvents:
     """Whether a cell runs. Outside IPython none ever does.
 
-    before_cell: called before each cell. is_running: whether one runs now. ended_at: when the last one ended, s of
+    before_cell: called before each cell. is_running: whether one runs now. ended_at: when the last
+        one ended, s of
     `time.monotonic`.
     """
 
@@ -44,8 +45,10 @@ class CellEvents:
 
 
 def receive_during_cells(widget: Any) -> None:
-    """Let a new widget be heard while a cell runs too, where the notebook asks for it, by a subshell of the kernel.
+    """Let a new widget be heard while a cell runs too, where the notebook asks for it, by a
+    subshell of the kernel.
 
-    ipykernel 7.4 gives a page's messages to the thread that opened the widget, and not to the one that the page asks for.
+    ipykernel 7.4 gives a page's messages to the thread that opened the widget, and not to the one
+    that the page asks for.
     """
     getattr(widget.comm, "__dict__", {}).pop("_reply_subshell_id", None)

@@ -1,8 +1,10 @@
-"""The picture in a notebook: a widget whose frames travel over the kernel's own connection, as a slider's values do.
+"""The picture in a notebook: a widget whose frames travel over the kernel's own connection, as a
+slider's values do.
 
-So it works wherever sliders work, with no port of its own: JupyterLab, Notebook, VS Code, Colab, a hub, Voilà. The widget is
-`anywidget`'s, which brings what each of these needs in one package and leaves the rest to us: widget.js, which holds the page
-in a frame. The page's code is sent once to each page of the notebook that asks for it.
+So it works wherever sliders work, with no port of its own: JupyterLab, Notebook, VS Code, Colab, a
+hub, Voilà. The widget is `anywidget`'s, which brings what each of these needs in one package and
+leaves the rest to us: widget.js, which holds the page in a frame. The page's code is sent once to
+each page of the notebook that asks for it.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ from floatbase.viewer.web import pages
 
 FRAME_INTERVAL = (
     1.0 / 30.0
-)  # s from frame to frame: every one is a message of the kernel, of which Jupyter takes 1000 a second at most
+    # s from frame to frame: every one is a message of the kernel, of which Jupyter takes 1000 a
+    # second at most
+)
 _MAX_IN_FLIGHT = 2  # frames: so a page far away gets one for each half of the way there and back
 _MAX_PAGES = 50  # of one display; one that is closed without a word is forgotten after them
 
@@ -33,7 +37,8 @@ _MAX_PAGES = 50  # of one display; one that is closed without a word is forgotte
 class NotebookWidget(anywidget.AnyWidget):
     """One display of a window's scene.
 
-    name: what the picture shows, for screen readers. height: pixels. thumbnail: a PNG of the scene as it is now, for the time
+    name: what the picture shows, for screen readers. height: pixels. thumbnail: a PNG of the scene
+        as it is now, for the time
     until the page has drawn, and for places where no page can; empty for none.
     """
 
@@ -43,7 +48,9 @@ class NotebookWidget(anywidget.AnyWidget):
     height = traitlets.Int().tag(sync=True)
     thumbnail = traitlets.Bytes().tag(sync=True)
 
-    def __init__(self, server: Server, display: int, name: str, height: int, thumbnail: bytes = b""):
+    def __init__(
+        self, server: Server, display: int, name: str, height: int, thumbnail: bytes = b""
+    ):
         super().__init__(version=_page_code()[0], name=name, height=height, thumbnail=thumbnail)
         self._output_pages = _OutputPages(self, server, display)
         self.on_msg(self._output_pages.receive)
@@ -51,13 +58,17 @@ class NotebookWidget(anywidget.AnyWidget):
 
 
 class _OutputPages:
-    """The pages of one widget. `receive` may be called in any thread; all else is done in the server's."""
+    """The pages of one widget. `receive` may be called in any thread; all else is done in the
+    server's.
+    """
 
     def __init__(self, widget: NotebookWidget, server: Server, number: int):
         self._widget, self._number = weakref.ref(widget), number
         self._server = weakref.ref(server)
         self._pages: dict[str, _WidgetChannel] = {}
-        server.on_stop[:] = [stop_callback for stop_callback in server.on_stop if stop_callback() is not None]
+        server.on_stop[:] = [
+            stop_callback for stop_callback in server.on_stop if stop_callback() is not None
+        ]
         server.on_stop.append(weakref.WeakMethod(self._stop))
 
     def receive(self, _: Any, content: Any, buffers: Any) -> None:
@@ -65,11 +76,24 @@ class _OutputPages:
         server = self._server()
         if server is None or not server.is_running:
             return self._send_closed()
-        if isinstance(content, dict) and isinstance(content.get("say"), str) and isinstance(content.get("page"), str):
+        if (
+            isinstance(content, dict)
+            and isinstance(content.get("say"), str)
+            and isinstance(content.get("page"), str)
+        ):
             answers_wait = threading.current_thread() is threading.main_thread()
-            server.call(self._handle, server, content["page"][:40], content["say"], answers_wait, contextvars.copy_context())
+            server.call(
+                self._handle,
+                server,
+                content["page"][:40],
+                content["say"],
+                answers_wait,
+                contextvars.copy_context(),
+            )
 
-    def _handle(self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context) -> None:
+    def _handle(
+        self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context
+    ) -> None:
         known = self._pages.get(name)
         if known is not None:
             known.answers_wait, known.context = answers_wait, context
@@ -114,18 +138,27 @@ class _OutputPages:
 
 
 class _WidgetChannel(Channel):
-    """The way to one page: messages of the widget that name the page, so that no other page takes them.
+    """The way to one page: messages of the widget that name the page, so that no other page takes
+    them.
 
-    answers_wait: whether what the page says is heard only between cells. Where the notebook sends it to a subshell of
+    answers_wait: whether what the page says is heard only between cells. Where the notebook sends
+        it to a subshell of
     the kernel, it
-    is heard at once. context: of a message of the page; what is sent in it is an answer, so the page's next words go the
-    same way.
+    is heard at once. context: of a message of the page; what is sent in it is an answer, so the
+    page's next words go the same way.
     """
 
     max_in_flight, min_interval = _MAX_IN_FLIGHT, FRAME_INTERVAL
     page: Connection
 
-    def __init__(self, display: _OutputPages, server: Server, name: str, answers_wait: bool, context: contextvars.Context):
+    def __init__(
+        self,
+        display: _OutputPages,
+        server: Server,
+        name: str,
+        answers_wait: bool,
+        context: contextvars.Context,
+    ):
         self.name, self.answers_wait = name, answers_wait
         self.context = context
         self._display, self._cells = display, server.cells

@@ -1,17 +1,22 @@
-"""Several displays of one viewer in a notebook: the newest is live, each earlier one keeps its picture."""
+"""Several displays of one viewer in a notebook: the newest is live, each earlier one keeps its
+picture.
+"""
 
 from __future__ import annotations
 
 from floatbase.viewer.scene.store import Scene
 
-MAX_FROZEN = 20  # pictures at most; they share their commands with each other and with the live scene
+MAX_FROZEN = (
+    20  # pictures at most; they share their commands with each other and with the live scene
+)
 
 
 class OutputHistory:
     """The displays of one scene, numbered from 1 in the order in which they open.
 
-    A new display usually shows what its cell has just drawn. So the display before it keeps the scene as it was when that
-    cell began, or when the display before it opened, if that was later. `begin_cell` must be called before each cell.
+    A new display usually shows what its cell has just drawn. So the display before it keeps the
+    scene as it was when that cell began, or when the display before it opened, if that was later.
+    `begin_cell` must be called before each cell.
     """
 
     def __init__(self, scene: Scene):
@@ -25,7 +30,9 @@ class OutputHistory:
         self._before = self._scene.copy()
 
     def open(self) -> int:
-        """Open a display and return its number. The display before it keeps its picture from now on."""
+        """Open a display and return its number. The display before it keeps its picture from now
+        on.
+        """
         if self.newest:
             self._frozen[self.newest] = self._before
             self._frozen.pop(self.newest - MAX_FROZEN, None)

@@ -1,4 +1,6 @@
-"""The server of a window: a thread with the connections to all pages, and a web server if one is asked for."""
+"""The server of a window: a thread with the connections to all pages, and a web server if one is
+asked for.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,14 @@ from floatbase.viewer.web import pages
 FRAME_INTERVAL = 1.0 / 60.0  # s, the least time between two frames
 MAX_MESSAGE_SIZE = (
     32 << 20
-)  # bytes of a message from a page: a picture of the largest screens, which is the longest that pages send
+    # bytes of a message from a page: a picture of the largest screens, which is the longest that
+    # pages send
+)
 
 
 class Server:
-    """The thread that serves one scene. It has no reference to its `Window`, so a window that nobody refers to can end it.
+    """The thread that serves one scene. It has no reference to its `Window`, so a window that
+    nobody refers to can end it.
 
     port: the port that it listens on; None until `listen`: a notebook needs none.
     """
@@ -46,12 +51,15 @@ class Server:
         self.on_stop: list[weakref.WeakMethod[Callable[[], None]]] = []
         self._http: tornado.httpserver.HTTPServer | None = None
         self._loop = asyncio.new_event_loop()
-        # the newest change for which a wake-up was requested, and the newest that a wake-up has dealt with
+        # the newest change for which a wake-up was requested, and the newest that a wake-up has
+        # dealt with
         self._requested = self._sent = 0
         self._last_flush = 0.0
         self._timer: asyncio.TimerHandle | None = None
         ready = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(ready,), name=f"floatbase-window-{id(self):x}", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(ready,), name=f"floatbase-window-{id(self):x}", daemon=True
+        )
         self._thread.start()
         ready.wait()
 
@@ -61,12 +69,16 @@ class Server:
         self.call(self._listen, sockets)
 
     def notify(self, number: int) -> None:
-        """Have change `number` sent. Any thread may call this; it costs little while a wake-up is under way."""
+        """Have change `number` sent. Any thread may call this; it costs little while a wake-up is
+        under way.
+        """
         if not self.clients:
             self.scene.sent_to_all = number
         elif self._requested <= self._sent:
             self.call(self.flush)
-            self._requested = number  # after the call: an interrupt between the two causes a second wake-up, not a missing one
+            # after the call: an interrupt between the two causes a second wake-up, not a missing
+            # one
+            self._requested = number
 
     def freeze_outputs(self) -> None:
         """Make the pages of earlier displays keep their pictures."""
@@ -124,7 +136,9 @@ class Server:
         await asyncio.gather(*rest, return_exceptions=True)
 
     def flush(self, wait: float = 0.0) -> None:
-        """Send a frame after `wait` s, once the last one is `FRAME_INTERVAL` old. Runs in the loop's thread."""
+        """Send a frame after `wait` s, once the last one is `FRAME_INTERVAL` old. Runs in the
+        loop's thread.
+        """
         when = max(self._last_flush + FRAME_INTERVAL, self._loop.time() + wait)
         if self._timer is not None:
             if self._timer.when() <= when:
@@ -133,7 +147,9 @@ class Server:
         self._timer = self._loop.call_at(when, self._flush)
 
     def _flush(self) -> None:
-        """Send a frame to every page whose way is free. The others call `flush` when they have drawn theirs."""
+        """Send a frame to every page whose way is free. The others call `flush` when they have
+        drawn theirs.
+        """
         self._timer, self._last_flush = None, self._loop.time()
         self._sent = max(self.scene.newest, self._requested)
         wait = min([client.next_frame() for client in list(self.clients)], default=math.inf)
@@ -151,13 +167,21 @@ class Server:
         if live:
             live[-1].request_picture(answer)
         elif self.clients:
-            answer.set_exception(ViewerError("every open page keeps an earlier picture; press 'make live' in one of them."))
+            answer.set_exception(
+                ViewerError(
+                    "every open page keeps an earlier picture; press 'make live' in one of them."
+                )
+            )
         else:
-            answer.set_exception(ViewerError("the browser closed before the picture was taken; open it again."))
+            answer.set_exception(
+                ViewerError("the browser closed before the picture was taken; open it again.")
+            )
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Answers only requests to 127.0.0.1 or localhost, so that no foreign page reaches us under a host name of its own."""
+    """Answers only requests to 127.0.0.1 or localhost, so that no foreign page reaches us under a
+    host name of its own.
+    """
 
     def prepare(self) -> None:
         if self.request.host_name not in ("127.0.0.1", "localhost"):
@@ -205,7 +229,9 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
     def _write(self, message: bytes | str, binary: bool) -> None:
         """Give a message to the connection. When the page has gone, `on_close` cleans up."""
         with suppress(tornado.websocket.WebSocketClosedError):
-            self.write_message(message, binary=binary).add_done_callback(lambda done: done.cancelled() or done.exception())
+            self.write_message(message, binary=binary).add_done_callback(
+                lambda done: done.cancelled() or done.exception()
+            )
 
 
 def _application(server: Server) -> tornado.web.Application:

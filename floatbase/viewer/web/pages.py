@@ -1,8 +1,8 @@
 """The four pages: the live page, the notebook's page, the file, and the inner page.
 
-The live page and that in a notebook follow a window. The file contains a scene and needs no server. The inner page shows the
-scenes that a page around it gives it, one after the other. All load meshcat's viewer and give it the same messages (see
-`protocol.frame`); page.js holds the rest.
+The live page and that in a notebook follow a window. The file contains a scene and needs no server.
+The inner page shows the scenes that a page around it gives it, one after the other. All load
+meshcat's viewer and give it the same messages (see `protocol.frame`); page.js holds the rest.
 """
 
 from __future__ import annotations
@@ -40,18 +40,27 @@ comes back by itself.</div>
 
 @cache
 def viewer_code() -> bytes:
-    """meshcat's viewer, one JavaScript file of the installed package. Raises `ViewerError` without meshcat."""
+    """meshcat's viewer, one JavaScript file of the installed package. Raises `ViewerError` without
+    meshcat.
+    """
     spec = find_spec("meshcat")
     if spec is None or not spec.submodule_search_locations:
-        raise ViewerError("meshcat is not installed; the viewer needs it. Install it with: pip install meshcat")
-    return (Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js").read_bytes()
+        raise ViewerError(
+            "meshcat is not installed; the viewer needs it. Install it with: pip install meshcat"
+        )
+    return (
+        Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
+    ).read_bytes()
 
 
 @cache
 def live_page() -> str:
     """The page that a window serves."""
-    start = "window.MeshCat ? startWhenSeen(follow) : comeBack();"  # the window may close while the page loads
-    return _page(f'<script src="main.min.js"></script><script>{_scripts()}{start}</script>', "floatbase")
+    # the window may close while the page loads
+    start = "window.MeshCat ? startWhenSeen(follow) : comeBack();"
+    return _page(
+        f'<script src="main.min.js"></script><script>{_scripts()}{start}</script>', "floatbase"
+    )
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
@@ -65,13 +74,20 @@ def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
 
 @cache
 def embedded_page(code: str) -> str:
-    """A page for a frame inside another page, which gives it scenes (see page.js). code: address of meshcat's viewer."""
-    return _page(f'<script src="{html.escape(code)}"></script><script>{_scripts()}waitForScenes();</script>', "floatbase")
+    """A page for a frame inside another page, which gives it scenes (see page.js). code: address of
+    meshcat's viewer.
+    """
+    return _page(
+        f'<script src="{html.escape(code)}"></script><script>{_scripts()}waitForScenes();</script>',
+        "floatbase",
+    )
 
 
 @cache
 def notebook_page() -> str:
-    """A page for a frame in a notebook, which gives it the viewer's code and a port to the kernel (see page.js)."""
+    """A page for a frame in a notebook, which gives it the viewer's code and a port to the kernel
+    (see page.js).
+    """
     return _page(f"<script>{_scripts()}waitForPort();</script>", "floatbase")
 
 
@@ -82,7 +98,9 @@ def embedded_viewer_code() -> str:
 
 
 def embedded_data(name: str, data: bytes) -> str:
-    """Data as a script element with the id `name`: compressed, in base64. `unpack(name)` in page.js reads it."""
+    """Data as a script element with the id `name`: compressed, in base64. `unpack(name)` in page.js
+    reads it.
+    """
     packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="text/plain" id="{name}">{packed}</script>'
 
@@ -99,7 +117,9 @@ def _scripts() -> str:
 
 def _colours() -> str:
     """The backgrounds, and the shades of the dark one, for theme.js."""
-    backgrounds = {name: [hex_code(colour) for colour in parts] for name, parts in BACKGROUNDS.items()}
+    backgrounds = {
+        name: [hex_code(colour) for colour in parts] for name, parts in BACKGROUNDS.items()
+    }
     night = {hex_code(colour): hex_code(shade) for colour, shade in DARK_SHADES.items()}
     return f"const BACKGROUNDS = {json.dumps(backgrounds)}, DARK_SHADES = {json.dumps(night)};"
 
@@ -107,6 +127,7 @@ def _colours() -> str:
 def _page(scripts: str, title: str) -> str:
     return (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" '
+        'href="data:,">'
         f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
     )

@@ -1,8 +1,9 @@
-"""The course as a web site: `make site` runs the lessons, prepares all pages for Sphinx, and builds them into build/site.
+"""The course as a web site: `make site` runs the lessons, prepares all pages for Sphinx, and builds
+them into build/site.
 
-`build` does it. `outputs` prepares the lessons, `references` links what texts name, `reference` and `docstrings` make the pages of
-the library, `mathml` draws formulas; `conf` is Sphinx's, and the texts of the site's own pages stand beside it. This needs the
-extra `site`.
+`build` does it. `outputs` prepares the lessons, `references` links what texts name, `reference` and
+`docstrings` make the pages of the library, `mathml` draws formulas; `conf` is Sphinx's, and the
+texts of the site's own pages stand beside it. This needs the extra `site`.
 """
 
 from floatbase.lessons.publish.site import docstrings, mathml

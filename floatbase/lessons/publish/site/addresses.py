@@ -1,4 +1,6 @@
-"""What stands where on the pages of the library: packages, what they export, and the address of each name."""
+"""What stands where on the pages of the library: packages, what they export, and the address of
+each name.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ PACKAGES = {
 
 @cache
 def addresses() -> dict[str, str]:
-    """What texts call a thing -> its address on these pages: alone, with its package, and as a member of its class."""
+    """What texts call a thing -> its address on these pages: alone, with its package, and as a
+    member of its class.
+    """
     found: dict[str, str] = {}
     for package in list(PACKAGES)[1:]:
         for name, value in exported(package):
@@ -48,11 +52,17 @@ def addresses() -> dict[str, str]:
 
 
 def exported(package: str) -> list[tuple[str, Any]]:
-    """Name and value of all that a package exports; of a module without `__all__`, what it defines itself."""
+    """Name and value of all that a package exports; of a module without `__all__`, what it defines
+    itself.
+    """
     module = import_module(package)
     names = getattr(module, "__all__", None)
     if names is None:
-        own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == package]
+        own = [
+            name
+            for name, value in vars(module).items()
+            if getattr(value, "__module__", None) == package
+        ]
         names = [name for name in own if not name.startswith("_")]
     return [(name, getattr(module, name)) for name in sorted(names, key=str.lower)]
 
@@ -63,9 +73,17 @@ def members(value: Any) -> list[str]:
         return [name for name, _ in exported(value.__name__)]
     if not inspect.isclass(value):
         return []
-    return [name for name, member in vars(value).items() if not name.startswith("_") and _is_documented(member)]
+    return [
+        name
+        for name, member in vars(value).items()
+        if not name.startswith("_") and _is_documented(member)
+    ]
 
 
 def _is_documented(member: Any) -> bool:
-    is_code = inspect.isroutine(member) or isinstance(member, property | staticmethod | classmethod) or hasattr(member, "func")
+    is_code = (
+        inspect.isroutine(member)
+        or isinstance(member, property | staticmethod | classmethod)
+        or hasattr(member, "func")
+    )
     return is_code and bool(inspect.getdoc(member))

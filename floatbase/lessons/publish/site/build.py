@@ -1,4 +1,6 @@
-"""Builds the site: runs lessons, writes all that Sphinx reads into one folder, and lets it write the pages."""
+"""Builds the site: runs lessons, writes all that Sphinx reads into one folder, and lets it write
+the pages.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +34,14 @@ _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 _DESCRIPTIONS = {
-    "equations": "Every equation of the course, written out, with the functions, tests and lessons that belong to it.",
-    "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of floatbase.",
+    "equations": "Every equation of the course, written out, with the functions, tests and lessons "
+    "that belong to it.",
+    "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of "
+    "floatbase.",
     "how_to": "Where your work is kept, and what to do when something fails.",
     "changelog": "What changed in floatbase, version by version.",
-    "peers": "The time of floatbase's control tick beside those of TSID and placo, which find the same torques.",
+    "peers": "The time of floatbase's control tick beside those of TSID and placo, which find the "
+    "same torques.",
     "tick": "What a control tick of floatbase takes, part by part, and how it grows.",
     "rollout": "What a simulated second takes in floatbase's rollout, beside a bare loop.",
     "walking": "How well robots walk with floatbase, as measured and as required.",
@@ -46,7 +51,8 @@ _DESCRIPTIONS = {
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
     """Write the site into `folder`; the path of its first page.
 
-    lessons: those that it has, all by default. stored: run none of them, and show what their notebooks hold. Raises
+    lessons: those that it has, all by default. stored: run none of them, and show what their
+        notebooks hold. Raises
     `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
     """
     known = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -54,14 +60,18 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     for path in shown:
         if path not in known:
             raise InputError(f"there is no lesson {path}; the course's lessons are in {NOTEBOOKS}.")
-    *notebooks, scene = run_lessons([*([] if stored else shown), _front_page_notebook()], RUN_FOLDER).values()
+    *notebooks, scene = run_lessons(
+        [*([] if stored else shown), _front_page_notebook()], RUN_FOLDER
+    ).values()
     pictures = Pictures(folder / "_static")
     if (folder / ".buildinfo").exists():  # an earlier site, and no other folder of somebody's
         shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         source = Path(place) / "source"
         shutil.copytree(_SITE_SOURCE, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-        _write_lessons(source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures)
+        _write_lessons(
+            source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures
+        )
         _write_texts(source, shown, _first_picture(scene, pictures))
         _write_reference(source / "api")
         _run_sphinx(source, folder)
@@ -76,7 +86,9 @@ def _front_page_notebook() -> Path:
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
     play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
-    notebook = new_notebook(cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")])
+    notebook = new_notebook(
+        cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")]
+    )
     path = RUN_FOLDER / "first_page.ipynb"
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, path)
@@ -88,14 +100,20 @@ def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures)
     addresses = {path.name.split("_")[0]: path.name for path in notebooks}
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
-        nbformat.write(prepare_lesson(notebook, pictures, addresses), source / "lessons" / path.name)
+        nbformat.write(
+            prepare_lesson(notebook, pictures, addresses), source / "lessons" / path.name
+        )
 
 
 def _first_picture(notebook: Any, pictures: Pictures) -> str:
     """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
-    data = next(output.data for cell in notebook.cells for output in cell.outputs if "data" in output)
+    data = next(
+        output.data for cell in notebook.cells for output in cell.outputs if "data" in output
+    )
     placed = pictures.place(data)
-    image = f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+    image = (
+        f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+    )
     return f"```{{raw}} html\n{placed or image}\n```"
 
 
@@ -104,13 +122,24 @@ def _toctrees(lessons: Sequence[Path]) -> str:
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
     return "\n\n".join(
-        "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *(f"lessons/{path.stem}" for path in paths), "```"])
+        "\n".join(
+            [
+                "```{toctree}",
+                ":hidden:",
+                f":caption: {caption}",
+                "",
+                *(f"lessons/{path.stem}" for path in paths),
+                "```",
+            ]
+        )
         for caption, paths in listed.items()
     )
 
 
 def _lesson_table(known: Iterable[Path]) -> str:
-    rows = [f"| [{title_of(path)}](lessons/{path.name}) | {equation_ranges(path)} |" for path in known]
+    rows = [
+        f"| [{title_of(path)}](lessons/{path.name}) | {equation_ranges(path)} |" for path in known
+    ]
     return "\n".join(["| lesson | equations |", "|---|---|", *rows])
 
 
@@ -120,18 +149,38 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
-        "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8").replace("(notebooks/", "(lessons/"),
-        **{f"benchmarks/{path.name}": path.read_text(encoding="utf-8") for path in _ROOT.glob("benchmarks/*.md")},
+        "changelog.md": (_ROOT / "CHANGELOG.md")
+        .read_text(encoding="utf-8")
+        .replace("(notebooks/", "(lessons/"),
+        **{
+            f"benchmarks/{path.name}": path.read_text(encoding="utf-8")
+            for path in _ROOT.glob("benchmarks/*.md")
+        },
     }
     for name, text in made.items():
-        about = f'---\nmyst:\n  html_meta:\n    description: "{_DESCRIPTIONS[Path(name).stem]}"\n---\n'
+        about = (
+            f'---\nmyst:\n  html_meta:\n    description: "{_DESCRIPTIONS[Path(name).stem]}"\n---\n'
+        )
         (source / name).write_text(about + text, encoding="utf-8")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
-        for name, part in {"scene": scene, "lessons": _lesson_table(lessons), "toctrees": _toctrees(lessons)}.items():
+        for name, part in {
+            "scene": scene,
+            "lessons": _lesson_table(lessons),
+            "toctrees": _toctrees(lessons),
+        }.items():
             text = text.replace(f"{{{name}}}", part) if path == source / "index.md" else text
-        way = "" if path.parent.name == "lessons" else "lessons/" if path.parent == source else "../lessons/"
-        path.write_text(add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}), encoding="utf-8")
+        way = (
+            ""
+            if path.parent.name == "lessons"
+            else "lessons/"
+            if path.parent == source
+            else "../lessons/"
+        )
+        path.write_text(
+            add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}),
+            encoding="utf-8",
+        )
     for path in _ROOT.glob("benchmarks/*.png"):
         shutil.copy(path, source / "benchmarks")
 
@@ -154,17 +203,35 @@ def _with_anchors(page: str) -> str:
         files = match[1].replace("`", "").split(", ")
         listed = " ".join(f"<code>{file}</code>" for file in files)
         count = "1 file" if len(files) == 1 else f"{len(files)} files"
-        return f'- <details class="tests"><summary>tests that use them, in {count}</summary>{listed}</details>'
+        return (
+            f'- <details class="tests"><summary>tests that use them, in '
+            f"{count}</summary>{listed}</details>"
+        )
 
     page = _TESTS.sub(fold, page)
-    page = page.replace("## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text")
-    return _FUNCTIONS.sub(link, _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page))
+    page = page.replace(
+        "## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text"
+    )
+    return _FUNCTIONS.sub(
+        link, _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page)
+    )
 
 
 def _run_sphinx(source: Path, folder: Path) -> None:
     """Let Sphinx write the pages; a warning is a fault."""
     from sphinx.cmd.build import build_main
 
-    options = ["-q", "-W", "--keep-going", "-E", "-j", "2", "-c", str(_SITE_SOURCE), "-d", str(source / ".doctrees")]
+    options = [
+        "-q",
+        "-W",
+        "--keep-going",
+        "-E",
+        "-j",
+        "2",
+        "-c",
+        str(_SITE_SOURCE),
+        "-d",
+        str(source / ".doctrees"),
+    ]
     if build_main([*options, str(source), str(folder)]):
         raise FloatbaseError("Sphinx found faults, named above; the site is not whole.")

@@ -1,4 +1,6 @@
-"""Sphinx's settings for the site; `floatbase.lessons.publish.site.build` starts it on the folder of prepared pages."""
+"""Sphinx's settings for the site; `floatbase.lessons.publish.site.build` starts it on the folder of
+prepared pages.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The package's docstrings, which are plain text, as what Sphinx reads: lists of parameters, links, code, and no more."""
+"""The package's docstrings, which are plain text, as what Sphinx reads: lists of parameters, links,
+code, and no more.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +21,20 @@ _CLASS_NAME = re.compile(r"\b(npt\.|np\.|fb\.)?([A-Z]\w*)\b")
 _UNDERLINE = re.compile(r"^(?:-+|=+)$")
 
 
-def process_docstring(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+def process_docstring(
+    app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
+) -> None:
     """Sphinx's event autodoc-process-docstring: changes the lines in place."""
     own = name if what == "class" else name.rpartition(".")[0]
     lines[:] = to_restructured_text("\n".join(lines), parameters(value), own).splitlines() + [""]
 
 
-def process_signature(app: Any, what: str, name: str, value: Any, options: Any, signature: Any, returns: Any) -> Any:
-    """Sphinx's event autodoc-process-signature: types as the source writes them, "Array" and not what stands behind it."""
+def process_signature(
+    app: Any, what: str, name: str, value: Any, options: Any, signature: Any, returns: Any
+) -> Any:
+    """Sphinx's event autodoc-process-signature: types as the source writes them, "Array" and not
+    what stands behind it.
+    """
     if getattr(value, "_is_protocol", False):
         return "", None
     if signature is None or what in ("property", "attribute", "data"):
@@ -35,7 +43,11 @@ def process_signature(app: Any, what: str, name: str, value: Any, options: Any, 
     given = list(found.parameters.values())
     shown = given[1:] if what == "method" and given and given[0].name in ("self", "cls") else given
     typed = [one.replace(annotation=_linked_type(one.annotation)) for one in shown]
-    returned = None if what == "class" or found.return_annotation is found.empty else _linked_type(found.return_annotation)
+    returned = (
+        None
+        if what == "class" or found.return_annotation is found.empty
+        else _linked_type(found.return_annotation)
+    )
     return stringify_signature(inspect.Signature(typed)).replace("<factory>", "…"), returned
 
 
@@ -44,22 +56,32 @@ def _linked_type(annotation: Any) -> Any:
     if not isinstance(annotation, str):
         return annotation
     known = addresses()
-    return _CLASS_NAME.sub(lambda match: f"~{known[match[2]]}" if match[2] in known else match[2], annotation)
+    return _CLASS_NAME.sub(
+        lambda match: f"~{known[match[2]]}" if match[2] in known else match[2], annotation
+    )
 
 
 def parameters(value: Any) -> set[str]:
-    """The names that a docstring may explain: parameters of a function, those of a class, its fields and its members."""
-    names = {*getattr(value, "__annotations__", ())} | {*(vars(value) if inspect.isclass(value) else ())}
+    """The names that a docstring may explain: parameters of a function, those of a class, its
+    fields and its members.
+    """
+    names = {*getattr(value, "__annotations__", ())} | {
+        *(vars(value) if inspect.isclass(value) else ())
+    }
     with suppress(TypeError, ValueError):  # a module or a property takes nothing
         names |= set(inspect.signature(value).parameters)
     return {name for name in names if not name.startswith("_")} - {"self", "return"}
 
 
 def to_restructured_text(text: str, names: Iterable[str], own: str = "") -> str:
-    """A docstring as reStructuredText. names: those that it may explain. own: address of the class or module it belongs to."""
+    """A docstring as reStructuredText. names: those that it may explain. own: address of the class
+    or module it belongs to.
+    """
     blocks = []
     name = "|".join(sorted(map(re.escape, names), key=len, reverse=True))
-    entry = re.compile(rf"(?:^|(?<=\n)|(?<=[.;] ))((?:{name})(?:, (?:{name}))*):\s" if name else r"(?!)")
+    entry = re.compile(
+        rf"(?:^|(?<=\n)|(?<=[.;] ))((?:{name})(?:, (?:{name}))*):\s" if name else r"(?!)"
+    )
     for block in re.split(r"\n\s*\n", text.strip("\n")):
         rows = block.splitlines()
         if not block.strip():
@@ -81,7 +103,10 @@ def _parameter_list(block: str, entry: re.Pattern[str], own: str) -> list[str]:
     before, *parts = entry.split(block)
     found = [_paragraph(before, own)] if before.strip() else []
     pairs = zip(parts[::2], parts[1::2], strict=True)
-    items = [f"* {', '.join(f'``{one}``' for one in names.split(', '))}: {_paragraph(about, own)}" for names, about in pairs]
+    items = [
+        f"* {', '.join(f'``{one}``' for one in names.split(', '))}: {_paragraph(about, own)}"
+        for names, about in pairs
+    ]
     return [*found, "\n".join(items)] if items else found
 
 

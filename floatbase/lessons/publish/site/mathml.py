@@ -1,4 +1,6 @@
-"""Formulas as MathML, which browsers draw themselves, and a font for them: the site needs no script for either."""
+"""Formulas as MathML, which browsers draw themselves, and a font for them: the site needs no script
+for either.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ FONT = "formulas.woff"  # in the site's static files
 logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells each step
 _TAG = re.compile(r"\\tag\{(.*?)\}")
 _MATHML = re.compile(r"<math.*?</math>", re.DOTALL)
-# what the converter leaves out: brackets grow with their own matrix only, dots stand near, and what is below min stands below
+# what the converter leaves out: brackets grow with their own matrix only, dots stand near, and what
+# is below min stands below
 _MATRIX = re.compile(r"<mo>&#x0005B;</mo><mtable>.*?</mtable><mo>&#x0005D;</mo>")
 _DOTTED = re.compile(r"<mover>(<mi>[^<]*</mi><mo>(?:&#x000A8;|&#x002D9;|&#x0007E;)</mo></mover>)")
 _BELOW = re.compile(r"<msub>(<mo>(?:min|max)</mo>(?:<mi>[^<]*</mi>|<mrow>.*?</mrow>))</msub>")
@@ -44,7 +47,9 @@ def visit_displaymath(writer: Any, node: Any) -> None:
     latex = node.astext()
     tag = _TAG.search(latex)
     number = f'<span class="number">({tag[1]})</span>' if tag else ""
-    writer.body.append(f'<div class="equation">{mathml(_TAG.sub("", latex), "block")}{number}</div>')
+    writer.body.append(
+        f'<div class="equation">{mathml(_TAG.sub("", latex), "block")}{number}</div>'
+    )
     raise nodes.SkipNode
 
 
@@ -54,9 +59,13 @@ def write_font(pages: Iterable[str], target: Path) -> None:
     Brackets grow around matrices only in a font made for formulas, and few machines have one.
     """
     formulas = (formula for page in pages for formula in _MATHML.findall(page))
-    letters = {letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))}
+    letters = {
+        letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))
+    }
     cutter = subset.Subsetter(subset.Options(layout_features=["ssty"], notdef_outline=True))
-    cutter.populate(unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}])
+    cutter.populate(
+        unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}]
+    )
     with subset.load_font(_font_file(), subset.Options()) as font:
         cutter.subset(font)
         font.flavor = "woff"
@@ -67,12 +76,17 @@ def _font_file() -> str:
     """Where the font lies; the package around it is not imported."""
     spec = find_spec("ziamath")
     if spec is None or not spec.submodule_search_locations:
-        raise ViewerError("ziamath is not installed; the site needs its font. Install it with: pip install floatbase[site]")
+        raise ViewerError(
+            "ziamath is not installed; the site needs its font. Install it with: pip install "
+            "floatbase[site]"
+        )
     return str(Path(spec.submodule_search_locations[0]) / "fonts" / "STIXTwoMath-Regular.ttf")
 
 
 def _slanted(letter: str) -> str:
-    """The letter as browsers draw it when it stands alone in a formula: in italics, which are letters of their own."""
+    """The letter as browsers draw it when it stands alone in a formula: in italics, which are
+    letters of their own.
+    """
     for first, last, slanted in (("a", "z", 0x1D44E), ("A", "Z", 0x1D434), ("α", "ω", 0x1D6FC)):
         if first <= letter <= last:
             return "ℎ" if letter == "h" else chr(slanted + ord(letter) - ord(first))

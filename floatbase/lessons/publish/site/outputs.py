@@ -1,4 +1,6 @@
-"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of what needs one."""
+"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of
+what needs one.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ _CLAIMS_PROMPT = "claims of the text above, as code that fails if one is wrong"
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
-_LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)  # what they print is about the learner
+_LEARNER_CALLS = re.compile(
+    r"^(?:review|show_progress|reveal)\(", re.MULTILINE
+)  # what they print is about the learner
 
 
 class PicturePlacer(Protocol):
@@ -37,13 +41,17 @@ class PicturePlacer(Protocol):
 
 
 def run_lessons(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
-    """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran last are taken from `kept`.
+    """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran
+    last are taken from `kept`.
 
-    kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the package.
+    kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the
+        package.
     """
     kept.mkdir(parents=True, exist_ok=True)
     source = _digest_of_package()
-    files = {path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons}
+    files = {
+        path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons
+    }
     new = {path: file for path, file in files.items() if not file.exists()}
     with ProcessPoolExecutor(PARALLEL_RUNS, mp_context=get_context("spawn")) as pool:
         for path in pool.map(_run_lesson, new, new.values()):
@@ -70,7 +78,8 @@ def _digest_of_package() -> bytes:
     files = (
         path
         for path in sorted(package.rglob("*.*"))
-        if "publish" not in path.relative_to(package).parts and path.suffix in (".py", ".json", ".js", ".html")
+        if "publish" not in path.relative_to(package).parts
+        and path.suffix in (".py", ".json", ".js", ".html")
     )
     return b"".join(path.read_bytes() for path in files)
 
@@ -108,12 +117,19 @@ def _prepare_code_cell(cell: Any, heading: str, pictures: PicturePlacer) -> Any:
     if "predict" in tags:
         return new_markdown_cell(_prediction_question(cell))
     if "check" in tags:
-        return new_markdown_cell(_live_lesson_note("The check of your answer, and hints, are in the live lesson"))
+        return new_markdown_cell(
+            _live_lesson_note("The check of your answer, and hints, are in the live lesson")
+        )
     if _LEARNER_CALLS.search(cell.source):
-        return new_markdown_cell(_live_lesson_note("This is about what you said and solved, in the live lesson"))
+        return new_markdown_cell(
+            _live_lesson_note("This is about what you said and solved, in the live lesson")
+        )
     if "claims" in tags:
         cell.metadata["tags"] = [*tags, "hide-input"]
-        cell.metadata["mystnb"] = {"code_prompt_show": _CLAIMS_PROMPT, "code_prompt_hide": _CLAIMS_PROMPT}
+        cell.metadata["mystnb"] = {
+            "code_prompt_show": _CLAIMS_PROMPT,
+            "code_prompt_hide": _CLAIMS_PROMPT,
+        }
     cell.outputs = [shown for output in cell.outputs for shown in _site_outputs(output, pictures)]
     _describe_figure(cell, heading)
     return cell
@@ -126,16 +142,23 @@ def _live_lesson_note(text: str) -> str:
 def _prediction_question(cell: Any) -> str:
     """What a prediction asks for, in words."""
     call = next(
-        node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
+        node
+        for node in ast.walk(ast.parse(cell.source))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
     )
     given = {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords}
     if "choices" in given:
         wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
     else:
         count, unit = given.get("count", 1), given.get("unit", "")
-        wanted = ("a number" if count == 1 else f"{count} numbers") + (f", in {unit}" if unit else "")
+        wanted = ("a number" if count == 1 else f"{count} numbers") + (
+            f", in {unit}" if unit else ""
+        )
     asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
-    return f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({RUN_PAGE}); here, think first.\n:::"
+    return (
+        f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({RUN_PAGE}); here, "
+        f"think first.\n:::"
+    )
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
@@ -155,8 +178,14 @@ def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
 
 
 def _describe_figure(cell: Any, heading: str) -> None:
-    """Says what a figure shows, for those who cannot see it, and how wide it is, as it has two dots for each pixel."""
-    figures = [output for output in cell.outputs if "image/png" in output.get("data", {}) and "text/html" not in output.data]
+    """Says what a figure shows, for those who cannot see it, and how wide it is, as it has two dots
+    for each pixel.
+    """
+    figures = [
+        output
+        for output in cell.outputs
+        if "image/png" in output.get("data", {}) and "text/html" not in output.data
+    ]
     if figures:
         image = {"alt": f"Figure: {re.sub(r'[*`$]', '', heading)}"}
         wide = figures[0].metadata.get("image/png", {}).get("width")

@@ -1,4 +1,6 @@
-"""Links from what the course's texts name, an equation (7), a section §4, App. C, a note or a lesson, to where it stands."""
+"""Links from what the course's texts name, an equation (7), a section §4, App. C, a note or a
+lesson, to where it stands.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,12 @@ NOTES_ANCHOR = "notes-of-the-document"
 _NUMBERS = {formula.number for formula in FORMULAS}
 _SECTIONS = {section.number for section in SECTIONS}
 # what is left as it is: code, formulas, links, headings, HTML, fences
-_NOT_LINKED = r"```.*?```|`[^`\n]*`|\$\$.+?\$\$|\$[^$\n]+?\$|!?\[[^\]\n]*\]\([^)\n]*\)|^#.*?$|<[^>\n]+>"
+_NOT_LINKED = (
+    r"```.*?```|`[^`\n]*`|\$\$.+?\$\$|\$[^$\n]+?\$|!?\[[^\]\n]*\]\([^)\n]*\)|^#.*?$|<[^>\n]+>"
+)
 REFERENCE = re.compile(
-    r"(?<![\w\]])(?P<equation>\(\d{1,2}\))|(?P<section>§\d(?:\.\d)?)|(?P<appendix>App(?:\.|endix) [ABC])\b"
+    r"(?<![\w\]])(?P<equation>\(\d{1,2}\))|(?P<section>§\d(?:\.\d)?)|(?P<appendix>App(?:\.|endix) "
+    r"[ABC])\b"
     r"|(?P<note>\bnotes? \d+)|(?P<lesson>\b[Ll]esson (?:\d\d|[A-Z])\b)"
 )
 _LESSON_LINK = re.compile(r"\[([^\]]*)\]\((?:lessons/)?([^:()/]+\.ipynb)\)")
@@ -25,11 +30,17 @@ def anchor_of(number: str) -> str:
     """The name of a place in the map: of "(9)" eq-9, of "§2.1" sec-2-1, of "App. A" app-a."""
     if number.startswith("App"):
         return f"app-{number[-1].lower()}"
-    return f"sec-{number[1:].replace('.', '-')}" if number.startswith("§") else f"eq-{number.strip('()')}"
+    return (
+        f"sec-{number[1:].replace('.', '-')}"
+        if number.startswith("§")
+        else f"eq-{number.strip('()')}"
+    )
 
 
 def target_of(match: re.Match[str]) -> str:
-    """The place in the map that a match of `REFERENCE` leads to; "" where it leads nowhere, or to a lesson."""
+    """The place in the map that a match of `REFERENCE` leads to; "" where it leads nowhere, or to a
+    lesson.
+    """
     if match["note"]:
         return NOTES_ANCHOR
     named = match["equation"] or match["section"] or (match["appendix"] or "").replace("endix", ".")
@@ -37,7 +48,8 @@ def target_of(match: re.Match[str]) -> str:
 
 
 def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
-    """Markdown with links to the map and to lessons; what links to a lesson that is not there is text.
+    """Markdown with links to the map and to lessons; what links to a lesson that is not there is
+    text.
 
     lessons: number -> address, such as "05" -> "05_centre_of_mass.ipynb".
     """
@@ -47,7 +59,11 @@ def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
         if match["kept"]:
             to_lesson = _LESSON_LINK.fullmatch(match[0])
             return to_lesson[1] if to_lesson and to_lesson[2] not in names else match[0]
-        address = lessons.get(match["lesson"].split()[1], "") if match["lesson"] else f"#{target_of(match)}"
+        address = (
+            lessons.get(match["lesson"].split()[1], "")
+            if match["lesson"]
+            else f"#{target_of(match)}"
+        )
         return f"[{match[0]}]({address})" if len(address) > 1 else match[0]
 
     return _IN_MARKDOWN.sub(link, markdown)
