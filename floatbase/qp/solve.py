@@ -27,9 +27,8 @@ _CLARABEL_TOLERANCES = (
     1e-10,
     1e-8,
 )  # asked for in turn; now and then it makes no progress on the way to the first
-_CONVEXITY_TOLERANCE = (
-    1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
-)
+# part of the largest |H| that a curvature may be negative by: rounding of the pullback
+_CONVEXITY_TOLERANCE = 1e-10
 # part of the largest variable that polishing may move any: beyond it, it mends no last digits
 _MAX_POLISHING_STEP = 1e-4
 

@@ -16,10 +16,10 @@ _SKIPPED_PACKAGES = (
     "lessons",
     "viewer",
 )  # their numbers choose what is drawn, not what is answered
-# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int()
-_TOLERANCE = re.compile(
-    r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)  # (.+)$", re.MULTILINE
-)
+# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int(). The reason
+# may also stand in comment lines above.
+_VALUE = r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)"
+_TOLERANCE = re.compile(rf"((?:^# [^\n]+\n)*){_VALUE}(?:  # ([^\n]+))?$", re.MULTILINE)
 
 
 def page() -> str:
@@ -76,5 +76,12 @@ def tolerances() -> Iterator[tuple[str, str, str, str]]:
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
         if place.parts[0] not in _SKIPPED_PACKAGES:
-            for name, value, reason in _TOLERANCE.findall(path.read_text(encoding="utf-8")):
-                yield place.with_suffix("").as_posix(), name, value, reason.replace("|", "\\|")
+            for above, name, value, beside in _TOLERANCE.findall(path.read_text(encoding="utf-8")):
+                reason = beside or " ".join(line[2:] for line in above.splitlines())
+                if reason:
+                    yield (
+                        place.with_suffix("").as_posix(),
+                        name,
+                        value.strip(),
+                        reason.replace("|", "\\|"),
+                    )
