@@ -5,7 +5,6 @@ can be solved.
 from __future__ import annotations
 
 import ast
-import ast
 import contextlib
 import os
 import re
