@@ -125,7 +125,7 @@ class CompiledTick:
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._time_varying_tasks = pack_problem(problem)
         self.user_terms, time_varying = (
-            UserTerms(problem, self.dynamics),
+            UserTerms(problem),
             {each.task_index for each in self._time_varying_tasks},
         )
         self.unchecked_tasks = [
