@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from floatbase._validation import Array, read_only
 from floatbase.affine import Affine
+from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem, residual_of
-from floatbase.control.tick.problem_arrays import BLOCKS, CONTACT_KINDS, TASK_KINDS
+from floatbase.control.tick.problem_arrays import CONTACT_KINDS, TASK_KINDS
 from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -49,7 +50,7 @@ class UserTerms:
     def __init__(self, problem: Problem):
         self._problem, self._limits = problem, problem.limits
         self._tasks = [
-            (i, task, BLOCKS[task.block])
+            (i, task, BLOCKS.index(task.block))
             for i, task in enumerate(problem.tasks)
             if type(task) not in TASK_KINDS
         ]
@@ -113,7 +114,7 @@ class UserTerms:
             if each.row_names:
                 each.labels(len(h))  # raises where there is another number of them
             inequalities.append((G, h))
-            packed += (BLOCKS[each.block], len(h)), G.ravel(), h
+            packed += (BLOCKS.index(each.block), len(h)), G.ravel(), h
         return TickInputs(
             np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
         )
