@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
@@ -105,13 +105,10 @@ class WholeBodyController:
         backend: Backend = "auto",
     ):
         as_instance("robot", robot, Robot)
-        limits = (
-            robot.torque_limits
-            if torque_limits is None
-            else as_torque_limits(robot.d, torque_limits)
-        )
-        checked_limits = Limits(
-            limits,
+        if torque_limits is None:
+            torque_limits = robot.torque_limits
+        limits = Limits(
+            as_torque_limits(robot.d, torque_limits),
             facets,
             inner_approximation,
             min_normal_force,
@@ -119,22 +116,13 @@ class WholeBodyController:
             inequalities,
             facet_rotation,
         )
-        problem = Problem(robot, contacts, tasks, checked_limits, mismatch)
+        problem = Problem(robot, contacts, tasks, limits, mismatch)
         if contact_weight is not None:
-            problem = Problem(
-                robot,
-                *with_soft_contacts(contacts, problem.tasks, contact_weight),
-                checked_limits,
-                mismatch,
-            )
+            problem = _softened(problem, contact_weight)
         mismatch.check_names(contacts)
-        checked_limits.check_names(contacts.names, _foot_frames(robot))
-        with dry_run():
-            problem.qp(
-                robot.standing()
-                # names that do not exist and shapes that do not fit are told now, and not in the
-                # loop
-            )
+        limits.check_names(contacts.names, _foot_frames(robot))
+        with dry_run():  # unknown names and shapes that do not fit raise here, not in the loop
+            problem.qp(robot.standing())
         check_solver(solver)
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
@@ -251,8 +239,7 @@ class WholeBodyController:
     @cached_property
     def _soft_controller(self) -> WholeBodyController:
         """The same controller with soft contacts."""
-        soft = with_soft_contacts(self.contacts, self.tasks, SOFT_CONTACT_WEIGHT)
-        other = self._with_problem(replace(self._problem, contacts=soft[0], tasks=soft[1]))
+        other = self._with_problem(_softened(self._problem, SOFT_CONTACT_WEIGHT))
         other._softened = True
         return other
 
@@ -314,17 +301,14 @@ class WholeBodyController:
 
         Other limits: `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
         """
-        weight = contact_weight_of(self.tasks)
-        if weight is not None:
-            contacts, tasks = with_soft_contacts(
-                self.contacts if contacts is None else contacts,
-                self.tasks if tasks is None else tasks,
-                weight,
-            )
-        new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(
-            self._problem, **{name: value for name, value in new.items() if value is not None}
+            self._problem,
+            contacts=self.contacts if contacts is None else contacts,
+            tasks=self.tasks if tasks is None else tasks,
+            limits=self.limits if limits is None else limits,
         )
+        if (weight := contact_weight_of(self.tasks)) is not None:
+            problem = _softened(problem, weight)
         if limits is not None:
             limits.check_names(
                 problem.contacts.names,
@@ -335,9 +319,8 @@ class WholeBodyController:
         other = self._with_problem(problem)
         if other._compiled is None:
             problem.check()
-        elif (
-            tasks is not None or limits is not None or other._compiled.user_terms.any
-        ):  # what its tables have not found to fit
+        elif tasks is not None or limits is not None or other._compiled.user_terms.any:
+            # what its tables have not found to fit
             problem.check(other._compiled.unchecked_tasks)
         return other
 
@@ -352,6 +335,12 @@ def _check_choice(name: str, value: object, choices: object) -> None:
     """Raise `UnknownNameError` for a value that is none of a `Literal`'s."""
     if not isinstance(value, str) or value not in get_args(choices):
         raise unknown_name(name, value, get_args(choices))
+
+
+def _softened(problem: Problem, weight: float) -> Problem:
+    """The problem with soft contacts."""
+    contacts, tasks = with_soft_contacts(problem.contacts, problem.tasks, weight)
+    return replace(problem, contacts=contacts, tasks=tasks)
 
 
 def _foot_frames(robot: Robot) -> list[str]:

@@ -124,10 +124,8 @@ class CompiledTick:
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._time_varying_tasks = pack_problem(problem)
-        self.user_terms, time_varying = (
-            UserTerms(problem),
-            {each.task_index for each in self._time_varying_tasks},
-        )
+        self.user_terms = UserTerms(problem)
+        time_varying = {each.task_index for each in self._time_varying_tasks}
         self.unchecked_tasks = [
             task
             for i, task in enumerate(problem.tasks)
@@ -136,16 +134,10 @@ class CompiledTick:
         self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._workspace_sizes, self._tables, self._tick, self._n_stages = (
-            tick.workspace_sizes,
-            tables,
-            tick.tick,
-            tick.N_STAGES,
-        )
-        self._varies, self._n_user_rows = (
-            bool(self._time_varying_tasks) or self.user_terms.varies,
-            -1,
-        )
+        self._workspace_sizes, self._tables, self._tick = tick.workspace_sizes, tables, tick.tick
+        self._n_stages = tick.N_STAGES
+        self._varies = bool(self._time_varying_tasks) or self.user_terms.varies
+        self._n_user_rows = -1
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
@@ -154,10 +146,8 @@ class CompiledTick:
         """
         if n_user_rows > self._n_user_rows:
             n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
-            self.workspace, self._n_user_rows = (
-                (np.empty(n_floats), np.empty(n_ints, np.int64)),
-                n_user_rows,
-            )
+            self.workspace = (np.empty(n_floats), np.empty(n_ints, np.int64))
+            self._n_user_rows = n_user_rows
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
@@ -274,11 +264,8 @@ class CompiledTick:
 
     def _targets_at(self, t: float) -> Array:
         """All targets at time t. Raises `InputError` for a bad one."""
-        targets, robot, k = (
-            self.default_inputs.packed[: self.n_targets].copy(),
-            self._problem.robot,
-            self._problem.contacts.k,
-        )
+        targets, robot = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot
+        k = self._problem.contacts.k
         for _, task, first in self._time_varying_tasks:
             for value in targets_at(task, robot, k, t):
                 targets[first : first + value.size] = value.ravel()

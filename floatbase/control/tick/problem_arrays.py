@@ -73,10 +73,8 @@ class Dynamics:
             (model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
             for i in range(n)
         ]
-        self.tree, self.links = (
-            np.array(tree, np.int64),
-            np.array([(link.mass, *link.lever) for link in model.inertias]),
-        )
+        self.tree = np.array(tree, np.int64)
+        self.links = np.array([(link.mass, *link.lever) for link in model.inertias])
 
     def update(self, q: Array, v: Array) -> None:
         """Fill the views for a configuration q (nq,) and a velocity v (nv,)."""
@@ -124,11 +122,8 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses, targets, time_varying = _pack_tasks(problem)
-    dynamics, limits, problem_contacts = (
-        dynamics_of(problem.robot),
-        problem.limits,
-        problem.contacts,
-    )
+    dynamics, limits = dynamics_of(problem.robot), problem.limits
+    problem_contacts = problem.contacts
     sizes = (
         len(dynamics.tree),
         len(contacts),
@@ -138,10 +133,8 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         len(tasks),
         problem.robot.d,
     )
-    user_contacts, points_only = (
-        contacts[contacts[:, 1] == USER_DEFINED],
-        np.all(contacts[:, 1] == POINT),
-    )
+    user_contacts = contacts[contacts[:, 1] == USER_DEFINED]
+    points_only = np.all(contacts[:, 1] == POINT)
     n_user_contact_numbers = sum(
         m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:]
     )
