@@ -53,9 +53,8 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # part of its distance from the middle that a foot keeps to its own side: legs must not cross
 _MIN_SIDE_FRACTION = 0.25
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-_RAMP_LOAD_FACTOR = (
-    2.0  # times its even share of the weight: the normal force from which a ramp comes down
-)
+# times its even share of the weight: the normal force from which a ramp comes down
+_RAMP_LOAD_FACTOR = 2.0
 _MAX_SPEED = 10.0  # m/s and rad/s: more is a slip of units
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 

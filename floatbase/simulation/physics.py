@@ -40,9 +40,8 @@ _FALLEN_COSINE = float(
 # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
-_CLOCK_TOLERANCE = (
-    1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
-)
+# s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
+_CLOCK_TOLERANCE = 1e-9
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
