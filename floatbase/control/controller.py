@@ -21,8 +21,7 @@ from floatbase._validation import (
 )
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
-from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
-from floatbase.control.problem import Problem, dry_run
+from floatbase.control.problem import ModifyQP, Problem, dry_run
 from floatbase.control.soft import contact_weight_of, with_soft_contacts
 from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
@@ -43,7 +42,7 @@ _OPTIONS = (
     "torque_limits",
     "inequalities",
     "contact_weight",
-    "mismatch",
+    "modify_qp",
     "solver",
     "backend",
 )
@@ -71,8 +70,11 @@ class WholeBodyController(FixedAttributes):
         contact_weight ‖A q̈ - b‖² into the objective instead: contacts give way where torques and
         friction do not suffice to hold them, and only user-defined rows and bounds of normal forces
         can make a tick infeasible.
-    mismatch: what is taken for (7), the truth by default, see `floatbase.control.ModelMismatch`;
-        any other takes the reference backend.
+    modify_qp: a function (qp, eom) -> QP that changes the problem before it is solved, called at
+        every control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
+        `EquationsOfMotion` at that state: to add rows that couple q̈, τ and λ, to relax or scale
+        rows of (7), or to change the objective. It returns a QP in the same x, such as
+        `dataclasses.replace(qp, H=…, g=…)`, and takes the reference backend. None changes nothing.
     solver: one of `floatbase.qp.solvers()`.
     backend: "reference" assembles and solves the QP as it is written. "compiled" solves the same
         problem many times faster (`floatbase.control.tick`), with tasks, constraints and
@@ -120,7 +122,7 @@ class WholeBodyController(FixedAttributes):
         torque_limits: npt.ArrayLike | None = None,
         inequalities: Sequence[LinearInequality] = (),
         contact_weight: float | None = None,
-        mismatch: ModelMismatch = NO_MISMATCH,
+        modify_qp: ModifyQP | None = None,
         solver: str = "daqp",
         backend: Backend = "auto",
     ):
@@ -139,15 +141,14 @@ class WholeBodyController(FixedAttributes):
             inequalities,
             facet_rotation,
         )
-        problem = Problem(robot, contacts, tasks, checked_limits, mismatch)
+        problem = Problem(robot, contacts, tasks, checked_limits, modify_qp)
         if contact_weight is not None:
             problem = Problem(
                 robot,
                 *with_soft_contacts(contacts, problem.tasks, contact_weight),
                 checked_limits,
-                mismatch,
+                modify_qp,
             )
-        mismatch.check_names(contacts)
         checked_limits.check_names(contacts.names, _foot_frames(robot))
         with dry_run():
             problem.qp(
@@ -167,9 +168,12 @@ class WholeBodyController(FixedAttributes):
         check_solver(solver)
         if not isinstance(backend, str) or backend not in get_args(Backend):
             raise unknown_name("backend", backend, get_args(Backend))
-        reason = (
-            "it was requested" if backend == "reference" else _unsupported_reason(problem, solver)
-        )
+        if backend == "reference":
+            reason = "it was requested"
+        elif problem.modify_qp is not None:
+            reason = "modify_qp changes the QP"
+        else:
+            reason = unsupported_reason(problem, solver)
         compiled = None if reason else CompiledTick(problem)
         if compiled is not None and warm_up:
             reason = compiled.warm_up()
@@ -311,15 +315,6 @@ class WholeBodyController(FixedAttributes):
             f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, "
             f"{len(self.tasks)} tasks, {self.backend})"
         )
-
-
-def _unsupported_reason(problem: Problem, solver: str) -> str:
-    """Why a problem cannot run compiled, or ""."""
-    return (
-        unsupported_reason(problem, solver)
-        if problem.mismatch.is_exact
-        else "its model mismatch is not zero"
-    )
 
 
 def _foot_frames(robot: Robot) -> list[str]:

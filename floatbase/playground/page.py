@@ -12,7 +12,6 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.lessons import static_export
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
 from floatbase.playground.panel import Panel
@@ -23,7 +22,7 @@ from floatbase.playground.term_arrows import term_arrows
 from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
 from floatbase.viewer import Picture
-from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
 _SITE_NOTE = "The playground needs the live lesson: here its robot stands still."
@@ -126,7 +125,7 @@ class Playground:
     def set(self, **changes: Any) -> None:
         """Change settings, fields of `Settings`; the run takes them over before its next slice.
 
-        Raises `TypeError` for a name that is none.
+        Raises `TypeError` for a name that is none, `InputError` for a value that cannot be.
         """
         replace(self.session.settings, **changes)
         with self._lock:
@@ -225,8 +224,7 @@ class Playground:
                 self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
-            code = self.session.settings.code(self.robot, PERIOD, self._last_push)
-            self.view.add_text("code", code, "as Python", code=True)
+            self.view.add_text("code", self.session.code(self._last_push), "as Python", code=True)
 
     def _on_status(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
@@ -303,9 +301,9 @@ class Playground:
         )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        if display_mode() == "site":
+        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             self.view.show(self.session.sim.state, self.session.sim.feet)
-            return static_export.StaticExport([self.view], words=_SITE_NOTE).bundle()
+            return bundle(self.view, words=_SITE_NOTE)
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
@@ -314,7 +312,10 @@ class Playground:
 
 
 def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> Playground:
-    """A playground for a notebook. robot: as from `fb.load`, or its name. settings: those at first."""
+    """A playground for a notebook.
+
+    robot: as from `fb.load`, or its name. settings: those at first.
+    """
     return Playground(fb.load(robot) if isinstance(robot, str) else robot, settings)
 
 
