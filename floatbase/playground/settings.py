@@ -105,13 +105,11 @@ class Settings(Value):
             raise unknown_name("gait", self.gait, _GAIT_NAMES)
         for name in ("lifted_feet", "assumed_off", "actual_off"):
             self._keep(name, dict.fromkeys(as_strings(name, getattr(self, name))))
-        for name, terms in (
-            ("assumed_off", [term.name for term in EQUATION if term.assumed_switch]),
-            ("actual_off", [term.name for term in EQUATION if term.actual_switch]),
-        ):
-            for term in getattr(self, name):
-                if term not in terms:
-                    raise unknown_name(f"term of {name}", term, terms)
+        for name in ("assumed_off", "actual_off"):
+            terms = [term.name for term in EQUATION if name in term.switches]
+            for off in getattr(self, name):
+                if off not in terms:
+                    raise unknown_name(f"term of {name}", off, terms)
 
     def _entries(self, name: str) -> list[float]:
         """The numbers of a field, as many as its default has."""
