@@ -73,6 +73,7 @@ class Playground:
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self._pause_after_slice = False  # for the reader to press run, after the next slice
         self._requested: dict[str, Any] = {}
+        self._applying: dict[str, Any] = {}  # what the session is changing to just now
         self._lock = threading.Lock()  # over what is requested
         self._drawing_lock = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
@@ -170,7 +171,9 @@ class Playground:
         self.run.reset()
 
     def _start_with(self, settings: Settings) -> None:
-        self.session.change(**asdict(settings))
+        with self._lock:
+            self._applying = asdict(settings)
+        self._change()
         self._panel.show_settings(self.session.settings)
         self._update_run()
         self._update_text()
@@ -178,14 +181,22 @@ class Playground:
     def _apply_requested(self) -> None:
         """Change what was requested, and hand it to the run."""
         with self._lock:
-            changes, self._requested = self._requested, {}
-        if not changes:
-            return
-        restarted = self.session.change(**changes)
+            if not self._requested:
+                return
+            self._applying, self._requested = self._requested, {}
+        restarted = self._change()
         self._update_run()
         self._update_text()
         if restarted:
             self.run.reset()
+
+    def _change(self) -> bool:
+        """Change the session; returns whether it put the robot back on its feet."""
+        try:
+            return self.session.change(**self._applying)
+        finally:
+            with self._lock:
+                self._applying = {}
 
     def _update_run(self) -> None:
         session = self.session
@@ -207,9 +218,9 @@ class Playground:
 
     @property
     def pending_settings(self) -> Settings:
-        """The settings with what is still requested."""
+        """The settings with what is still requested, or being changed."""
         with self._lock:
-            return replace(self.session.settings, **self._requested)
+            return replace(self.session.settings, **self._applying | self._requested)
 
     def show_term(self, term: str, shown: bool) -> None:
         self.shown_terms[term] = shown

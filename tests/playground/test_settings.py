@@ -280,6 +280,25 @@ def test_settings_are_values_with_numbers_of_six_digits() -> None:
     )
 
 
+def test_what_is_being_changed_counts_as_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slider that moves while the session changes keeps what another one has set."""
+    playground = Playground(GO2)
+    try:
+        change, seen = playground.session.change, []
+
+        def watched(**changes: object) -> bool:
+            seen.append(playground.pending_settings.velocity)
+            return change(**changes)
+
+        monkeypatch.setattr(playground.session, "change", watched)
+        playground.set(velocity=(0.5, 0.0, 0.0))
+        playground.set(friction=(0.5, 0.5))
+        assert seen == [(0.5, 0.0, 0.0)] * 2
+        assert playground.pending_settings == playground.session.settings
+    finally:
+        playground.close()
+
+
 def test_an_ellipse_that_grows_keeps_its_phase() -> None:
     playground = Playground(GO2)
     try:
