@@ -32,7 +32,7 @@ from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import ConstantTorques, qp_plots
 from floatbase.qp import table_top
-from floatbase.simulation import LiveSimulation, PerturbedSimulation
+from floatbase.simulation import LiveSimulation
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
 
@@ -111,7 +111,7 @@ def right() -> dict[str, Any]:
     view, qp = fb.Viewer(robot), values()["QP"]
     forces = 30.0 * np.tile(UP, 4)
     return values() | {
-        "Simulation": sim, "PerturbedSimulation": PerturbedSimulation(robot), "Viewer": view,
+        "Simulation": sim, "Viewer": view,
         "WholeBodyController":
         controller(),
         "LiveSimulation": LiveSimulation(sim, controller(), lambda record: None),
@@ -183,12 +183,12 @@ LEFT_OUT = {
         "reveal", "review"),
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
-        "Simulation.advance", "PerturbedSimulation.advance",
+        "Simulation.advance",
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
         "raibert_foothold",
         "target_shapes", "targets_at",
-        "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
+        "QP.objective",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
         "Limits.normal_forces",
         "Limits.bounded_points", "Problem.check",

@@ -25,7 +25,6 @@ from floatbase.dynamics import PointContact
 
 WITHOUT_ARRAYS = (
     "ActiveSetRun",
-    "ModelMismatch",
     "FeasibleSpace",
     "Gains",
     "Gait",
@@ -33,10 +32,8 @@ WITHOUT_ARRAYS = (
     "Residuals",
     "LinearInequality",
     "Table",
-    "Perturbation",
 )
 NO_VALUES = {
-    "physics that changes": "PerturbedSimulation",
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
     "Simulation WholeBodyController",
     "a text": "ConstraintLabel",

@@ -11,7 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
-from floatbase.control import AnalyticController, LinearInequality, ModelMismatch
+from floatbase.control import AnalyticController, LinearInequality
 from floatbase.dynamics import (
     RollingWheel,
     bias_forces,
@@ -23,7 +23,7 @@ from floatbase.dynamics import (
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torques_from_forces
 from floatbase.qp import active_set, table_top
-from floatbase.simulation import Perturbation, PushRecovery, Table
+from floatbase.simulation import PushRecovery, Table
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -81,6 +81,5 @@ def values() -> dict[str, Any]:
         "PushRecovery": PushRecovery(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
         "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan,
         "Gains": Gains(),
-        "ModelMismatch": ModelMismatch(mass=1.2), "Perturbation": Perturbation(mass=1.2),
         "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),
     }  # fmt: skip

@@ -4,7 +4,6 @@ from floatbase.control.analytic import AnalyticController
 from floatbase.control.command import Command
 from floatbase.control.controller import WholeBodyController
 from floatbase.control.limits import Limits, LinearInequality
-from floatbase.control.model_mismatch import ModelMismatch
 from floatbase.control.problem import Problem, build_qp
 
 __all__ = [
@@ -12,7 +11,6 @@ __all__ = [
     "Command",
     "Limits",
     "LinearInequality",
-    "ModelMismatch",
     "Problem",
     "WholeBodyController",
     "build_qp",

@@ -21,8 +21,7 @@ from floatbase._validation import (
 )
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
-from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
-from floatbase.control.problem import Problem, dry_run
+from floatbase.control.problem import ModifyQP, Problem, dry_run
 from floatbase.control.soft import SOFT_CONTACT_WEIGHT, contact_weight_of, with_soft_contacts
 from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
@@ -59,8 +58,11 @@ class WholeBodyController:
         can make a tick infeasible.
     on_infeasible: "raise" raises `InfeasibleError`. "soften" answers a tick without a solution once
         more with contact_weight=1e4, and sets `Command.softened`.
-    mismatch: what is taken for (7), the truth by default, see `floatbase.control.ModelMismatch`;
-        any other takes the reference backend.
+    modify_qp: a function (qp, eom) -> QP that changes the problem before it is solved, called at
+        every control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
+        `EquationsOfMotion` at that state: to add rows that couple q̈, τ and λ, to relax or scale
+        rows of (7), or to change the objective. It returns a QP in the same x, such as
+        `dataclasses.replace(qp, H=…, g=…)`, and takes the reference backend. None changes nothing.
     solver: one of `floatbase.qp.solvers()`.
     backend: "reference" assembles and solves the QP as it is written. "compiled" solves the same
         problem many times faster (`floatbase.control.tick`), with tasks, constraints and
@@ -100,7 +102,7 @@ class WholeBodyController:
         inequalities: Sequence[LinearInequality] = (),
         contact_weight: float | None = None,
         on_infeasible: OnInfeasible = "raise",
-        mismatch: ModelMismatch = NO_MISMATCH,
+        modify_qp: ModifyQP | None = None,
         solver: str = "daqp",
         backend: Backend = "auto",
     ):
@@ -116,10 +118,9 @@ class WholeBodyController:
             inequalities,
             facet_rotation,
         )
-        problem = Problem(robot, contacts, tasks, limits, mismatch)
+        problem = Problem(robot, contacts, tasks, limits, modify_qp)
         if contact_weight is not None:
             problem = _softened(problem, contact_weight)
-        mismatch.check_names(contacts)
         limits.check_names(contacts.names, _foot_frames(robot))
         with dry_run():  # unknown names and shapes that do not fit raise here, not in the loop
             problem.qp(robot.standing())
@@ -142,8 +143,8 @@ class WholeBodyController:
         self._problem, self._settings = problem, (solver, backend, on_infeasible)
         if backend == "reference":
             reason = "it was requested"
-        elif not problem.mismatch.is_exact:
-            reason = "its model mismatch is not zero"
+        elif problem.modify_qp is not None:
+            reason = "modify_qp changes the QP"
         else:
             reason = unsupported_reason(problem, solver)
         compiled = None if reason else CompiledTick(problem)

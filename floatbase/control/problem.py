@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,7 +13,6 @@ import numpy as np
 from floatbase._validation import Array, Value, as_callable, as_instance, as_positive, short_repr
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
-from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
 from floatbase.dynamics import (
     CONSTRAINT_NOISE,
     Block,
@@ -27,6 +26,7 @@ from floatbase.objectives import ForceTask, Task, TorqueTask
 from floatbase.qp import QP, ConstraintLabel
 from floatbase.robots import Robot, State, as_torque_limits
 
+ModifyQP: TypeAlias = Callable[[QP, EquationsOfMotion], QP]  # of `Problem.modify_qp`
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
 # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
@@ -38,6 +38,8 @@ class Problem(Value):
     """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning
     there.
 
+    modify_qp: (qp, eom) -> QP, applied to the assembled QP; None leaves it as it is.
+
     Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not
     fit.
     """
@@ -46,16 +48,13 @@ class Problem(Value):
     contacts: Contacts
     tasks: Sequence[Task]
     limits: Limits
-    mismatch: ModelMismatch = NO_MISMATCH
+    modify_qp: ModifyQP | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (
-            ("robot", Robot),
-            ("contacts", Contacts),
-            ("limits", Limits),
-            ("mismatch", ModelMismatch),
-        ):
+        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits)):
             as_instance(name, getattr(self, name), kind)
+        if self.modify_qp is not None:
+            as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
 
@@ -66,9 +65,17 @@ class Problem(Value):
                 f"the state belongs to another robot, {state.robot!r}, than the problem, "
                 f"{self.robot!r}."
             )
-        return build_qp(
-            equations_of_motion(state, self.contacts, t), self.tasks, self.limits, t, self.mismatch
-        )
+        eom = equations_of_motion(state, self.contacts, t)
+        qp = build_qp(eom, self.tasks, self.limits, t)
+        if self.modify_qp is None:
+            return qp
+        modified = as_instance("the result of modify_qp", self.modify_qp(qp, eom), QP)
+        if modified.blocks != qp.blocks:
+            raise InputError(
+                f"modify_qp changed the blocks of x from {dict(qp.blocks)} to "
+                f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
+            )
+        return modified
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
         """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and
@@ -90,7 +97,6 @@ def build_qp(
     tasks: Sequence[Task],
     limits: Limits,
     t: float = 0.0,
-    mismatch: ModelMismatch = NO_MISMATCH,
 ) -> QP:
     """(26)(27) as a QP in x = (q̈, τ, λ).
 
@@ -103,7 +109,6 @@ def build_qp(
         missing).
     limits: the inequalities.
     t: s, the time that tasks with moving targets are evaluated at.
-    mismatch: what is taken for (7) instead of eom; tasks and user-defined rows see eom.
 
     Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a
     measured velocity that the contacts do not quite allow makes them inconsistent. The rows
@@ -113,7 +118,6 @@ def build_qp(
     """
     as_instance("eom", eom, EquationsOfMotion)
     as_instance("limits", limits, Limits)
-    as_instance("mismatch", mismatch, ModelMismatch)
     if not isinstance(tasks, Sequence) or not all(hasattr(task, "residual") for task in tasks):
         raise InputError(
             f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not "
@@ -121,14 +125,7 @@ def build_qp(
         )
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     inequalities = [each.at(eom, t) for each in limits.inequalities]
-    qp = assemble_qp(
-        mismatch.assumed_equations(eom),
-        costs,
-        limits,
-        limits.normal_forces(eom.contacts, t),
-        inequalities,
-    )
-    return mismatch.assumed_qp(qp, eom)
+    return assemble_qp(eom, costs, limits, limits.normal_forces(eom.contacts, t), inequalities)
 
 
 def assemble_qp(

@@ -157,9 +157,9 @@ def _entries(scene: Scene) -> dict[protocol.Key, bytes]:
     }
 
 
-def bundle(view: Viewer) -> dict[str, Any]:
-    """The mimebundle of one viewer: what it shows now."""
-    return StaticExport([view]).bundle()
+def bundle(view: Viewer, words: str = "") -> dict[str, Any]:
+    """The mimebundle of one viewer: what it shows now. words: what stands below."""
+    return StaticExport([view], words=words).bundle()
 
 
 MIMEBUNDLES[MODE] = bundle

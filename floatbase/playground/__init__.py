@@ -2,11 +2,14 @@
 a page of its own.
 """
 
+from floatbase.playground.build import nodding_rotation
 from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
 from floatbase.playground.equation import EQUATION, SYMBOLS, Term
+from floatbase.playground.mismatch import ModelMismatch
 from floatbase.playground.page import Playground, mean_force_error, playground
+from floatbase.playground.perturbed import BaseMotors, Perturbation, PerturbedSimulation
 from floatbase.playground.real_time_factor import RealTimeFactor
-from floatbase.playground.session import PERIOD, BaseMotors, Session, nodding_rotation
+from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import GAITS, Settings
 from floatbase.playground.term_arrows import term_arrows
 
@@ -19,6 +22,9 @@ __all__ = [
     "BaseMotors",
     "Challenge",
     "Judge",
+    "ModelMismatch",
+    "Perturbation",
+    "PerturbedSimulation",
     "Playground",
     "RealTimeFactor",
     "Session",

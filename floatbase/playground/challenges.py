@@ -288,44 +288,59 @@ _LOCKED_PHYSICS = ("mass", "actual_off", "assumed_off", "slope")
 _LOCKED_STANCE = ("com_shift", "lifted_feet", "nod", "gait", "steps_when_pushed")
 _LOCKED_QP = ("facets", "torque_fraction", "min_normal_force", "weights")
 CHALLENGES = (
-    Challenge("Stand on two feet", "Lift FR and RL, and stand on FL and RR for a second.", _two_feet, locked=_LOCKED_PHYSICS),
-    Challenge("Survive 300 N", "Push it with 300 N from any side; 2 s later it must be on its "
-                               "feet.", _survive, locked=_LOCKED_PHYSICS),
     Challenge(
-        "Down an icy slope", "The ground falls by 20° and is slippery. Press run, and slide 30 cm "
-                             "without falling.", _icy_slope,
-        Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)), ("mass", "actual_off", "assumed_off"),
-        ("slope", "friction"),
+        "Stand on two feet",
+        "Lift FR and RL, and stand on FL and RR for a second.",
+        _two_feet, locked=_LOCKED_PHYSICS,
+    ),
+    Challenge(
+        "Survive 300 N",
+        "Push it with 300 N from any side; 2 s later it must be on its feet.",
+        _survive, locked=_LOCKED_PHYSICS,
+    ),
+    Challenge(
+        "Down an icy slope",
+        "The ground falls by 20° and is slippery. Press run, and slide 30 cm without falling.",
+        _icy_slope, Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)),
+        locked=("mass", "actual_off", "assumed_off"), locked_actual=("slope", "friction"),
         paused=True,
     ),
-    Challenge("On an edge", "Bring a foot's planned force onto an edge of its polyhedron: two "
-                            "active facets.", _on_an_edge, locked=_LOCKED_PHYSICS),
     Challenge(
-        "No answer", "Find settings for which the quadratic program has no solution.", _no_answer,
-        locked=("actual_off", "assumed_off"), end=_infeasible,
+        "On an edge",
+        "Bring a foot's planned force onto an edge of its polyhedron: two active facets.",
+        _on_an_edge, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "Quick foot", "From four feet that carry to a front foot 2 cm in the air in less than 0.5 "
-                      "s; stay so for 1 s.", _quick_foot,
-        locked=_LOCKED_PHYSICS,
+        "No answer",
+        "Find settings for which the quadratic program has no solution.",
+        _no_answer, locked=("actual_off", "assumed_off"), end=_infeasible,
     ),
     Challenge(
-        "Feet that travel", "No foot is lifted, none slips, and all four end 12 mm away from where "
-                            "they stood.", _feet_that_travel,
-        locked=_LOCKED_PHYSICS,
+        "Quick foot",
+        "From four feet that carry to a front foot 2 cm in the air in less than 0.5 s; stay so for "
+        "1 s.",
+        _quick_foot, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "On ice", "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for "
-                  "2 s.", _on_ice,
-        Settings(friction=(0.7, 0.05)), (*_LOCKED_PHYSICS, "gait"), ("friction",),
+        "Feet that travel",
+        "No foot is lifted, none slips, and all four end 12 mm away from where they stood.",
+        _feet_that_travel, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "How many facets?", "The fewest facets with which no direction loses more than 3 % of the "
-                            "cone's friction.", _how_many_facets,
-        locked=_LOCKED_PHYSICS,
+        "On ice",
+        "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for 2 s.",
+        _on_ice, Settings(friction=(0.7, 0.05)),
+        locked=(*_LOCKED_PHYSICS, "gait"), locked_actual=("friction",),
     ),
     Challenge(
-        "The weakest side", "Topple the standing robot with one push of at most 19 N·s.", _topple,
+        "How many facets?",
+        "The fewest facets with which no direction loses more than 3 % of the cone's friction.",
+        _how_many_facets, locked=_LOCKED_PHYSICS,
+    ),
+    Challenge(
+        "The weakest side",
+        "Topple the standing robot with one push of at most 19 N·s.",
+        _topple,
         locked=(*_LOCKED_PHYSICS, "friction", "bandwidth", *_LOCKED_STANCE, *_LOCKED_QP),
         end=_toppled,
     ),

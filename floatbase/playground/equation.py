@@ -1,6 +1,4 @@
-"""The terms of (7) in the playground: how each is written, and which switches it has in the belief
-and in the world.
-"""
+"""The terms of (7) in the playground: how each is written, and which switches it has."""
 
 from __future__ import annotations
 
@@ -24,20 +22,30 @@ class Term(NamedTuple):
     mismatch_option: str = ""
     perturbation_option: str = ""
 
+    @property
+    def switches(self) -> dict[str, str]:
+        """The names of the switches that there are, by the field of `Settings` that they set."""
+        names = {"assumed_off": self.assumed_switch, "actual_off": self.actual_switch}
+        return {field: name for field, name in names.items() if name}
+
 
 EQUATION = (
     Term("inertia", "M q̈"),
     Term(
-        "velocity", "+ C q̇", "Coriolis and centrifugal forces believed", "Coriolis and "
-                                                                          "centrifugal forces in "
-                                                                          "the world",
+        "velocity", "+ C q̇",
+        "Coriolis and centrifugal forces believed",
+        "Coriolis and centrifugal forces in the world",
         "velocity_forces", "velocity_forces",
     ),
     Term("gravity", "+ g", "gravity believed", "gravity in the world", "gravity", "gravity"),
     Term("zeros", "= S τ", "zeros of S believed", "zeros of S in the world", "underactuated"),
     Term("forces", "+ Jᵀλ", "force of one leg believed", "force of one leg in the world"),
     Term("drift", "J̇ q̇", "drift of the contacts believed", "", "drift"),
-    Term("cones", "nᵀλ ≥ 0", "feet that cannot pull believed", "feet that cannot pull in the "
-                                                               "world", "cones"),
+    Term(
+        "cones", "nᵀλ ≥ 0",
+        "feet that cannot pull believed",
+        "feet that cannot pull in the world",
+        "cones",
+    ),
 )  # fmt: skip
 SYMBOLS = {term.name: term.symbol for term in EQUATION}

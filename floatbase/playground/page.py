@@ -12,7 +12,6 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.errors import ViewerError
-from floatbase.lessons import static_export
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
 from floatbase.playground.panel import Panel
@@ -23,7 +22,7 @@ from floatbase.playground.term_arrows import term_arrows
 from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
 from floatbase.viewer import Picture
-from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
 _SITE_NOTE = "The playground needs the live lesson: here its robot stands still."
@@ -74,6 +73,7 @@ class Playground:
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self._pause_after_slice = False  # for the reader to press run, after the next slice
         self._requested: dict[str, Any] = {}
+        self._applying: dict[str, Any] = {}  # what the session is changing to just now
         self._lock = threading.Lock()  # over what is requested
         self._drawing_lock = threading.Lock()  # the run draws, and so does who pauses it
         session = self.session
@@ -126,7 +126,7 @@ class Playground:
     def set(self, **changes: Any) -> None:
         """Change settings, fields of `Settings`; the run takes them over before its next slice.
 
-        Raises `TypeError` for a name that is none.
+        Raises `TypeError` for a name that is none, `InputError` for a value that cannot be.
         """
         replace(self.session.settings, **changes)
         with self._lock:
@@ -171,7 +171,9 @@ class Playground:
         self.run.reset()
 
     def _start_with(self, settings: Settings) -> None:
-        self.session.change(**asdict(settings))
+        with self._lock:
+            self._applying = asdict(settings)
+        self._change()
         self._panel.show_settings(self.session.settings)
         self._update_run()
         self._update_text()
@@ -179,14 +181,22 @@ class Playground:
     def _apply_requested(self) -> None:
         """Change what was requested, and hand it to the run."""
         with self._lock:
-            changes, self._requested = self._requested, {}
-        if not changes:
-            return
-        restarted = self.session.change(**changes)
+            if not self._requested:
+                return
+            self._applying, self._requested = self._requested, {}
+        restarted = self._change()
         self._update_run()
         self._update_text()
         if restarted:
             self.run.reset()
+
+    def _change(self) -> bool:
+        """Change the session; returns whether it put the robot back on its feet."""
+        try:
+            return self.session.change(**self._applying)
+        finally:
+            with self._lock:
+                self._applying = {}
 
     def _update_run(self) -> None:
         session = self.session
@@ -208,9 +218,9 @@ class Playground:
 
     @property
     def pending_settings(self) -> Settings:
-        """The settings with what is still requested."""
+        """The settings with what is still requested, or being changed."""
         with self._lock:
-            return replace(self.session.settings, **self._requested)
+            return replace(self.session.settings, **self._applying | self._requested)
 
     def show_term(self, term: str, shown: bool) -> None:
         self.shown_terms[term] = shown
@@ -225,8 +235,7 @@ class Playground:
                 self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
-            code = self.session.settings.code(self.robot, PERIOD, self._last_push)
-            self.view.add_text("code", code, "as Python", code=True)
+            self.view.add_text("code", self.session.code(self._last_push), "as Python", code=True)
 
     def _on_status(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
@@ -303,9 +312,9 @@ class Playground:
         )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        if display_mode() == "site":
+        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             self.view.show(self.session.sim.state, self.session.sim.feet)
-            return static_export.StaticExport([self.view], words=_SITE_NOTE).bundle()
+            return bundle(self.view, words=_SITE_NOTE)
         return self.start().view._repr_mimebundle_(**kwargs)
 
     def __repr__(self) -> str:
@@ -314,7 +323,10 @@ class Playground:
 
 
 def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> Playground:
-    """A playground for a notebook. robot: as from `fb.load`, or its name. settings: those at first."""
+    """A playground for a notebook.
+
+    robot: as from `fb.load`, or its name. settings: those at first.
+    """
     return Playground(fb.load(robot) if isinstance(robot, str) else robot, settings)
 
 

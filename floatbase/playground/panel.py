@@ -5,8 +5,9 @@ settings.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from floatbase.playground.challenges import CHALLENGES
 from floatbase.playground.equation import EQUATION
@@ -17,13 +18,61 @@ if TYPE_CHECKING:
     from floatbase.playground.page import Playground
 
 _MAX_PUSH = 2.5  # times the weight: a push that asks for steps
-_PAIRED_SLIDERS = {  # name: (attribute, low, high, step)
-    "friction": ("friction", 0.05, 1.5, 0.05),
-    "slope [°]": ("slope", -30.0, 30.0, 1.0),
-    "mass [×]": ("mass", 0.5, 2.0, 0.05),
-    "motors [Hz]": ("bandwidth", 1.0, IDEAL_BANDWIDTH, 1.0),
-}
-_WEIGHTS = ("motion", "posture", "effort")
+_PAIRED = "believed and true"  # section of sliders with a column each for what is believed and true
+_QP = "its quadratic program"
+
+
+class _Slider(NamedTuple):
+    """A slider for a number of `Settings`: an entry of a field, or the field itself."""
+
+    name: str
+    field: str
+    entry: int | None
+    low: float
+    high: float
+    step: float
+    section: str
+    column: str = ""
+    exponent: bool = False  # whether it sets the power of ten
+
+    def shown(self, settings: Settings) -> float:
+        """Where the slider is for these settings, within its range."""
+        value = getattr(settings, self.field)
+        value = value if self.entry is None else value[self.entry]
+        value = math.log10(value) if self.exponent else value
+        return min(max(value, self.low), self.high)
+
+
+_PAIRED_SLIDERS = tuple(
+    _Slider(f"{name} {column}", field, index, low, high, step, _PAIRED, column)
+    for name, field, low, high, step in (
+        ("friction", "friction", 0.05, 1.5, 0.05),
+        ("slope [°]", "slope", -30.0, 30.0, 1.0),
+        ("mass [×]", "mass", 0.5, 2.0, 0.05),
+        ("motors [Hz]", "bandwidth", 1.0, IDEAL_BANDWIDTH, 1.0),
+    )
+    for index, column in enumerate(("believed", "true"))
+)
+_STANCE_SLIDERS = tuple(
+    _Slider(f"CoM {axis} [m]", "com_shift", index, -0.08, 0.08, 0.005, "its stance")
+    for index, axis in enumerate("xyz")
+)
+_NOD_SLIDER = _Slider("nod and turn", "nod", None, 0.0, 0.35, 0.01, "its stance")
+_STEP_SLIDERS = (
+    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, "its steps"),
+    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, "its steps"),
+    _Slider("turn [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, "its steps"),
+)
+_QP_SLIDERS = (
+    _Slider("facets", "facets", None, 3, 16, 1, _QP),
+    _Slider("torque limits [×]", "torque_fraction", None, 0.05, 1.0, 0.05, _QP),
+    _Slider("least force [N]", "min_normal_force", None, 0.0, 100.0, 5.0, _QP),
+    *(
+        _Slider(f"{name} ×10^", "weights", index, -3.0, 3.0, 0.5, _QP, exponent=True)
+        for index, name in enumerate(("motion", "posture", "effort"))
+    ),
+)
+_SWITCH_WORDS = {"assumed_off": "believed", "actual_off": "world"}  # what is written on a switch
 _FREE_PLAY = "play freely"
 
 
@@ -35,79 +84,47 @@ class Panel:
         self._add()
 
     def _add(self) -> None:
-        view, weight, s = (
-            self._playground.view,
-            self._playground.robot.weight,
-            self._playground.session.settings,
-        )
-        view.add_button("run", self._playground.run.start)
-        view.add_button("pause", self._playground.run.pause)
-        view.add_button("reset", self._playground.run.reset)
-        view.add_button("push", self._playground.push)
-        view.add_button("all as at first", self._playground.reset_all)
-        view.add_slider("speed", self._playground.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
-        view.add_slider(
-            "push [N]",
-            partial(setattr, self._playground, "force"),
-            self._playground.force,
-            0.0,
-            _MAX_PUSH * weight,
-            1.0,
-        )
-        view.add_slider(
-            "towards [°]",
-            partial(setattr, self._playground, "towards"),
-            self._playground.towards,
-            -180.0,
-            180.0,
-            5.0,
-        )
-        if not self._playground.robot.is_floating:
+        play, view = self._playground, self._playground.view
+        view.add_button("run", play.run.start)
+        view.add_button("pause", play.run.pause)
+        view.add_button("reset", play.run.reset)
+        view.add_button("push", play.push)
+        view.add_button("all as at first", play.reset_all)
+        view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
+        most = _MAX_PUSH * play.robot.weight
+        view.add_slider("push [N]", partial(setattr, play, "force"), play.force, 0.0, most, 1.0)
+        towards = partial(setattr, play, "towards")
+        view.add_slider("towards [°]", towards, play.towards, -180.0, 180.0, 5.0)
+        if not play.robot.is_floating:
             return
+        settings = play.session.settings
         self._add_challenges()
-        for name, (attribute, low, high, step) in _PAIRED_SLIDERS.items():
-            for i, column in enumerate(("believed", "true")):
-                value, changed = getattr(s, attribute)[i], partial(self._set_entry, attribute, i)
-                word = "perfect" if high == IDEAL_BANDWIDTH else ""
-                view.add_slider(
-                    f"{name} {column}",
-                    changed,
-                    value,
-                    low,
-                    high,
-                    step,
-                    "believed and true",
-                    column,
-                    word,
-                )
-        self._add_stance()
-        self._add_walk()
-        where = "its quadratic program"
-        view.add_slider(
-            "facets", lambda n: self._playground.set(facets=round(n)), s.facets, 3, 16, 1, where
-        )
-        view.add_slider(
-            "torque limits [×]",
-            lambda x: self._playground.set(torque_fraction=x),
-            s.torque_fraction,
-            0.05,
-            1.0,
-            0.05,
-            where,
-        )
-        view.add_slider(
-            "least force [N]",
-            lambda x: self._playground.set(min_normal_force=x),
-            s.min_normal_force,
-            0.0,
-            100.0,
-            5.0,
-            where,
-        )
-        for i, name in enumerate(_WEIGHTS):
-            changed = partial(self._set_weight, i)
-            view.add_slider(f"{name} ×10^", changed, 0.0, -3.0, 3.0, 0.5, where)
+        self._add_sliders(_PAIRED_SLIDERS)
+        for foot in play.robot.feet:
+            changed = partial(self._set_foot_contact, foot.frame)
+            stands = foot.frame not in settings.lifted_feet
+            view.add_checkbox(f"on {foot.frame}", changed, stands, "its stance")
+        self._add_sliders(_STANCE_SLIDERS)
+        self._add_slider(_NOD_SLIDER, play.set_nodding)
+        if self._gait_names:
+            choices = ["stand", "step when pushed", *self._gait_names]
+            number = self._gait_number(settings)
+            view.add_dropdown("gait", self._set_gait, choices, number, "its steps")
+            self._add_sliders(_STEP_SLIDERS)
+        self._add_sliders(_QP_SLIDERS)
         self._add_terms()
+
+    def _add_sliders(self, sliders: Sequence[_Slider]) -> None:
+        for slider in sliders:
+            self._add_slider(slider, partial(self._set_number, slider))
+
+    def _add_slider(self, slider: _Slider, changed: Callable[[float], None]) -> None:
+        name, _, _, low, high, step, section, column, _ = slider
+        value = slider.shown(self._playground.session.settings)
+        at_most = "perfect" if slider.field == "bandwidth" else ""
+        self._playground.view.add_slider(
+            name, changed, value, low, high, step, section, column, at_most
+        )
 
     def _add_challenges(self) -> None:
         if self._playground.robot.name in {challenge.robot for challenge in CHALLENGES}:
@@ -121,102 +138,38 @@ class Panel:
                 titles,
             )
 
-    def _add_stance(self) -> None:
-        view = self._playground.view
-        for foot in self._playground.robot.feet:
-            view.add_checkbox(
-                f"on {foot.frame}", partial(self._set_foot_contact, foot.frame), True, "its stance"
-            )
-        for i, axis in enumerate("xyz"):
-            view.add_slider(
-                f"CoM {axis} [m]",
-                partial(self._set_entry, "com_shift", i),
-                0.0,
-                -0.08,
-                0.08,
-                0.005,
-                "its stance",
-            )
-        view.add_slider(
-            "nod and turn", self._playground.set_nodding, 0.0, 0.0, 0.35, 0.01, "its stance"
-        )
-
-    def _add_walk(self) -> None:
-        view, gaits = self._playground.view, self._gait_names
-        if not gaits:
-            return
-        view.add_dropdown(
-            "gait", self._set_gait, ["stand", "step when pushed", *gaits], 0, "its steps"
-        )
-        view.add_slider(
-            "forwards [m/s]",
-            partial(self._set_entry, "velocity", 0),
-            0.0,
-            -0.3,
-            0.5,
-            0.05,
-            "its steps",
-        )
-        view.add_slider(
-            "to the left [m/s]",
-            partial(self._set_entry, "velocity", 1),
-            0.0,
-            -0.2,
-            0.2,
-            0.05,
-            "its steps",
-        )
-        view.add_slider(
-            "turn [rad/s]",
-            partial(self._set_entry, "velocity", 2),
-            0.0,
-            -0.5,
-            0.5,
-            0.05,
-            "its steps",
-        )
-
     def _add_terms(self) -> None:
         view = self._playground.view
         for name, (colour, meaning) in TERM_LEGEND.items():
             view.add_legend_entry(f"term {name}", colour, meaning)
         for term in EQUATION:
             show = partial(self._playground.show_term, term.name)
-            view.add_toggle(
-                f"show {term.name}",
-                show,
-                self._playground.shown_terms[term.name],
-                term.symbol,
-                "shown",
-            )
-            if term.assumed_switch:
-                view.add_toggle(
-                    term.assumed_switch,
-                    partial(self._set_term, "assumed_off", term.name),
-                    True,
-                    term.symbol,
-                    "believed",
-                )
-            if term.actual_switch:
-                view.add_toggle(
-                    term.actual_switch,
-                    partial(self._set_term, "actual_off", term.name),
-                    True,
-                    term.symbol,
-                    "world",
-                )
+            shown = self._playground.shown_terms[term.name]
+            view.add_toggle(f"show {term.name}", show, shown, term.symbol, "shown")
+            for field, switch in term.switches.items():
+                changed = partial(self._set_term, field, term.name)
+                on = term.name not in getattr(self._playground.session.settings, field)
+                view.add_toggle(switch, changed, on, term.symbol, _SWITCH_WORDS[field])
 
     @property
     def _gait_names(self) -> list[str]:
         return list(GAITS.get(len(self._playground.robot.feet), {}))
 
-    def _set_entry(self, attribute: str, i: int, value: float) -> None:
-        values = list(getattr(self._playground.pending_settings, attribute))
-        values[i] = value
-        self._playground.set(**{attribute: tuple(values)})
+    def _gait_number(self, settings: Settings) -> int:
+        """The number of the gait among the choices."""
+        if settings.gait is not None:
+            return 2 + self._gait_names.index(settings.gait)
+        return int(settings.steps_when_pushed)
 
-    def _set_weight(self, i: int, exponent: float) -> None:
-        self._set_entry("weights", i, 10.0**exponent)
+    def _set_number(self, slider: _Slider, value: float) -> None:
+        value = 10.0**value if slider.exponent else value
+        if slider.entry is None:
+            whole = slider.field == "facets"
+            self._playground.set(**{slider.field: round(value) if whole else value})
+            return
+        values = list(getattr(self._playground.pending_settings, slider.field))
+        values[slider.entry] = value
+        self._playground.set(**{slider.field: tuple(values)})
 
     def _set_foot_contact(self, foot: str, stands: bool) -> None:
         lifted = [name for name in self._playground.pending_settings.lifted_feet if name != foot]
@@ -229,12 +182,10 @@ class Panel:
         )
 
     def _set_term(self, attribute: str, term: str, on: bool) -> None:
-        off = tuple(
-            name for name in getattr(self._playground.pending_settings, attribute) if name != term
-        )
-        self._playground.set(
-            **{attribute: off if on else (*off, term)}, leg=self._playground.robot.feet[0].frame
-        )
+        settings, feet = self._playground.pending_settings, self._playground.robot.feet
+        off = tuple(name for name in getattr(settings, attribute) if name != term)
+        leg = feet[0].frame if feet else ""
+        self._playground.set(**{attribute: off if on else (*off, term)}, leg=leg)
 
     def show_view_settings(self, speed: float) -> None:
         """Show the push, the speed (simulated over real time) and the shown terms at their
@@ -251,46 +202,20 @@ class Panel:
         for name, value in values.items():
             play.view.set_control_value(name, value)
 
-    def show_settings(self, s: Settings) -> None:
+    def show_settings(self, settings: Settings) -> None:
         """Show settings at the controls, which only a floating robot has."""
         if not self._playground.robot.is_floating:
             return
-        view = self._playground.view
-        values: dict[str, Any] = {
-            "facets": s.facets,
-            "nod and turn": s.nod,
-            "torque limits [×]": s.torque_fraction,
-        }
-        values["least force [N]"] = s.min_normal_force
-        for name, (attribute, *_) in _PAIRED_SLIDERS.items():
-            values |= dict(
-                zip((f"{name} believed", f"{name} true"), getattr(s, attribute), strict=True)
-            )
-        values |= {
-            f"on {foot.frame}": foot.frame not in s.lifted_feet
-            for foot in self._playground.robot.feet
-        }
-        values |= {f"CoM {axis} [m]": value for axis, value in zip("xyz", s.com_shift, strict=True)}
-        values |= {
-            f"{name} ×10^": math.log10(value)
-            for name, value in zip(_WEIGHTS, s.weights, strict=True)
-        }
+        sliders = [*_PAIRED_SLIDERS, *_STANCE_SLIDERS, _NOD_SLIDER, *_QP_SLIDERS]
+        values: dict[str, Any] = {}
         if self._gait_names:
-            values["gait"] = (
-                1
-                if s.steps_when_pushed
-                else 0
-                if s.gait is None
-                else 2 + self._gait_names.index(s.gait)
-            )
-            names = ("forwards [m/s]", "to the left [m/s]", "turn [rad/s]")
-            values |= dict(zip(names, s.velocity, strict=True))
+            sliders += _STEP_SLIDERS
+            values["gait"] = self._gait_number(settings)
+        values |= {slider.name: slider.shown(settings) for slider in sliders}
+        for foot in self._playground.robot.feet:
+            values[f"on {foot.frame}"] = foot.frame not in settings.lifted_feet
         for term in EQUATION:
-            values |= (
-                {term.assumed_switch: term.name not in s.assumed_off} if term.assumed_switch else {}
-            )
-            values |= (
-                {term.actual_switch: term.name not in s.actual_off} if term.actual_switch else {}
-            )
+            for field, switch in term.switches.items():
+                values[switch] = term.name not in getattr(settings, field)
         for name, value in values.items():
-            view.set_control_value(name, value)
+            self._playground.view.set_control_value(name, value)

@@ -1,4 +1,4 @@
-"""The terms of (7) as arrows in the picture: what each of them is, at the last instant of a record."""
+"""The terms of (7) as arrows in the picture, at the last instant of a record."""
 
 from __future__ import annotations
 

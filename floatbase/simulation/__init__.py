@@ -9,7 +9,6 @@ from floatbase.simulation.live import (
     LiveSimulation,
     status_message,
 )
-from floatbase.simulation.perturbed import Perturbation, PerturbedSimulation
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
 from floatbase.simulation.record import Rollout
@@ -26,8 +25,6 @@ __all__ = [
     "Conversion",
     "Ground",
     "LiveSimulation",
-    "Perturbation",
-    "PerturbedSimulation",
     "Push",
     "PushRecovery",
     "Rollout",

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.control import AnalyticController, Limits, LinearInequality, ModelMismatch
+from floatbase.control import AnalyticController, Limits, LinearInequality
 from floatbase.errors import InputError, UnknownNameError
 
 GO2, SOLO = judges.load("go2"), judges.load("solo12")
@@ -201,10 +202,17 @@ def analytic(**swap: object) -> AnalyticController:
             18,
         ),
         (
-            lambda: controller(mismatch=ModelMismatch(ignored_contacts=["FL_fot"])),
-            UnknownNameError,
-            "FL_fot",
-            "FL_foot",
+            lambda: controller(modify_qp=lambda qp: qp),
+            InputError,
+            "modify_qp",
+            "eom",
+        ),
+        (lambda: controller(modify_qp=lambda qp, eom: None), InputError, "modify_qp", "QP"),
+        (
+            lambda: controller(modify_qp=lambda qp, eom: replace(qp, blocks={})),
+            InputError,
+            "modify_qp",
+            "blocks",
         ),
         (
             lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)),

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.control import ModelMismatch
 from floatbase.lessons import all_exercises
 from floatbase.lessons.lessonX import (
     FAULTS,
@@ -40,6 +39,7 @@ from floatbase.lessons.lessonX import (
     show_instant,
     sliding_friction_ratios,
 )
+from floatbase.playground import ModelMismatch
 
 SEEDS = (
     1,
@@ -198,7 +198,7 @@ def test_the_mistaken_controllers_are_those_of_belief() -> None:
     state = judges.load("go2").standing()
     tasks = fb.standing_tasks(state)
     heavy = fb.WholeBodyController(
-        state.robot, fb.Contacts.points(state.robot), tasks, mismatch=ModelMismatch(mass=1.2)
+        state.robot, fb.Contacts.points(state.robot), tasks, modify_qp=ModelMismatch(mass=1.2)
     )
     assert heavy(state.q, state.v).forces[2::3].sum() == pytest.approx(
         1.2 * state.robot.weight, rel=1e-3

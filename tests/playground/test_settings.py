@@ -1,17 +1,22 @@
-"""What the playground shows as Python is what it runs: pasted elsewhere, it makes the same robot."""
+"""The program that the playground shows makes the same robot as the playground runs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import judges
 import numpy as np
 import pytest
+from messages import raises
 
 import floatbase as fb
+from floatbase.behaviours import Gait
+from floatbase.errors import FloatbaseError, InputError
 from floatbase.playground import (
+    PERIOD,
     BaseMotors,
     Playground,
     Session,
@@ -39,55 +44,78 @@ EACH = {
     "terms off": Settings(assumed_off=("velocity", "drift", "cones"), actual_off=("velocity",)),
     "motors of the base": Settings(assumed_off=("zeros",), actual_off=("zeros",)),
     "a leg unfelt": Settings(assumed_off=("forces",), actual_off=("forces",), leg="FR_foot"),
+    "it trots otherwise": Settings(
+        gait="crawl", mass=(1.1, 1.0), assumed_off=("drift",), facets=5, start_time=0.2
+    ),
+    "it steps on a slope": Settings(steps_when_pushed=True, slope=(2.0, 3.0)),
+    "slowly": Settings(bandwidth=(1.2, 9.0), weights=(10.0**0.5, 1.0, 1.0), nod=0.1),
+    "motors of a lighter base": Settings(
+        assumed_off=("gravity", "velocity"), actual_off=("zeros",), mass=(1.3, 1.0)
+    ),
+    "on two feet": Settings(com_shift=(-0.02, 0.0, 0.0), lifted_feet=("FR_foot", "RL_foot")),
     "no gravity": Settings(assumed_off=("gravity",), actual_off=("gravity",)),
 }
 SECONDS = 1.0  # of the program's three: the push is over, a trot is under way
 
 
 def run_of(code: str) -> fb.Rollout:
-    """The rollout of a program."""
+    """The rollout of a program, of `SECONDS` instead of 3 s."""
     names: dict[str, Any] = {}
-    exec(code, names)
+    assert code.count(", controller, 3, ") == 1
+    exec(code.replace(", controller, 3, ", f", controller, {SECONDS}, "), names)
     run: fb.Rollout = names["run"]
     return run
 
 
-@pytest.mark.parametrize("name", EACH)
-def test_the_program_runs_and_makes_the_same_robot(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    settings, period = EACH[name], 4e-3
-    session = Session(GO2, settings)
-    push = fb.Push([20.0, -10.0, 0.0], 0.5)
+def assert_same_run(robot: fb.Robot, settings: Settings, push: fb.Push | None = None) -> None:
+    """The program of a session makes what the session has, bit for bit."""
+    session = Session(robot, settings)
     here = fb.rollout(
-        session.sim,
-        session.controller,
-        SECONDS,
-        [push],
-        control_period=period,
-        actuators=session.actuators,
-    )
-    program = settings.code(GO2, period, push)
-    assert ", controller, 3, [" in program
-    there = run_of(program.replace(", controller, 3, [", f", controller, {SECONDS}, ["))
-    assert (
-        here.outcome == there.outcome
-        and np.array_equal(here.q, there.q)
-        and np.array_equal(here.planned, there.planned)
-    )
-    assert there.outcome in capsys.readouterr().out
+        session.sim, session.controller, SECONDS, [] if push is None else [push],
+        control_period=PERIOD, actuators=session.actuators,
+    )  # fmt: skip
+    there = run_of(session.code(push))
+    assert here.outcome == there.outcome and here.robot == there.robot
+    for name in ("q", "v", "tau", "planned", "measured"):
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name), err_msg=name)
 
 
-def test_the_program_of_a_robot_of_ones_own_loads_its_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", EACH)
+def test_the_program_makes_the_same_run(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert_same_run(GO2, EACH[name], fb.Push([20.0, -10.0, 0.0], 0.5))
+    assert " at " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["ur5", "g1"])
+def test_the_program_of_an_arm_and_of_a_biped_makes_the_same_run(name: str) -> None:
+    robot = judges.load(name)
+    walk = {"gait": "walk", "velocity": (0.1, 0.0, 0.0)} if robot.is_floating else {}
+    assert_same_run(robot, Settings(com_shift=(0.01, 0.0, 0.0), **walk))
+
+
+@pytest.mark.parametrize(
+    "names", [("it's", 'a "quoted" \\ foot'), ("__import__('os')", "'); 1/0; ('")]
+)
+def test_names_of_feet_are_written_as_texts_and_run_nothing(
+    names: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "my.urdf").write_text(judges.load("solo12").urdf)
+    """Of a robot from a file, whose feet have other names."""
+    urdf = judges.load("solo12").urdf
+    for old, new in zip(("FL_FOOT", "HR_FOOT"), names, strict=True):
+        urdf = urdf.replace(f'"{old}"', quoteattr(new))
+    (tmp_path / "solo12.urdf").write_text(urdf)
     monkeypatch.chdir(tmp_path)
-    assert "fb.load('double_pendulum')" in Settings().code(judges.load("double_pendulum"), 4e-3)
-    own = fb.load_urdf(
-        "my.urdf", feet=["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"], foot_radius=0.02
-    )
-    assert run_of(Settings().code(own, 4e-3)).robot == own
+    first, last = names
+    robot = fb.load_urdf("solo12.urdf", feet=[first, "FR_FOOT", "HL_FOOT", last], foot_radius=0.02)
+    assert_same_run(robot, Settings(lifted_feet=(first,), friction=(0.6, 0.7), slope=(1.0, 2.0)))
+    off = {"assumed_off": ("forces", "drift"), "actual_off": ("forces",)}
+    assert_same_run(robot, Settings(leg=last, **off))
+    push = fb.Push([1.0, 0.0, 0.0], 0.5, frame=last)
+    assert_same_run(robot, Settings(), push)
+
+
+def test_a_robot_of_the_catalogue_is_loaded_by_its_name() -> None:
+    assert "fb.load('double_pendulum')" in Session(judges.load("double_pendulum")).code()
 
 
 @pytest.mark.parametrize("name", EACH)
@@ -105,30 +133,76 @@ def test_changes_lead_where_a_beginning_with_them_leads(name: str) -> None:
     assert np.array_equal(runs[0].q, runs[1].q)
 
 
-def test_what_cannot_be_is_told_and_the_robot_goes_on() -> None:
-    session = Session(GO2)
-    before = session.controller
-    session.change(facets=2)
-    assert "facets" in session.refusal and session.controller is before
-    session.change(facets=5)
-    assert session.refusal == "" and session.controller is not before
+REFUSED = {
+    "a polyhedron with two facets": {"facets": 2, "mass": (1.0, 1.3)},
+    "a leg that is none, in another world": {
+        "slope": (10.0, 10.0), "friction": (0.5, 0.5), "assumed_off": ("forces",), "leg": "paw",
+    },
+    "a leg that is none, on weak actuators": {
+        "actual_off": ("forces",), "leg": "paw", "bandwidth": (5.0, 5.0), "mass": (1.0, 2.0),
+    },
+    "a foot that is none": {"lifted_feet": ("paw",), "mass": (1.0, 1.3), "bandwidth": (9.0, 9.0)},
+    "a gait of others": {"gait": "walk", "friction": (0.2, 0.2)},
+}  # fmt: skip
 
 
-def test_the_program_is_what_runs_after_a_change_was_refused() -> None:
-    """Nothing of a refused change stays, in the world or on the page, and a reset after it finds
-    its controller.
-    """
-    session = Session(GO2)
-    for changes in ({"facets": 2, "mass": (1.0, 1.3)}, {"facets": 2, "slope": (10.0, 10.0)}):
-        assert session.change(**changes) == ("slope" in changes)
-        assert session.refusal and np.isclose(session.sim.model.body_mass.sum(), GO2.mass)
+@pytest.mark.parametrize("first", ["as it begins", "it trots", "motors of the base"])
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_refused_change_leaves_everything_as_it_was(first: str, name: str) -> None:
+    """A session that refused goes on as one that was not asked does, also after a reset."""
+    asked, other = Session(GO2, EACH[first]), Session(GO2, EACH[first])
+    for session in (asked, other):
+        session.observe(fb.rollout(session.sim, session.controller, 0.1, control_period=PERIOD))
+    before = dict(vars(asked))
+    assert asked.change(**REFUSED[name]) is False and asked.refusal
+    assert vars(asked) == before | {"refusal": asked.refusal}
+    runs = []
+    for session in (asked, other):
+        runs.append(fb.rollout(session.sim, session.controller, 0.1, control_period=PERIOD))
         session.sim.reset()
         session.after_reset()
-        here = fb.rollout(
-            session.sim, session.controller, 0.2, control_period=4e-3, actuators=session.actuators
-        )
-        there = run_of(session.settings.code(GO2, 4e-3))
-        assert np.array_equal(here.q, there.q[: len(here)])
+        runs.append(fb.rollout(session.sim, session.controller, 0.1, control_period=PERIOD))
+    for mine, others in zip(runs[:2], runs[2:], strict=True):
+        assert np.array_equal(mine.q, others.q) and np.array_equal(mine.tau, others.tau)
+    assert asked.change(facets=5) is False and asked.refusal == ""
+
+
+def test_a_walk_goes_on_where_its_velocity_or_gait_changes() -> None:
+    session = Session(GO2, Settings(gait="trot"))
+    walk = session.walk
+    session.change(velocity=(0.2, 0.0, 0.1))
+    session.change(gait="crawl", start_time=0.5)
+    assert session.walk is walk and session.controller is walk
+    assert walk.velocity.tolist() == [0.2, 0.0] and walk.yaw_rate == 0.1
+    assert walk.gait == Gait.crawl(GO2, start=1.5) or walk.gait.start == 1.5
+    session.change(gait=None)
+    assert session.walk is walk and walk.gait.stop == session.sim.time
+    session.change(gait="trot")
+    assert session.walk is not walk
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("friction", (0.7, 0.0)), ("friction", 0.7), ("friction", ("a", "b")), ("slope", (0, 90)),
+        ("mass", (1.0, -1.0)), ("mass", (1.0, np.nan)), ("bandwidth", (0.0, 5.0)),
+        ("facets", 2), ("facets", 4.5), ("lifted_feet", "FL_foot"), ("lifted_feet", (1,)),
+        ("com_shift", (0.0, 0.0)), ("nod", -0.1), ("nod", "a little"), ("torque_fraction", 0.0),
+        ("torque_fraction", 1.5), ("min_normal_force", -1.0), ("weights", (1.0, 1.0, 0.0)),
+        ("gait", "gallop"), ("gait", 1), ("velocity", (50.0, 0.0, 0.0)), ("leg", None),
+        ("steps_when_pushed", "no"), ("assumed_off", ("inertia",)), ("actual_off", ("drift",)),
+        ("actual_off", "gravity"), ("start_time", np.inf),
+    ],
+)  # fmt: skip
+def test_settings_that_cannot_be_are_refused_by_name(field: str, value: object) -> None:
+    with pytest.raises(FloatbaseError, match=field):
+        Settings(**{field: value})
+
+
+def test_a_robot_without_the_feet_for_a_gait_is_told_so() -> None:
+    for settings in (Settings(gait="trot"), Settings(steps_when_pushed=True)):
+        with raises(InputError, "ur5", "feet", 2, 4):
+            Session(judges.load("ur5"), settings)
 
 
 def test_motors_of_the_base_that_are_taken_away_push_no_more() -> None:
@@ -199,9 +273,30 @@ def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> No
         assert np.allclose((w1 - w0) / (2 * h), alpha, atol=1e-3)
 
 
-def test_settings_keep_their_kind_when_replaced() -> None:
-    assert replace(Settings(), gait="trot").gait == "trot"
-    assert Settings().is_nominal and not Settings(mass=(1.0, 1.1)).is_nominal
+def test_settings_are_values_with_numbers_of_six_digits() -> None:
+    assert replace(Settings(), gait="trot") == Settings(gait="trot") != Settings()
+    assert Settings(weights=(10.0**0.5, 1, 1), lifted_feet=["a", "a"]) == Settings(
+        weights=(3.16228, 1.0, 1.0), lifted_feet=("a",)
+    )
+
+
+def test_what_is_being_changed_counts_as_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slider that moves while the session changes keeps what another one has set."""
+    playground = Playground(GO2)
+    try:
+        change, seen = playground.session.change, []
+
+        def watched(**changes: object) -> bool:
+            seen.append(playground.pending_settings.velocity)
+            return change(**changes)
+
+        monkeypatch.setattr(playground.session, "change", watched)
+        playground.set(velocity=(0.5, 0.0, 0.0))
+        playground.set(friction=(0.5, 0.5))
+        assert seen == [(0.5, 0.0, 0.0)] * 2
+        assert playground.pending_settings == playground.session.settings
+    finally:
+        playground.close()
 
 
 def test_an_ellipse_that_grows_keeps_its_phase() -> None:

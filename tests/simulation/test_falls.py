@@ -16,7 +16,8 @@ import pytest
 from waiting import until
 
 import floatbase as fb
-from floatbase.simulation import LiveSimulation, Perturbation, PerturbedSimulation
+from floatbase.playground import Perturbation, PerturbedSimulation
+from floatbase.simulation import LiveSimulation
 
 # m below the ground, at most: a contact that carries a robot gives by less than a millimetre
 DEPTH = 5e-3

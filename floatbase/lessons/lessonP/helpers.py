@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 import floatbase as fb
 from floatbase.dynamics import Contacts
-from floatbase.simulation import Perturbation, PerturbedSimulation, Rollout
+from floatbase.playground import Perturbation, PerturbedSimulation
+from floatbase.simulation import Rollout
 
 MU, PERIOD = 0.7, 4e-3  # friction; s between ticks
 BAG_MASS = 6.0  # kg, of exercise P.1

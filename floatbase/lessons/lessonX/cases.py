@@ -13,12 +13,13 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
-from floatbase.control import Command, ModelMismatch
+from floatbase.control import Command
 from floatbase.errors import unknown_name
 from floatbase.lessons.lesson06 import state_with_feet_at
 from floatbase.lessons.lessonA import elliptic_rotation
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.objectives import Task
+from floatbase.playground import ModelMismatch
 from floatbase.simulation import Actuators, Rollout
 
 MU = 1.2  # friction that controllers are told: rubber on a rough mat
@@ -93,7 +94,12 @@ class TwistController:
         ]
         self.contacts, self.planned = contacts, list[Array]()
         self._controller = fb.WholeBodyController(
-            state.robot, contacts, tasks, facets=FACETS, mismatch=mismatch, on_infeasible="soften"
+            state.robot,
+            contacts,
+            tasks,
+            facets=FACETS,
+            modify_qp=None if mismatch.is_exact else mismatch,
+            on_infeasible="soften",
         )
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 VARIABLE = "FLOATBASE_VIEWER"  # in the environment
-# display mode -> what makes the mimebundle of a viewer in that mode; programs that publish
-# notebooks add theirs
-MIMEBUNDLES: dict[str, Callable[[Any], dict[str, Any]]] = {}
+# display mode -> what makes the mimebundle of a viewer in that mode, with `words` below it;
+# programs that publish notebooks add theirs
+MIMEBUNDLES: dict[str, Callable[..., dict[str, Any]]] = {}
 
 
 def display_mode() -> str:

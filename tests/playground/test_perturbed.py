@@ -12,18 +12,16 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import ModelMismatch
 from floatbase.errors import InputError, UnknownNameError
-from floatbase.simulation import Perturbation, PerturbedSimulation
+from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
 
 GO2 = judges.load("go2")
 G = 9.81  # m/s²
 
 
-def standing(sim: PerturbedSimulation, mismatch: object = None, seconds: float = 0.6) -> fb.Rollout:
-    options = {} if mismatch is None else {"mismatch": mismatch}
+def standing(sim: PerturbedSimulation, seconds: float = 0.6) -> fb.Rollout:
     controller = fb.WholeBodyController(
-        GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing()), **options
+        GO2, fb.Contacts.feet(GO2), fb.standing_tasks(GO2.standing())
     )
     return fb.rollout(sim, controller, seconds, control_period=2e-3)
 
@@ -117,7 +115,7 @@ def test_adhesion_lets_the_ground_pull() -> None:
     for adhesion_force in (0.0, GO2.weight):
         sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=adhesion_force))
         tasks, mismatch = fb.standing_tasks(GO2.standing()), ModelMismatch(cones=False)
-        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, mismatch=mismatch)
+        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, modify_qp=mismatch)
         record = fb.rollout(
             sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3
         )

@@ -1,5 +1,5 @@
 """A simulation in which terms of (7) can be changed or switched off while it runs, to see what each
-of them does.
+of them does; and a controller that drives motors of the base there.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from floatbase._validation import (
     as_strings,
     cross,
 )
+from floatbase.control import Command
+from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
+from floatbase.playground.mismatch import ModelMismatch
 from floatbase.robots import Robot, State
-from floatbase.simulation.build import Ground
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation import Controller, Ground, Push, Simulation
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Perturbation(Value):
     """What holds in a `PerturbedSimulation` instead of (7), M q̈ + h = S τ + Jᵀ λ. The defaults are
     physics as it is.
@@ -90,6 +92,7 @@ class PerturbedSimulation(Simulation):
         as_instance("robot", robot, Robot)
         self._perturbation = Perturbation()
         self._base_wrench: Array = np.zeros(6)
+        self._beside: tuple[mujoco.MjModel, mujoco.MjData] | None = None
         super().__init__(robot, ground, timestep)
         model = self.model
         self._nominal = {
@@ -97,6 +100,9 @@ class PerturbedSimulation(Simulation):
             for name in ("body_mass", "body_inertia", "dof_armature")
         }
         self._nominal_gravity = np.array(model.opt.gravity)
+        self._point_geoms = np.array(
+            self._foot_geom_ids(), dtype=int
+        )  # as `_raw_contacts` numbers them, also after a fall
         self.perturbation = Perturbation() if perturbation is None else perturbation
 
     @property
@@ -110,21 +116,26 @@ class PerturbedSimulation(Simulation):
         for name in as_instance("perturbation", perturbation, Perturbation).disabled_contacts:
             if name not in self.point_names:
                 raise unknown_name("contact point", name, self.point_names)
-        model, self._perturbation = self.model, perturbation
+        model, foot_geoms, self._perturbation = self.model, self._foot_geom_ids(), perturbation
         for name, nominal in self._nominal.items():
             getattr(model, name)[:] = perturbation.mass * nominal
         model.opt.gravity[:] = perturbation.gravity * self._nominal_gravity
         model.geom_friction[:, 0] = (
             self.ground.mu if perturbation.friction is None else perturbation.friction
         )
-        model.geom_conaffinity[self._foot_geoms] = 1
-        model.geom_conaffinity[
-            [
-                self._foot_geoms[self.point_names.index(name)]
-                for name in perturbation.disabled_contacts
-            ]
-        ] = 0
-        mujoco.mj_setConst(model, self._scratch)
+        for name, ball in zip(self.point_names, foot_geoms, strict=True):
+            model.geom_conaffinity[ball] = name not in perturbation.disabled_contacts
+        mujoco.mj_setConst(model, self._scratch())
+
+    def _scratch(self) -> mujoco.MjData:
+        """Data of the present model for what is computed beside the step."""
+        if self._beside is None or self._beside[0] is not self.model:
+            self._beside = self.model, mujoco.MjData(self.model)
+        return self._beside[1]
+
+    def _foot_geom_ids(self) -> list[int]:
+        """The numbers of the feet's geoms in the present model, in the order of `point_names`."""
+        return [int(self.model.geom(name).id) for name in self.point_names]
 
     @property
     def base_wrench(self) -> Array:
@@ -170,28 +181,28 @@ class PerturbedSimulation(Simulation):
         base's velocity is along world axes. In (7) it is along the base's own, which turn: M times
         ω × v of the base comes to it.
         """
-        scratch = self._scratch
-        scratch.qpos[:], scratch.qvel[:] = self.data.qpos, self.data.qvel
-        mujoco.mj_fwdPosition(self.model, scratch)
-        mujoco.mj_fwdVelocity(self.model, scratch)
-        bias_forces, frame_correction = np.array(scratch.qfrc_bias), np.zeros(self.model.nv)
+        model, data = self.model, self._scratch()
+        data.qpos[:], data.qvel[:] = self.data.qpos, self.data.qvel
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        bias_forces, frame_correction = np.array(data.qfrc_bias), np.zeros(model.nv)
         if self.robot.is_floating:
             R = np.empty(9)
-            mujoco.mju_quat2Mat(R, scratch.qpos[3:7])
-            acceleration = np.zeros(self.model.nv)
-            acceleration[:3] = cross(R.reshape(3, 3) @ scratch.qvel[3:6], scratch.qvel[:3])
-            mujoco.mj_mulM(self.model, scratch, frame_correction, acceleration)
-        scratch.qvel[:] = 0.0
-        mujoco.mj_fwdVelocity(self.model, scratch)
-        return bias_forces - scratch.qfrc_bias + frame_correction
+            mujoco.mju_quat2Mat(R, data.qpos[3:7])
+            acceleration = np.zeros(model.nv)
+            acceleration[:3] = cross(R.reshape(3, 3) @ data.qvel[3:6], data.qvel[:3])
+            mujoco.mj_mulM(model, data, frame_correction, acceleration)
+        data.qvel[:] = 0.0
+        mujoco.mj_fwdVelocity(model, data)
+        return bias_forces - data.qfrc_bias + frame_correction
 
     def _apply_adhesion(self, applied: Array) -> None:
         """Add the adhesion force on each ball that touches the ground."""
         # contacts where the feet are now: the step before found them where it began
         mujoco.mj_fwdPosition(self.model, self.data)
-        balls = set(self._foot_geoms.tolist())
+        foot_geoms = set(self._foot_geom_ids())
         for plane, ball in self.data.contact.geom.tolist():
-            if ball in balls:
+            if ball in foot_geoms:
                 force = -self._perturbation.adhesion_force * self.ground.normals[plane]
                 position, body = self.data.geom_xpos[ball], int(self.model.geom_bodyid[ball])
                 mujoco.mj_applyFT(
@@ -205,14 +216,45 @@ class PerturbedSimulation(Simulation):
         forces = super()._contact_forces_from(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
-            rows, columns = np.nonzero(np.isin(foot_geoms, self._upright_foot_geoms))
-            points = np.argmax(foot_geoms[rows, columns, None] == self._upright_foot_geoms, axis=1)
+            rows, columns = np.nonzero(np.isin(foot_geoms, self._point_geoms))
+            points = np.argmax(foot_geoms[rows, columns, None] == self._point_geoms, axis=1)
             forces[rows, points] -= (
                 self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
             )
         return forces
 
-    def _refresh_views(self) -> None:
-        """As there, with data of the present model for what is computed beside the step."""
-        super()._refresh_views()
-        self._scratch = mujoco.MjData(self.model)
+
+class BaseMotors:
+    """A controller around another one that drives motors of the base which no robot has: S without
+    its zeros.
+
+    At each control step `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what
+    the controller plans, with M, h and J as it assumes them: zero, but for rounding, unless it
+    assumes such motors.
+
+    mismatch: the controller's; None for none.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        sim: PerturbedSimulation,
+        mismatch: ModelMismatch | None = None,
+    ):
+        self.controller, self.sim = controller, sim
+        self.mismatch = ModelMismatch() if mismatch is None else mismatch
+
+    @property
+    def contacts(self) -> Contacts:
+        """Those of the controller now."""
+        held: Contacts = self.controller.contacts  # type: ignore[attr-defined]
+        return held
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+        """The command of the controller at q, (nq,), and v, (nv,), at t in s."""
+        command: Command = self.controller(q, v, t)  # type: ignore[arg-type]
+        eom = self.mismatch.assumed_equations(
+            equations_of_motion(State(self.sim.robot, q, v), self.contacts)
+        )
+        self.sim.base_wrench = (eom.M @ command.qdd + eom.h - eom.J.T @ command.forces)[:6]
+        return command

@@ -1,0 +1,76 @@
+"""`modify_qp`: a function that changes the QP of each control step before it is solved."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import judges
+import numpy as np
+
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+from floatbase.qp import QP
+
+GO2 = judges.load("go2")
+PARTS = ("H", "g", "A", "b", "G", "h")
+
+
+def with_even_knees(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+    """A row that couples torques: both front knees give the same."""
+    first, second = (eom.robot.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR"))
+    row = np.zeros((1, qp.n))
+    row[0, qp.blocks["tau"]][[first, second]] = 1.0, -1.0
+    return replace(
+        qp,
+        A=np.vstack([qp.A, row]),
+        b=np.append(qp.b, 0.0),
+        equality_names=(*qp.equality_names, "even knees"),
+    )
+
+
+def unchanged(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+    return qp
+
+
+def controller(**options: object) -> fb.WholeBodyController:
+    return fb.WholeBodyController(
+        GO2, judges.stance(GO2), fb.standing_tasks(GO2.standing()), **options
+    )
+
+
+def test_it_changes_the_problem_that_is_solved_and_no_other_is() -> None:
+    state = GO2.random_state(1, 0.05)
+    plain, even = controller(backend="reference"), controller(modify_qp=with_even_knees)
+    index = [GO2.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR")]
+    assert abs(np.diff(plain(state.q, state.v).tau[index])[0]) > 0.1
+    assert abs(np.diff(even(state.q, state.v).tau[index])[0]) < 1e-9
+    assert even.qp(state).equality_names[-1] == "even knees"
+    same, before = controller(modify_qp=unchanged).qp(state), plain.qp(state)
+    assert all(np.array_equal(getattr(same, part), getattr(before, part)) for part in PARTS)
+
+
+def test_it_takes_the_reference_backend_and_says_so() -> None:
+    state = GO2.standing()
+    even = controller(modify_qp=with_even_knees)
+    assert even.backend == "reference" and "modify_qp" in even.backend_reason
+    assert even(state.q, state.v).backend == "reference"
+    for other in (
+        even.replace(contacts=even.contacts.without("FL_foot")),
+        pickle.loads(pickle.dumps(even)),
+        controller(modify_qp=with_even_knees, contact_weight=1e4),
+    ):
+        assert other.backend == "reference"
+        assert other.qp(state).equality_names[-1] == "even knees"
+
+
+def test_a_walk_hands_it_to_the_controllers_of_all_stances() -> None:
+    seen = set()
+
+    def watch(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+        seen.add(eom.contacts.names)
+        return qp
+
+    walk = Walk(GO2, judges.stance(GO2), Gait.trot(GO2, start=0.02), modify_qp=watch)
+    record = fb.rollout(fb.Simulation(GO2, 0.7), walk, 0.4, control_period=4e-3)
+    assert record.outcome == "completed" and {len(names) for names in seen} == {2, 4}
