@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def printed_by(package: Path, folder: Path) -> str:
-    """What the README's first program prints with this package, run in a folder with nothing in it."""
+    """What the README's first program prints with this package, run in an empty folder."""
     venv.create(folder / "venv", with_pip=True)
     python, place = folder / "venv" / "bin" / "python", folder / "empty"
     pip = [

@@ -2,11 +2,11 @@
 
     import floatbase as fb
 
-    robot = fb.load("go2")                                     # fb.catalogue() lists what can be loaded
+    robot = fb.load("go2")  # fb.catalogue() lists the available robots
     state = robot.standing()
     contacts = fb.Contacts.points(robot, mu=0.7)
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    command = controller(state.q, state.v)                     # .tau, .qdd, .forces, .active
+    command = controller(state.q, state.v)  # .tau, .qdd, .forces, .active
     run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
 
 Robots        catalogue, load, load_urdf, Robot, State

@@ -227,9 +227,7 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
         assert reached(rotation + quarter, rotation) == pytest.approx(0.3, abs=ASIDE)
 
 
-def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> (
-    None
-):
+def test_facets_outside_the_cone_allow_less_when_doubled_and_more_than_facets_inside() -> None:
     """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges,
     neither holds the other.
     """
@@ -440,9 +438,7 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> (
-    None
-):
+def test_solo8_sways_near_its_singular_stance_without_accelerations_from_noise() -> None:
     robot = judges.load("solo8")
     state = robot.standing()
 
