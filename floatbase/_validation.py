@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from difflib import get_close_matches
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeAlias, TypeVar, overload
+from typing import Any, ClassVar, Self, TypeAlias, TypeGuard, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -248,7 +248,7 @@ def frozen(array: Array) -> Array:
     return array
 
 
-def _is_read_only(value: Any) -> bool:
+def _is_read_only(value: Any) -> TypeGuard[Array]:
     """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one
     that can.
     """

@@ -219,7 +219,8 @@ class Cylinders(Value):
 
     def force(self, pressures: Array) -> Array:
         """F = p_A A_A - p_B A_B, shape (d,), N."""
-        return self.areas[0] * pressures[0] - self.areas[1] * pressures[1]
+        forces: Array = self.areas[0] * pressures[0] - self.areas[1] * pressures[1]
+        return forces
 
     def force_limits(self) -> Array:
         """The least and the largest F that supply and tank allow, shape (2, d), N."""
