@@ -1,6 +1,6 @@
 """Install a wheel or an sdist into an environment of its own and let it print what the README says.
 
-`python .ci/check_package.py dist/floatbase-0.2.0-py3-none-any.whl`; nothing of the repository but
+`python .ci/check_package.py dist/floatbase-0.1.0-py3-none-any.whl`; nothing of the repository but
 the README is used.
 """
 

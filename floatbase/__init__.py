@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     )
     from floatbase.viewer import Viewer
 
-__version__ = "0.2.0"
+__version__ = "0.1.0"
 
 # heavy packages, imported at first use: mujoco behind Simulation, meshcat behind Viewer
 _LAZY = {
