@@ -92,7 +92,7 @@ def killed(points: int, workers: int, path: Path, rows: int) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print the times and compare the tables. Returns 1 if a table is wrong, else 0."""
+    """Print the times, and compare the tables. Returns 1 if something is not as it must be, else 0."""
     parser = argparse.ArgumentParser(
         description="Ten thousand pushes, in one and in two processes, killed, and on Dask."
     )

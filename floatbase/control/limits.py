@@ -193,7 +193,7 @@ class Limits(Value):
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
-        """Options of the friction polyhedra: arguments of `FrictionPolyhedron`."""
+        """Options of the friction polyhedra: what `FrictionPolyhedron` takes after normal and mu."""
         return self.facets, self.inner_approximation, self.facet_rotation
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Soft contacts: (5) as a cost instead of rows, for states in which no forces can hold them."""
+"""Contacts that give way: (5) as a cost instead of rows, for states in which no forces hold them."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def record_settling(
 def settling_rollout(
     sim: Simulation, previous: Rollout, ticks: int, substeps: int, pushes: tuple[Push, ...]
 ) -> Rollout:
-    """The ticks after a record that ends with the controller off, as a separate record."""
+    """The next ticks after a record at whose end the controller is off, as a record of their own."""
     stance = previous.contacts_at(-1) if len(previous) else previous.contacts
     record = Recorder(sim, stance, ticks, substeps)
     record_settling(sim, record, stance, ticks, substeps, pushes)

@@ -75,7 +75,7 @@ def _is_shared_field(
     model: mujoco.MjModel,
     from_upright: npt.NDArray[np.int_],
 ) -> bool:
-    """Whether an attribute is an array with the same numbers in both models as built."""
+    """Whether an attribute is an array that has the same numbers in both models as they were built."""
     upright = getattr(upright_model, name)
     if name.startswith("_") or not isinstance(upright, np.ndarray) or not upright.size:
         return False
@@ -92,7 +92,7 @@ def _copy_fields(
     target: mujoco.MjModel,
     target_geoms: Any,
 ) -> None:
-    """Copy fields and options; source_geoms, target_geoms: the geoms that both models have."""
+    """Copy fields and options; source_geoms and target_geoms: of the geoms that both models have."""
     for name in fields:
         a, b = getattr(source, name), getattr(target, name)
         if name.startswith(_GEOM_FIELD_PREFIX):

@@ -174,8 +174,7 @@ class PerturbedSimulation(Simulation):
         scratch.qpos[:], scratch.qvel[:] = self.data.qpos, self.data.qvel
         mujoco.mj_fwdPosition(self.model, scratch)
         mujoco.mj_fwdVelocity(self.model, scratch)
-        bias_forces: Array = np.array(scratch.qfrc_bias)
-        frame_correction = np.zeros(self.model.nv)
+        bias_forces, frame_correction = np.array(scratch.qfrc_bias), np.zeros(self.model.nv)
         if self.robot.is_floating:
             R = np.empty(9)
             mujoco.mju_quat2Mat(R, scratch.qpos[3:7])
@@ -184,8 +183,7 @@ class PerturbedSimulation(Simulation):
             mujoco.mj_mulM(self.model, scratch, frame_correction, acceleration)
         scratch.qvel[:] = 0.0
         mujoco.mj_fwdVelocity(self.model, scratch)
-        bias_forces -= scratch.qfrc_bias
-        return bias_forces + frame_correction
+        return bias_forces - scratch.qfrc_bias + frame_correction
 
     def _apply_adhesion(self, applied: Array) -> None:
         """Add the adhesion force on each ball that touches the ground."""

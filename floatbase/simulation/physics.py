@@ -328,7 +328,7 @@ class Simulation(FixedAttributes):
         mujoco.mj_step(self.model, self.data)
 
     def torques(self) -> Array:
-        """Torques of the motors during the last step, within their limits, shape (d,) [N·m]."""
+        """Torques that the motors gave during the last step, within their limits, shape (d,), N·m."""
         return self._torques_from(self.data.actuator_force)
 
     def _torques_from(self, actuator_force: Array) -> Array:
@@ -439,7 +439,7 @@ class Simulation(FixedAttributes):
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
     def _standing_state(self) -> State:
-        """The robot standing on the ground, turned with a slope so that every foot touches."""
+        """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
         if len(self._planes) > 1:
             return self.robot.standing(normal=self.ground.normals, offset=self.ground.offsets)
         state = self.robot.standing()

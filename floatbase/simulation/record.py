@@ -1,4 +1,4 @@
-"""`Rollout`: the record of a controlled simulation, row by row; `Recorder` collects it."""
+"""`Rollout`: what happened under a controller on the physics, row by row; `Recorder` collects it."""
 
 from __future__ import annotations
 

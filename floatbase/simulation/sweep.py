@@ -1,4 +1,4 @@
-"""`sweep`: a function at every point of a grid, in local processes or on a Dask cluster."""
+"""`sweep`: a function at every point of a grid, in processes on this machine or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -53,17 +53,17 @@ def sweep(
     """Call a function at every point of a grid, in several processes, and collect what it returns
     in a table.
 
-        def setup():  # heavy things, made once in each process
+        def setup():                                         # heavy things, made once in each process
             robot = fb.load("go2")
-            contacts, tasks = fb.Contacts.points(robot, mu=0.7), fb.standing_tasks(robot.standing())
-            return fb.Simulation(robot), fb.WholeBodyController(robot, contacts, tasks)
+            controller = fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7),
+            fb.standing_tasks(robot.standing())) return fb.Simulation(robot), controller
 
         def push(made, force, angle):
             sim, controller = made
             sim.reset()
-            direction = np.array([np.cos(angle), np.sin(angle), 0.0])
-            run = fb.rollout(sim, controller, 0.6, [fb.Push(force * direction)])
-            return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
+            run = fb.rollout(sim, controller, 0.6, [fb.Push([force * np.cos(angle), force *
+            np.sin(angle), 0.0])]) return {"outcome": run.outcome, "moved": run.com[-1] -
+            run.com[0]}
 
         grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
         table = fb.sweep(push, grid, setup=setup, file="pushes.jsonl")
@@ -394,7 +394,7 @@ def _evaluate(job: _Job, point: Row) -> Row:
 
 
 def _exit_with_parent(parent: int) -> None:
-    """In a worker: end when the program that started it is gone, which may have been killed."""
+    """In a worker: end when the program that started it is gone. One that was killed tells nobody."""
     global _parent_pid
     _parent_pid = parent
 

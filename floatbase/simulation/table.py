@@ -1,4 +1,4 @@
-"""`Table`: results of a sweep, row by row; `RowStore` keeps them in a file."""
+"""`Table`: what a sweep found, row by row; `RowStore` keeps it in a file that outlives the sweep."""
 
 from __future__ import annotations
 

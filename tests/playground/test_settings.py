@@ -1,4 +1,4 @@
-"""The program that the playground shows runs elsewhere and makes the same robot."""
+"""What the playground shows as Python is what it runs: pasted elsewhere, it makes the same robot."""
 
 from __future__ import annotations
 

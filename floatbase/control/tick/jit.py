@@ -135,7 +135,7 @@ class PackageCache(FunctionCache):
 
 
 class WritableCache(PackageCache):
-    """numba's cache of one function; where it is empty, the cache beside the source."""
+    """numba's cache of one function, and where that holds nothing, what is kept beside the source."""
 
     _impl_class = _ChecksummedCacheImpl
 

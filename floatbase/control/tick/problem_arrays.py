@@ -87,7 +87,7 @@ class Dynamics:
 
     @property
     def layout_supported(self) -> bool:
-        """Whether this Pinocchio version's memory layout is the one that the views assume."""
+        """Whether this version of Pinocchio lays its results out in memory as the views take them."""
         with self.lock:
             self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
             poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
@@ -190,7 +190,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 def _pack_contact(
     robot: Robot, contact: Contact, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """A contact's row in the table, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
+    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = len(contact.point_names)
@@ -219,7 +219,7 @@ def _pack_builtin_contact(
 
 
 def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
-    """Facets and -normal of each point of a contact, their lengths, and a zero, (p (F + 1), 5)."""
+    """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
     if not contact.point_names:
         return np.zeros((0, 5))
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
