@@ -254,10 +254,10 @@ def plot(rows: Sequence[Row]) -> None:
 INTRODUCTION = """\
 Ratios are reliable; absolute times depend on the machine. A ratio is the median over turns, in each
 of which both sides answer all states, one side after the other. Every tick goes from q and v to
-torques, in Python, through each library's own binding: `computeProblemData`, `solve` and `getActuatorForces`
-for TSID, `update_kinematics` and `solve` for placo, `controller(q, v)` for floatbase. The peers are
-the packages of PyPI, compiled for any processor of their kind; numba compiles floatbase's tick for
-this one."""
+torques, in Python, through each library's own binding: `computeProblemData`, `solve` and
+`getActuatorForces` for TSID, `update_kinematics` and `solve` for placo, `controller(q, v)` for
+floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba
+compiles floatbase's tick for this one."""
 
 OWN = """\
 floatbase accepts tasks written in Python. TSID's binding accepts only its own classes:
