@@ -29,8 +29,7 @@ LAYERS = (
     ("simulation",),
     ("behaviours",),
     ("viewer",),
-    ("lessons",),
-    ("playground",),
+    ("playground", "lessons"),
     ("__main__",),
 )
 LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
