@@ -104,12 +104,13 @@ python:
 		exit 1; \
 	fi >&2
 
-# keeps the versions that environment.txt has where they still fit; LOCK_ARGS=--upgrade takes the newest
+# keeps the versions in environment.txt where they still fit; LOCK_ARGS=--upgrade takes the newest;
+# the extra test contains all others
 lock: | python
 	"$(BASE)" -m venv build/uv
 	build/uv/bin/python -m pip --disable-pip-version-check install -q uv
 	build/uv/bin/uv pip compile -q --universal --python-version 3.11 --fork-strategy fewest \
-		--extra course --extra test --extra cluster --extra meshes --extra video --extra site --extra hub --no-annotate --no-emit-index-url \
+		--extra test --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
 clean:

@@ -1,6 +1,6 @@
 """Install a wheel or an sdist into an environment of its own and let it print what the README says.
 
-`python .ci/check_package.py dist/floatbase-0.2.0-py3-none-any.whl`; nothing of the repository but
+`python .ci/check_package.py dist/floatbase-0.1.0-py3-none-any.whl`; nothing of the repository but
 the README is used.
 """
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def printed_by(package: Path, folder: Path) -> str:
-    """What the README's first program prints with this package, run in a folder with nothing in it."""
+    """What the README's first program prints with this package, run in an empty folder."""
     venv.create(folder / "venv", with_pip=True)
     python, place = folder / "venv" / "bin" / "python", folder / "empty"
     pip = [

@@ -26,21 +26,27 @@ SEEN = """() => {
   viewer.scene_tree.find(["meshcat"]).object.traverse((one) => {
     one.updateMatrix();
     const {geometry, material} = one;
-    found.push(one.name, one.visible, one.matrix.elements.map((x) => x.toFixed(4)).join(), material?.color?.getHex(),
-               geometry?.attributes?.position?.count, geometry?.attributes?.position?.array?.slice(0, 30).join());
+    const position = geometry?.attributes?.position;
+    found.push(one.name, one.visible, one.matrix.elements.map((x) => x.toFixed(4)).join(),
+               material?.color?.getHex(), position?.count, position?.array?.slice(0, 30).join());
   });
-  return viewer.animator.duration > 0 ? `plays ${viewer.animator.duration}` + found.length : found.join("|");
+  const duration = viewer.animator.duration;
+  return duration > 0 ? `plays ${duration}` + found.length : found.join("|");
 }"""
 # moves a control to its nth place; false where it has none
 MOVE = """(one, n) => {
-  const range = one.type === "range", last = range ? Number(one.max) : one.tagName === "SELECT" ? one.options.length - 1 : 1;
+  const range = one.type === "range", select = one.tagName === "SELECT";
+  const last = range ? Number(one.max) : select ? one.options.length - 1 : 1;
   if (n > last) return false;
-  if (range) one.value = n; else if (one.tagName === "SELECT") one.selectedIndex = n; else one.checked = !one.checked;
+  if (range) one.value = n;
+  else if (select) one.selectedIndex = n;
+  else one.checked = !one.checked;
   one.dispatchEvent(new Event(range ? "input" : "change", {bubbles: true}));
   return true;
 }"""
 END = """(one) => {
-  if (one.type === "range") one.value = one.max; else if (one.tagName === "SELECT") one.selectedIndex = one.options.length - 1;
+  if (one.type === "range") one.value = one.max;
+  else if (one.tagName === "SELECT") one.selectedIndex = one.options.length - 1;
   one.dispatchEvent(new Event(one.type === "range" ? "input" : "change", {bubbles: true}));
 }"""
 

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -47,14 +48,106 @@ def lock() -> Faults:
         if pin.url or [spec.operator for spec in pin.specifier] != ["=="]:
             yield f"{pin} is not an exact version"
     extras = PROJECT["optional-dependencies"].values()
-    for required in (
-        Requirement(line) for lines in (PROJECT["dependencies"], *extras) for line in lines
-    ):
+    required_lines = {line for lines in (PROJECT["dependencies"], *extras) for line in lines}
+    for required in map(Requirement, sorted(required_lines)):
+        if required.name == PROJECT["name"]:
+            continue  # one extra contains another
         pin = pins.get(canonicalize_name(required.name))
         if pin is None or pin.marker:
             yield f"{required.name} is not pinned for every platform; run `make lock`"
         elif not required.specifier.contains(next(iter(pin.specifier)).version, prereleases=True):
             yield f"{pin} is not within {required}; run `make lock`"
+
+
+# distributions that pip's record of top-level modules does not tell
+DISTRIBUTIONS = packages_distributions() | {
+    "coal": ["coal"],
+    "example_robot_data": ["example-robot-data"],
+    "mujoco": ["mujoco"],
+    "pinocchio": ["pin"],
+}
+# the extra without which the modules of a folder cannot be imported; the library needs none
+EXTRAS = {
+    "floatbase/viewer": "viewer",
+    "floatbase/playground": "viewer",
+    "floatbase/lessons": "course",
+    "floatbase/lessons/publish/site": "site",
+    "tests": "test",
+    "benchmarks": "test",
+    ".ci": "test",
+    "assets": "test",
+}
+# declared, and not imported by name
+TOOLS = {
+    "clarabel", "editables", "example-robot-data-loaders", "hatchling", "jupyterhub", "jupyterlab",
+    "mypy", "myst-nb", "nbval", "pycollada", "pytest-timeout", "pytest-xdist", "ruff",
+    "sphinx-book-theme", "sphinx-design", "voila",
+}  # fmt: skip
+# benchmarks/peers.py makes environments of their own for these
+PEERS = {"placo", "tsid"}
+
+
+def imports() -> Faults:
+    """The base install suffices to import the library, an extra to import what is built on it; all
+    that is imported anywhere is declared, and all that is declared is used.
+    """
+    used, declared = set(), _declared("test")
+    for path in sorted(path for folder in ("floatbase", *EXTRAS) for path in _sources(folder)):
+        place = path.relative_to(ROOT)
+        extra = next((EXTRAS[str(up)] for up in place.parents if str(up) in EXTRAS), None)
+        if place.name == "conftest.py" or place.parts[0] != "floatbase":
+            extra = "test"
+        for line, module, at_once in sorted(_imports(path)):
+            found = set(map(canonicalize_name, DISTRIBUTIONS.get(module, [module])))
+            used |= found
+            if not found & (_declared(extra) if at_once else declared):
+                where = f"the extra {extra}" if at_once and extra else "the dependencies"
+                yield f"{place}:{line} imports {module}, which is not in {where}"
+    yield from (f"{name} is declared and not used" for name in declared - used - TOOLS)
+
+
+def _declared(extra: str | None) -> set[str]:
+    """Distributions of the base install and of an extra with those that it contains."""
+    lines, found = [*PROJECT["dependencies"]], set()
+    if extra:
+        lines += PROJECT["optional-dependencies"][extra]
+    for required in map(Requirement, lines):
+        if required.name == PROJECT["name"]:
+            found |= set().union(*map(_declared, required.extras))
+        else:
+            found.add(canonicalize_name(required.name))
+    return found
+
+
+def _sources(folder: str) -> Iterator[Path]:
+    inner = [ROOT / name for name in EXTRAS if name.startswith(folder + "/")]
+    for path in (ROOT / folder).rglob("*.py"):
+        if "node_modules" not in path.parts and not any(up in inner for up in path.parents):
+            yield path
+
+
+def _imports(path: Path) -> set[tuple[int, str, bool]]:
+    """Line and name of each imported package, and whether it loads with the module."""
+    folders = path.parent, ROOT / "tests", ROOT / "benchmarks"
+    own = {"floatbase", *PEERS, *(file.stem for one in folders for file in one.glob("*.py"))}
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.Import(names=names):
+                modules = [alias.name for alias in names]
+            case ast.ImportFrom(module=str(module), level=0):
+                modules = [module]
+            case ast.Call(
+                func=ast.Name(id=called) | ast.Attribute(attr=called),
+                args=[ast.Constant(value=str(module)), *_],
+            ) if called in ("require", "import_module", "find_spec", "importorskip"):
+                modules = [module]
+            case _:
+                continue
+        tops = {module.partition(".")[0] for module in modules}
+        at_once = node.col_offset == 0 and not isinstance(node, ast.Call)
+        found |= {(node.lineno, top, at_once) for top in tops - own - sys.stdlib_module_names}
+    return found
 
 
 def version() -> Faults:
@@ -219,7 +312,7 @@ def _numbers(ranges: str) -> set[str]:
 
 
 CHECKS: tuple[Callable[[], Faults], ...]
-CHECKS = (lock, version, container, pythons, scripts, hub, workflows, commands, pages)
+CHECKS = (lock, imports, version, container, pythons, scripts, hub, workflows, commands, pages)
 
 
 def main() -> int:

@@ -105,7 +105,7 @@ def lab(copy: Path) -> Iterator[str]:
 
 
 def opened(browser: Any, address: str) -> tuple[Any, Any]:
-    """The page of a notebook that has run, and the frame of its picture, both noting their times."""
+    """The page of a notebook that has run and the frame of its picture, both noting times."""
     page = browser.new_page(viewport={"width": 1100, "height": 900})
     page.set_default_timeout(1000 * LONGEST)
     page.goto(f"{address}/lab/tree/slider.ipynb?token=t")

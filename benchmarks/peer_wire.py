@@ -4,7 +4,7 @@ needs numpy alone.
 An order is a line of JSON on the standard input of a process, the answer a line on its standard
 output:
 
-    {"problem": {…}}                 build the problem that `peer_problems.Problem.description` describes
+    {"problem": {…}}                 build the problem of `peer_problems.Problem.description`
     {"states": {label: [[q, v], …]}} keep these states
     {"torques": label}               the torques at each of them, null where the solver found none
     {"clock": label}                 the time of each tick, µs

@@ -1,9 +1,10 @@
 """floatbase's tick against TSID and placo, the C++ libraries one would bind to otherwise: torques
 first, then times.
 
-    python benchmarks/peers.py                  makes what is missing, compares, measures -> benchmarks/peers.md, peers.png
-    python benchmarks/peers.py --env FOLDER     where the peers' environments are kept; build/peers
-                                                by default
+    python benchmarks/peers.py                  makes what is missing, compares, measures ->
+                                                benchmarks/peers.md, peers.png
+    python benchmarks/peers.py --env FOLDER     where the peers' environments are kept;
+                                                build/peers by default
     python benchmarks/peers.py --peers placo    only these
 
 Each library runs in a process of its own, in its own environment, through its own Python binding,
@@ -251,23 +252,25 @@ def plot(rows: Sequence[Row]) -> None:
 
 
 INTRODUCTION = """\
-Ratios are to be trusted, microseconds to be taken with salt: a ratio is the median over turns, in each of which both sides
-answer all states, one side after the other. Every tick goes from q and v to torques, in Python, through each library's own
-binding: `computeProblemData`, `solve` and `getActuatorForces` for TSID, `update_kinematics` and `solve` for placo,
-`controller(q, v)` for floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba compiles
-floatbase's tick for this one."""
+Ratios are reliable; absolute times depend on the machine. A ratio is the median over turns, in each
+of which both sides answer all states, one side after the other. Every tick goes from q and v to
+torques, in Python, through each library's own binding: `computeProblemData`, `solve` and
+`getActuatorForces` for TSID, `update_kinematics` and `solve` for placo, `controller(q, v)` for
+floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba
+compiles floatbase's tick for this one."""
 
 OWN = """\
-floatbase takes a task that its user writes in Python. TSID's binding takes classes of its own alone: `addMotionTask` has an
-overload for each of them, and C++ never calls what a Python class derived from one overrides. Who needs another task there
-writes C++. So like cannot be compared with like, and these rows say what a task in Python costs: the problem is that above,
-but floatbase's task for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every tick, while TSID has
-its `TaskComEquality`."""
+floatbase accepts tasks written in Python. TSID's binding accepts only its own classes:
+`addMotionTask` has an overload for each of them, and C++ never calls what a Python subclass
+overrides; a custom task has to be written in C++. So these rows do not compare like with like, but
+show what a task in Python costs. The problem is the one above, but floatbase's task for the centre
+of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every tick, while TSID has its
+`TaskComEquality`."""
 
 SAMENESS = """\
-Torques are compared before times are: they count as the same up to a millionth of the strongest motor's limit. What is left is
-rounding in the peers' solver, as floatbase's compiled and reference backends, which share no solver, agree more closely (on every
-fifth state)."""
+Torques are compared before times: they count as equal up to a millionth of the strongest motor's
+limit. The remaining difference is rounding in the peers' solver, because floatbase's compiled and
+reference backends, which share no solver, agree more closely (on every fifth state)."""
 
 
 def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:

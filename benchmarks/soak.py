@@ -1,7 +1,7 @@
 """What leaks, slows down or breaks after many times: one command, a table, and exit code 1 when
 something does.
 
-    python benchmarks/soak.py                       all of `SOAKS`, as many times as it says: 10 to 20 minutes
+    python benchmarks/soak.py                       all of `SOAKS`: 10 to 20 minutes
     python benchmarks/soak.py ticks kills           some of them
     python benchmarks/soak.py viewers --times 20    so many times
 

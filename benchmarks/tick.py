@@ -1,8 +1,8 @@
 """How fast the controller's tick is, and that its backends agree: one command, a table and a plot.
 
-    python benchmarks/tick.py                      times, growth -> benchmarks/tick.md, benchmarks/tick.png
-    python benchmarks/tick.py --agreement 2000     compares the backends on that many random states
-                                                   for each robot and stance
+    python benchmarks/tick.py                    times, growth -> benchmarks/tick.md, tick.png
+    python benchmarks/tick.py --agreement 2000   compares the backends on that many random states
+                                                 for each robot and stance
 
 Both backends take turns within one run, on the same states. Times are ratios to be trusted,
 microseconds to be taken with salt.
@@ -246,7 +246,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
-    """Largest torque difference between the backends, on n random states of every robot and stance."""
+    """Largest torque difference between the backends, on n random states per robot and stance."""
     yield (
         "| robot | feet | states | infeasible | left to the reference backend | largest "
         "difference |"

@@ -164,7 +164,8 @@ def main(arguments: list[str] | None = None) -> int:
             missed = missed or median > TARGETS[call]
             verdict = "missed" if median > TARGETS[call] else ""
             print(
-                f"{page:9}{call:14}{how:43}{median:10.1f}{slow:10.1f}{work:10.1f}{TARGETS[call]:10.0f}  {verdict}",
+                f"{page:9}{call:14}{how:43}{median:10.1f}{slow:10.1f}{work:10.1f}"
+                f"{TARGETS[call]:10.0f}  {verdict}",
                 flush=True,
             )
 

@@ -2,11 +2,11 @@
 
     import floatbase as fb
 
-    robot = fb.load("go2")                                     # fb.catalogue() lists what can be loaded
+    robot = fb.load("go2")  # fb.catalogue() lists the available robots
     state = robot.standing()
     contacts = fb.Contacts.points(robot, mu=0.7)
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    command = controller(state.q, state.v)                     # .tau, .qdd, .forces, .active
+    command = controller(state.q, state.v)  # .tau, .qdd, .forces, .active
     run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
 
 Robots        catalogue, load, load_urdf, Robot, State
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     )
     from floatbase.viewer import Viewer
 
-__version__ = "0.2.0"
+__version__ = "0.1.0"
 
 # heavy packages, imported at first use: mujoco behind Simulation, meshcat behind Viewer
 _LAZY = {

@@ -109,7 +109,7 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
-    """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line, to be told."""
+    """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line."""
     from floatbase.playground import (
         Playground,
         Settings,

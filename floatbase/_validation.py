@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from types import MappingProxyType
-from typing import Any, Self, TypeAlias, TypeVar, overload
+from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -212,7 +212,7 @@ def frozen(array: Array) -> Array:
     return array
 
 
-def _is_read_only(value: Any) -> bool:
+def _is_read_only(value: Any) -> TypeGuard[Array]:
     """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one
     that can.
     """

@@ -138,7 +138,7 @@ class Affine(Value):
         return Affine(self.A @ inner.A, self.A @ inner.b + self.b, self.blocks)
 
     def __add__(self, other: Affine | npt.ArrayLike) -> Affine:
-        """The sum of two maps with the same sizes, or of a map and a constant vector of shape (m,)."""
+        """Sum of two maps of the same sizes, or of a map and a constant vector of shape (m,)."""
         if isinstance(other, Affine):
             if other.A.shape != self.A.shape:
                 raise InputError(f"cannot add maps of shapes {self.A.shape} and {other.A.shape}.")
@@ -294,7 +294,7 @@ class Quadratic(Value):
 
 
 def _as_factor(kind: str, scale: object) -> float:
-    """The number that a map or cost is multiplied by; `InputError` with advice for anything else."""
+    """The factor of a map or cost as a float; `InputError` with advice for anything else."""
     factor = numeric_copy(scale)
     if factor is not None and factor.ndim == 0 and abs(factor) <= MAX_MAGNITUDE:
         return float(factor)

@@ -14,8 +14,8 @@ Symbols
     τ, tau      joint torques (N·m) or forces of prismatic joints (N), shape (d,)
     λ, forces   what the ground does to the robot, N, world axes, stacked point by point, shape
                 (k,); a `LinearConstraint`'s in the units of its rows
-    M, h, S     inertia matrix, bias forces (Coriolis, centrifugal, gravity), actuation matrix: M q̈
-                + h = S τ + Jᵀ λ   (1)-(4)
+    M, h, S     inertia matrix, bias forces (Coriolis, centrifugal, gravity), actuation matrix:
+                M q̈ + h = S τ + Jᵀ λ   (1)-(4)
     J, b, A     Jacobian of the contact points (k, nv); A q̈ = b, with A (m, nv): the motion that
                 contacts allow         (5)-(7)
     ζ, η        affine maps τ -> λ (9) and τ -> q̈ (14)
@@ -24,8 +24,8 @@ Symbols
                 (20) (21)
     μ           friction coefficient; also the multipliers of inequality rows, where a quadratic
                 program is solved
-    c, ξ, ω     centre of mass, its divergent component ξ = c + ċ / ω (the capture point), ω = √(g /
-                height), where it walks
+    c, ξ, ω     centre of mass, its divergent component ξ = c + ċ / ω (the capture point),
+                ω = √(g / height), where it walks
     p           zero-moment point (ZMP), the centre of pressure of all feet: c̈ = ω² (c - p)
     H, g, c     the cost ½ xᵀ H x + gᵀ x + c; rows A x = b and G x ≤ h of a quadratic program
 
@@ -40,16 +40,16 @@ could be doubted stands in the name: `p_world`, `J_foot_world`.
 
 Signs
 -----
-A residual is actual - desired. A task minimises (weight / 2) ‖residual‖², and its feedback is -kp e
-- kd ė with e = actual - desired. A normal points from the ground to the robot, so a contact force
-  pushes where normal · f > 0. Gravity acts along -z.
+A residual is actual - desired. A task minimises (weight / 2) ‖residual‖², and its feedback is
+-kp e - kd ė with e = actual - desired. A normal points from the ground to the robot, so a contact
+force pushes where normal · f > 0. Gravity acts along -z.
 Multipliers of inequality rows are ≥ 0; a row with a positive multiplier is active. The multiplier
 is what one unit more in h would lower the optimal objective by.
 
 Units
 -----
 SI: m, rad, s, kg, N, N·m, W. Gains: kp 1/s², kd 1/s. Weights bring squared residuals to one unit:
-    per (m/s²)², N² or (N·m)².
+per (m/s²)², N² or (N·m)².
 
 Values
 ------
@@ -62,8 +62,7 @@ Importing
 ---------
 `import floatbase as fb` has the names that most programs need. Everything else is imported from its
 package: `floatbase.robots`, `floatbase.dynamics`, `floatbase.objectives`, `floatbase.friction`,
-    `floatbase.qp`, `floatbase.control`, `floatbase.actuators`,
-`floatbase.simulation`, `floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`,
-`floatbase.playground`, and the small `floatbase.affine`, `floatbase.linear_algebra` and
-`floatbase.errors`.
+`floatbase.qp`, `floatbase.control`, `floatbase.actuators`, `floatbase.simulation`,
+`floatbase.behaviours`, `floatbase.viewer`, `floatbase.lessons`, `floatbase.playground`, and the
+small `floatbase.affine`, `floatbase.linear_algebra` and `floatbase.errors`.
 """

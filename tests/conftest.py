@@ -112,7 +112,7 @@ def is_left(process: psutil.Process) -> bool:
 
 
 def shift_seeds(config: pytest.Config, n: int) -> None:
-    """Draw the numbers of every integer seed, and the examples of hypothesis, from the n-th stream."""
+    """Draw numbers for every integer seed, and examples of hypothesis, from the n-th stream."""
     hypothesis.settings.register_profile(
         "repeatable", derandomize=n == 0, deadline=None, database=None
     )

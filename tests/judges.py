@@ -267,7 +267,7 @@ def derivative(
 
 
 def jacobian_of(f: Callable[[State], Array], state: State, step: float = 1e-6) -> Array:
-    """The derivative of f with respect to v's directions, column by column, by central differences."""
+    """The derivative of f in v's directions, column by column, by central differences."""
     return np.column_stack([derivative(f, state, e, step) for e in np.eye(state.robot.nv)])
 
 
@@ -348,7 +348,7 @@ def is_feasible(qp: QP, rows: list[int]) -> bool:
 
 
 def is_smallest_conflict(qp: QP, names: Iterable[str]) -> bool:
-    """Whether these inequality rows are impossible together, and possible without any one of them."""
+    """Whether these inequality rows are infeasible together but feasible without any one."""
     rows = [qp.inequality_names.index(name) for name in names]
     return not is_feasible(qp, rows) and all(
         is_feasible(qp, [i for i in rows if i != row]) for row in rows

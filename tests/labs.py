@@ -1,4 +1,4 @@
-"""JupyterLab with a lesson in a page of a real browser: run it, move its sliders, push its robot."""
+"""JupyterLab with a lesson in a real browser: run it, move its sliders, push its robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ KERNEL = f"{NOTEBOOK}.sessionContext.session.kernel"
 # longer than anything here waits
 WORK = f"""() => {{
   window.works = true;
-  {KERNEL}.requestExecute({{code: "import time; time.sleep(300)"}}).done.finally(() => {{ window.works = false; }});
+  const request = {KERNEL}.requestExecute({{code: "import time; time.sleep(300)"}});
+  request.done.finally(() => {{ window.works = false; }});
 }}"""
 CELLS = f"{NOTEBOOK}.content.widgets.map(w => w.model).filter(m => m.type === 'code')"
 FIRST_RAN = f"() => {CELLS}[0].executionCount !== null"
@@ -40,16 +41,20 @@ ERRORS = (
 # sliders, cell by cell
 SLIDERS = f"""() => {{
   const found = {{}};
-  {NOTEBOOK}.content.widgets.forEach((cell, i) => cell.node.querySelectorAll(".widget-slider").forEach((slider, j) => {{
-    cell.node.dataset.cell = i;
-    slider.querySelector(".noUi-handle").dataset.slider = `${{i}}-${{j}}`;
-    (found[i] ??= []).push(slider.querySelector(".widget-label").textContent);
-  }}));
+  {NOTEBOOK}.content.widgets.forEach((cell, i) => {{
+    cell.node.querySelectorAll(".widget-slider").forEach((slider, j) => {{
+      cell.node.dataset.cell = i;
+      slider.querySelector(".noUi-handle").dataset.slider = `${{i}}-${{j}}`;
+      (found[i] ??= []).push(slider.querySelector(".widget-label").textContent);
+    }});
+  }});
   return found;
 }}"""
 # what a panel says, its sliders aside
-SAID = """(cell) => [...cell.querySelectorAll(".jp-OutputArea .widget-html, .jp-OutputArea .widget-label")]
-  .filter((part) => !part.closest(".widget-slider") && !part.querySelector("iframe")).map((part) => part.innerHTML).join("|")"""
+SAID = """(cell) =>
+  [...cell.querySelectorAll(".jp-OutputArea .widget-html, .jp-OutputArea .widget-label")]
+  .filter((part) => !part.closest(".widget-slider") && !part.querySelector("iframe"))
+  .map((part) => part.innerHTML).join("|")"""
 # the scene of a page, to the millimetre: every node with its place, and whether it is seen
 SCENE = """() => {
   const found = [];

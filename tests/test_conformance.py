@@ -174,13 +174,16 @@ def right() -> dict[str, Any]:
 
 # what only the package makes
 RESULTS = """
-    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces CylinderGeometry
-    PowerBalance Robot PushRecovery Table StepPlan AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
+    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition
+    TorquesFromForces CylinderGeometry PowerBalance Robot PushRecovery Table StepPlan
+    AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),
-    "judges whatever a learner may give": ("Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in", "array_or_verdict", "predict",
-        "reveal", "review"),
+    "judges whatever a learner may give": (
+        "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in",
+        "array_or_verdict", "predict", "reveal", "review",
+    ),
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
         "Simulation.advance",
@@ -201,17 +204,24 @@ LEFT_OUT = {
         "recording.as_rollout", "Ground.clearances", "with_thumbnail", "receive_during_cells",
     ),
     "needs trimesh": ("urdf_visuals",),
-    "draws what it is given": ("Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
-    "appearance_digest"),
+    "draws what it is given": (
+        "Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
+        "appearance_digest",
+    ),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")
-            for method in ("positions", "jacobian", "constraint", "force_generator_matrix", "slip")),
+            for method in (
+                "positions", "jacobian", "constraint", "force_generator_matrix", "slip"
+            )),
     ),
     "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
     "starts processes, with tests of its own": ("sweep", "push_recovery", "Table.read"),
-    "starts a thread": ("LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start", "LiveSimulation.reset"),
+    "starts a thread": (
+        "LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start",
+        "LiveSimulation.reset",
+    ),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}
 

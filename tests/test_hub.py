@@ -165,7 +165,7 @@ browser = browser_of_a_file
 
 @pytest.fixture(scope="module")
 def class_(hub: Hub, browser: Any) -> Iterator[list[Student]]:
-    """Two students who log in and start at once, each in a browser of their own, and run lesson 00."""
+    """Two students log in and start at once, each in their own browser, and run lesson 00."""
     with ExitStack() as ends:
         students = []
         for name in STUDENTS:

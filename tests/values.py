@@ -73,12 +73,16 @@ def values() -> dict[str, Any]:
         "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(),
         "Hydraulics": hydraulic.cylinders.hydraulics,
         "HydraulicState": hydraulic.state, "CylinderGeometry": pose,
-        "PowerBalance": hydraulic.cylinders.power(np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)),
+        "PowerBalance": hydraulic.cylinders.power(
+            np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)
+        ),
         "bias forces": bias_forces(state), "contact space": contact_space(eom),
         "drive": moving_frame("base", np.zeros_like),
         "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))),
         "Table": Table(({"force": 1.0, "error": None},)),
-        "PushRecovery": PushRecovery(np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts),
+        "PushRecovery": PushRecovery(
+            np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts
+        ),
         "Gait": Gait.trot(robot), "Swing": Swing(np.zeros(3), UP, 0.0, 0.5), "LIPM": plan,
         "Gains": Gains(),
         "turning view": view_from_rotating_frame([0.0, 0.1], UP, UP),

@@ -143,12 +143,9 @@ class Cylinders(Value):
         ℓ² = a² + b² - 2 a b cos γ                       the triangle: length of the cylinder
         L = dℓ/dq = a b sin γ / ℓ,   τ = L F             the same power on both sides: τ q̇ = F ℓ̇
         F = p_A A_A - p_B A_B                            force of the oil, N, pushing the rod out
-        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber; its volume V grows or
-                                                          shrinks with ℓ
-        Q = C_d w x √(2 Δp / ρ)                          one edge of the valve, from or to the line
-                                                         it opens to
-        ẋ = 2π f_valve (u - x)                           the spool; u in [-1, 1] is what the valve
-                                                         is told
+        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber, whose volume V varies with ℓ
+        Q = C_d w x √(2 Δp / ρ)                          each edge of the valve
+        ẋ = 2π f_valve (u - x)                           the spool; u in [-1, 1] is its command
 
     x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow
     turns round.
@@ -221,7 +218,8 @@ class Cylinders(Value):
 
     def force(self, pressures: Array) -> Array:
         """F = p_A A_A - p_B A_B, shape (d,), N."""
-        return self.areas[0] * pressures[0] - self.areas[1] * pressures[1]
+        forces: Array = self.areas[0] * pressures[0] - self.areas[1] * pressures[1]
+        return forces
 
     def force_limits(self) -> Array:
         """The least and the largest F that supply and tank allow, shape (2, d), N."""

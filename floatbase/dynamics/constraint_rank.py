@@ -87,7 +87,7 @@ def resolved_constraint(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 
 def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
-    """U, s, Vt of A's singular value decomposition, without the directions that A resolves badly."""
+    """U, s, Vt of A's singular value decomposition, without directions that A resolves badly."""
     as_instance("eom", eom, EquationsOfMotion)
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     r = int(np.sum(s > CONSTRAINT_RANK_TOLERANCE * s.max(initial=0.0)))

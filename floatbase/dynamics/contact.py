@@ -1,4 +1,4 @@
-"""One contact with the ground: the motion it holds and the points where its forces act (§2.1, (5))."""
+"""One contact: the motion that it constrains and the points where its forces act (§2.1, (5))."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
 
 
 def check_contact(contact: Contact) -> None:
-    """Check a new contact's friction coefficient and normal, and scale the normal to unit length."""
+    """Check a contact's friction coefficient and normal; scale the normal to unit length."""
     as_string("frame of a contact", contact.name)
     object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
     object.__setattr__(

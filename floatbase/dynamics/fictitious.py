@@ -40,7 +40,7 @@ class BiasForces(Value):
 
     @property
     def fictitious(self) -> Array:
-        """The part that comes from moving along coordinates that curve or turn, shape (nv,): C v."""
+        """The part due to motion along coordinates that curve or turn, shape (nv,): C v."""
         return read_only(self.centrifugal + self.coriolis)
 
     @property
@@ -86,7 +86,7 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
 
 
 def _world_to_base_axes(state: State) -> Array:
-    """T with v = T u, shape (nv, nv), orthogonal: u has the base's velocities in the world's axes."""
+    """T with v = T u, shape (nv, nv), orthogonal: u has the base's velocity in world axes."""
     T = np.eye(state.robot.nv)
     if state.robot.is_floating:
         T[:3, :3] = T[3:6, 3:6] = state.frame_pose("base").rotation.T

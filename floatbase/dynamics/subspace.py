@@ -76,7 +76,7 @@ def torque_force_space(eom: EquationsOfMotion) -> Affine:
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(12) B, shape (nv + m, nv + d + k), and its right-hand side (-h, b): B (q̈, τ, λ) = (-h, b)."""
+    """(12) B, shape (nv + m, nv + d + k), and (-h, b), with B (q̈, τ, λ) = (-h, b)."""
     as_instance("eom", eom, EquationsOfMotion)
     B = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.d + eom.k))]])
     return read_only(B), read_only(np.concatenate([-eom.h, eom.b]))

@@ -1,4 +1,4 @@
-"""Friction cones, polyhedra and the wrenches that a stance can produce (§4.2 of the course text)."""
+"""Friction cones, polyhedra and the wrenches that a stance can produce (§4.2)."""
 
 from floatbase.friction.cones import (
     Decomposition,

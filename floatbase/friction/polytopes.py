@@ -68,7 +68,7 @@ def polytope_vertices(support_point: Callable[[Array], Array], n: int, size: flo
     """
     tolerance = _FLATNESS_TOLERANCE * size
     basis, points = _affine_hull(support_point, n, tolerance)
-    origin = points[0]
+    origin: Array = points[0]
     if basis.shape[1] == 0:
         return origin[None]
     flat = (points - origin) @ basis
@@ -140,8 +140,9 @@ def _facet_through(rays: Array, chosen: list[int]) -> Array | None:
     U, s, _ = np.linalg.svd(rays[:, chosen])
     if np.sum(s > _SLIVER_TOLERANCE * s[0]) != len(rays) - 1:
         return None
-    row = U[:, -1]
-    return -np.sign(row @ rays.sum(axis=1)) * row
+    row: Array = U[:, -1]
+    row = -np.sign(row @ rays.sum(axis=1)) * row
+    return row
 
 
 def _affine_hull(

@@ -265,7 +265,8 @@ class WrenchSet(Value):
                 )
             if result.status == INFEASIBLE:
                 raise InfeasibleError("no contact forces add up to the requested force.")
-            return scale * (values @ result.x)
+            point: Array = scale * (values @ result.x)
+            return point
 
         try:
             return read_only(polytope_vertices(support_point, len(values), size))

@@ -6,6 +6,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
 from floatbase.lessons.exercises import (
@@ -90,7 +91,14 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(f"floatbase.lessons.{_LAZY[name]}")
+    try:
+        module = import_module(f"floatbase.lessons.{_LAZY[name]}")
+    except ModuleNotFoundError as error:
+        if str(error.name).startswith("floatbase"):
+            raise
+        raise FloatbaseError(
+            f'The course needs {error.name}: pip install "floatbase[course]".'
+        ) from None
     return module if name == _LAZY[name] else getattr(module, name)
 
 

@@ -100,7 +100,7 @@ def append(name: str, entry: dict[str, Any]) -> str:
 
 
 def storage_problem() -> str:
-    """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no file."""
+    """Why tries and predictions cannot be saved, and what to do, else "". Makes no file."""
     return _append_line(b"")
 
 

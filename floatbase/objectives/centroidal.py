@@ -219,7 +219,7 @@ class TorquesFromForces(Value):
     null_torques: Array
 
     def distance(self, forces: npt.ArrayLike) -> float:
-        """Distance, N, of desired forces (k,) from those that torques can give; 0 when reachable."""
+        """Distance [N] of desired forces (k,) from the reachable ones; 0 when reachable."""
         return float(np.linalg.norm(as_forces(forces, self.reachable.n_out) - self.nearest(forces)))
 
     def nearest(self, forces: npt.ArrayLike) -> Array:

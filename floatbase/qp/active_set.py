@@ -8,10 +8,11 @@ system gives the answer. So guess, look at what the guess gives, and correct it 
 time. Every point on the way satisfies all rows.
 
 Symbols
-    β  coordinates in which the equalities always hold, x = x0 + Z β (13); a problem without
-    equalities has β = x W  working set: rows of G held with equality for now, linearly independent
-    p  direction from the point to the minimiser on the rows of W; α length of the step along it, 1
-    to arrive there μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
+    β  coordinates in which the equalities always hold, x = x0 + Z β (13); x without equalities
+    W  working set: rows of G held with equality for now, linearly independent
+    p  direction from the point to the minimiser on the rows of W
+    α  length of the step along p, 1 to arrive at that minimiser
+    μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
 
 Algorithm
     0. `_feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem

@@ -202,5 +202,5 @@ class InequalityQP(QP):
 
 
 def _zero_if_rounding(value: Array, terms: float) -> Array:
-    """`value`, or zeros when all of it is no more than the rounding of sums of terms of that size."""
+    """`value`, or zeros when it is within the rounding error of sums of terms of that size."""
     return value if np.max(np.abs(value), initial=0.0) > _ROUNDING * terms else np.zeros_like(value)

@@ -1,4 +1,4 @@
-"""A robot: floating or fixed base, feet, standing posture, torque limits, lengths of (2), S of (3)."""
+"""A robot: floating or fixed base, feet, standing posture, torque limits, S of (3)."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Robot(Value):
         self._check_inertia()
 
     def _check_inertia(self) -> None:
-        """Raise `InputError` for a robot that has no mass, or that (1) cannot be solved for q̈ of."""
+        """Raise `InputError` for a robot without mass, or for which (1) cannot be solved for q̈."""
         if self.nv == 0:
             raise InputError(
                 f"nothing of {self.name} moves: its base is fixed, and so are all its joints."
@@ -360,7 +360,7 @@ class Robot(Value):
 
 def has_floating_base(model: pin.Model) -> bool:
     """Whether a model's base is free to move."""
-    return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+    return model.njoints > 1 and bool(model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
 def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:

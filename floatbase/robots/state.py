@@ -156,7 +156,7 @@ class State(Value):
         return read_only(J.reshape(6, self.robot.nv))  # of one joint Pinocchio gives (6,)
 
     def frame_velocity(self, frame: str) -> Array:
-        """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world-aligned."""
+        """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world axes."""
         return read_only(
             pin.getFrameVelocity(
                 self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED

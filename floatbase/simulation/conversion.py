@@ -42,7 +42,7 @@ class Conversion:
 
     def q(self, qpos: Array) -> Array:
         """Our q, shape (nq,), for MuJoCo's qpos."""
-        q = qpos[self._qpos_of_q]
+        q: Array = qpos[self._qpos_of_q]
         if self._cos_indices.size:
             q[self._cos_indices], q[self._cos_indices + 1] = (
                 np.cos(q[self._cos_indices]),
@@ -52,7 +52,7 @@ class Conversion:
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Our v, shape (nv,), for MuJoCo's qpos and qvel."""
-        v = qvel[self._qvel_of_v]
+        v: Array = qvel[self._qvel_of_v]
         if self._n_base:
             v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
         return v

@@ -85,11 +85,10 @@ def _shape_points(shape: Any) -> Array:
     """
     match shape:
         case coal.Box():
-            return np.array(shape.halfSide).ravel() * (
-                2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0
-            )
+            half_sides: Array = np.array(shape.halfSide).ravel()
+            return half_sides * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
         case coal.Sphere():
-            return shape.radius * _sphere_directions()
+            return float(shape.radius) * _sphere_directions()
         case coal.Cylinder() | coal.Capsule():
             ends = np.array([[0.0, 0.0, -shape.halfLength], [0.0, 0.0, shape.halfLength]])
             angles = np.arange(_PRISM_SIDES) * 2.0 * np.pi / _PRISM_SIDES
@@ -121,7 +120,8 @@ def _extreme_points(points: Array) -> Array:
         indices = supports.argmax(axis=1)
         farther = (candidate := supports[np.arange(len(directions)), indices]) > support
         best[farther], support[farther] = first + indices[farther], candidate[farther]
-    return points[np.unique(best)]
+    extreme: Array = points[np.unique(best)]
+    return extreme
 
 
 def _sphere_directions() -> Array:

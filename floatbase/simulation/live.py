@@ -153,9 +153,10 @@ class LiveSimulation:
         actuators: Actuators | EllipsisType | None = ...,
         control_period: float | None = None,
     ) -> None:
-        """Go on under another controller from the next slice, and where they are given with other things.
+        """Continue under another controller from the next slice.
 
-        controller, sim, actuators: as for `rollout`; actuators stay where none are given, and None takes them away.
+        controller, sim, actuators: as for `rollout`. Actuators that are not given stay; None
+            removes them.
         control_period: s.
         """  # fmt: skip
         as_callable("the controller", controller, "controller(q, v, t)")

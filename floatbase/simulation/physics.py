@@ -360,7 +360,8 @@ class Simulation:
         ordered as `point_names`.
         """
         geoms, contact_frame_forces = self._raw_contacts()
-        return self._contact_forces_from(geoms[None], contact_frame_forces[None])[0]
+        forces: Array = self._contact_forces_from(geoms[None], contact_frame_forces[None])[0]
+        return forces
 
     def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
         """What MuJoCo has of n contacts of feet now: geoms as the upright model has them, (n, 2),
@@ -420,7 +421,8 @@ class Simulation:
     def _lowest_points(self, centres: Array) -> Array:
         """`contact_positions` for centres of the balls, shape (…, n_points, 3), m."""
         nearest = np.argmin(self.ground.clearances(centres), axis=-1)
-        return centres - self._radii * self.ground.normals[nearest]
+        lowest: Array = centres - self._radii * self.ground.normals[nearest]
+        return lowest
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted
@@ -472,7 +474,8 @@ class Simulation:
     def _base_height(self) -> float:
         """Height of the base's origin over the nearest plane of the ground, m."""
         position = self._base_position.tolist()
-        return min([_dot(normal, position) - offset for normal, offset in self._planes])
+        height: float = min([_dot(normal, position) - offset for normal, offset in self._planes])
+        return height
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"

@@ -6,12 +6,19 @@ picture, in the `colours` of all pictures; `prefixed` puts several items below o
 makes figures of a rollout and of push recovery.
 """
 
-from floatbase.viewer import plots
-from floatbase.viewer.camera import PRESETS, View
-from floatbase.viewer.scene import colours, markers, shapes
-from floatbase.viewer.scene.painter import prefixed
-from floatbase.viewer.scene.shapes import Item, Picture
-from floatbase.viewer.viewer import Viewer
+from floatbase.errors import ViewerError
+
+try:
+    from floatbase.viewer import plots
+    from floatbase.viewer.camera import PRESETS, View
+    from floatbase.viewer.scene import colours, markers, shapes
+    from floatbase.viewer.scene.painter import prefixed
+    from floatbase.viewer.scene.shapes import Item, Picture
+    from floatbase.viewer.viewer import Viewer
+except ModuleNotFoundError as error:
+    if str(error.name).startswith("floatbase"):
+        raise
+    raise ViewerError(f'The viewer needs {error.name}: pip install "floatbase[viewer]".') from None
 
 __all__ = [
     "PRESETS",

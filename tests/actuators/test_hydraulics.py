@@ -32,7 +32,7 @@ def joints(hydraulics: Hydraulics = HYQ) -> HydraulicActuators:
 def run(
     actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3
 ) -> np.ndarray:
-    """Torques at the end of each step while the joints are held at their best angles, shape (n, d)."""
+    """Torques after each step with the joints held at their best angles, shape (n, d)."""
     q, v = actuators.cylinders.max_lever_angle, np.zeros(actuators.cylinders.d)
     return np.array([actuators.step(tau, q, v, dt) for _ in range(round(time / dt))])
 

@@ -44,7 +44,7 @@ def test_a_delay_of_a_quarter_step_mixes_the_last_torques_with_the_new_ones() ->
 
 @pytest.mark.parametrize("delay", [0.7e-3, 3e-3, 1e-2 / 3.0])
 def test_the_length_of_the_steps_changes_nothing_but_the_grid(delay: float) -> None:
-    """Four steps of 0.25 ms have the mean of one of 1 ms, with as many different torques under way."""
+    """Four steps of 0.25 ms have the mean of one of 1 ms, with four different torques."""
     fine = got(Delay(ROBOT, delay), np.repeat(WANTED, 4, axis=0), 0.25e-3)
     assert np.allclose(
         fine.reshape(40, 4, 12).mean(axis=1), got(Delay(ROBOT, delay), WANTED), atol=ROUNDING

@@ -311,9 +311,12 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
 def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
     record, walk = trot(200.0)
     reach = max(
-        np.linalg.norm(step.feet[foot][:2] - record.com[np.searchsorted(record.time, step.time) - 1][:2])
-        for step in walk.history for foot in step.stance if step.time > 1.5
-    )  # fmt: skip
+        np.linalg.norm((step.feet[foot] - record.com[i])[:2])
+        for step in walk.history
+        for i in [np.searchsorted(record.time, step.time) - 1]
+        for foot in step.stance
+        if step.time > 1.5
+    )
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
     assert record.outcome == "completed"  # limited about the plan it falls
     assert (

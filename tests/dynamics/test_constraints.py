@@ -31,8 +31,10 @@ M_DISC, R_DISC, G = 3.0, 0.25, 9.81
 I_ACROSS, I_AXLE = 0.25 * M_DISC * R_DISC**2, 0.5 * M_DISC * R_DISC**2
 Z = np.array([0.0, 0.0, 1.0])
 
-DISC = f"""<robot name="disc"><link name="disc"><inertial><origin xyz="0 0 0"/><mass value="{M_DISC}"/>
-<inertia ixx="{I_ACROSS}" ixy="0" ixz="0" iyy="{I_AXLE}" iyz="0" izz="{I_ACROSS}"/></inertial></link></robot>"""
+DISC = f"""<robot name="disc"><link name="disc"><inertial>
+<origin xyz="0 0 0"/><mass value="{M_DISC}"/>
+<inertia ixx="{I_ACROSS}" ixy="0" ixz="0" iyy="{I_AXLE}" iyz="0" izz="{I_ACROSS}"/>
+</inertial></link></robot>"""
 
 # a body with a steered wheel, every axis and offset askew, so that no term of the drift is zero by
 # luck
@@ -43,9 +45,11 @@ CART = """<robot name="cart">
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
 <link name="wheel"><inertial><origin xyz="0.01 0 0.02"/><mass value="1.5"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial></link>
-<joint name="steering" type="revolute"><parent link="body"/><child link="fork"/><origin xyz="0.3 0.05 -0.1" rpy="0.1 0.2 -0.1"/>
+<joint name="steering" type="revolute"><parent link="body"/><child link="fork"/>
+<origin xyz="0.3 0.05 -0.1" rpy="0.1 0.2 -0.1"/>
 <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="10" velocity="10"/></joint>
-<joint name="axle" type="revolute"><parent link="fork"/><child link="wheel"/><origin xyz="0.05 0.02 -0.1" rpy="0.2 0 0.1"/>
+<joint name="axle" type="revolute"><parent link="fork"/><child link="wheel"/>
+<origin xyz="0.05 0.02 -0.1" rpy="0.2 0 0.1"/>
 <axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="10" velocity="10"/></joint></robot>"""
 
 
@@ -115,9 +119,7 @@ def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:
 # any A q̈ = b -------------------------------------------------------------------------------------
 
 
-def test_a_linear_constraint_is_kept_by_the_motion_and_its_force_is_its_rows_times_its_multipliers() -> (
-    None
-):
+def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_multipliers() -> None:
     rng = np.random.default_rng(0)
     state = judges.load("go2").random_state(1)
     A, b = rng.normal(size=(4, 18)), rng.normal(size=4)
@@ -168,9 +170,7 @@ def test_a_number_of_rows_may_be_a_float() -> None:
 # bolts: Figure 1, left ----------------------------------------------------------------------------
 
 
-def test_bolts_of_a_robot_that_is_held_still_carry_its_weight_upwards_and_the_moment_of_its_centre_of_mass() -> (
-    None
-):
+def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_of_mass() -> None:
     """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r
     from the frame to the CoM.
     """
@@ -197,9 +197,7 @@ def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls
     assert 0.5 * up[2] < wrench[2] < 0.99 * up[2]
 
 
-def test_a_bolted_robot_moves_as_the_fixed_base_robot_of_the_same_urdf_and_its_bolts_carry_that_robots_base_wrench() -> (
-    None
-):
+def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_base_wrench() -> None:
     robot = judges.load("go2")
     rng = np.random.default_rng(0)
     model = pin.buildModelFromXML(robot.urdf)
@@ -426,7 +424,7 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
         return max(gains)
 
     def lie(x: Array, y: Array) -> Array:
-        """The bracket of two body-fixed directions: the free flyer's own, se(3); zero for joints."""
+        """Lie bracket of two body-fixed directions: se(3) for the free flyer, zero for joints."""
         out = np.zeros(cart.nv)
         out[:6] = (pin.Motion(x[:3], x[3:6]) ^ pin.Motion(y[:3], y[3:6])).vector
         return out

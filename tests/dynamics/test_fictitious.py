@@ -84,9 +84,7 @@ def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bo
         assert np.allclose(world.gravity, T.T @ own.gravity)
 
 
-def test_gliding_and_tumbling_as_one_body_asks_for_no_force_on_the_centre_of_mass_in_the_worlds_axes() -> (
-    None
-):
+def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axes() -> None:
     """A base that glides is the artefact: the base's axes count m ω × v, the world's only what
     tumbles.
     """

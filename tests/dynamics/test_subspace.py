@@ -223,9 +223,7 @@ def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -
             assert np.max(np.abs(J.T @ N), initial=0.0) < 1e-8, case
 
 
-def test_solo8_on_four_feet_has_rank_10_where_it_stands_symmetrically_9_with_straight_legs_and_11_elsewhere() -> (
-    None
-):
+def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_elsewhere() -> None:
     robot = judges.load("solo8")
     for state, rank in (
         (robot.standing(), 10),
@@ -344,9 +342,7 @@ def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_lo
         assert space.dimension == eom.d + eom.k - dynamics.dimensions(eom).rank_J, exponent
 
 
-def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_which_the_letter_of_the_rows_forbids() -> (
-    None
-):
+def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_forbid_it() -> None:
     """A leaning of 1e-4 rad is below what contacts resolve: torques that roll the base meet no wall
     of 500 N there.
     """
@@ -528,7 +524,7 @@ def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(n
 
 @pytest.mark.parametrize("name", judges.FLAT)
 def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: str) -> None:
-    """Twelve corner numbers a foot are not unique, the six of its wrench are; in motion, feet held."""
+    """A foot's twelve corner forces are not unique, the six of its wrench are; in motion, too."""
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         contacts = fb.Contacts.flat_feet(state.robot)
@@ -705,9 +701,7 @@ def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str
         )  # (13) v has no part along V⊥
 
 
-def test_where_contacts_cannot_do_what_is_required_the_dynamics_still_hold_and_the_motion_rows_are_met_nearest() -> (
-    None
-):
+def test_with_inconsistent_contacts_the_dynamics_hold_and_motion_rows_are_met_nearest() -> None:
     """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay
     for that.
     """

@@ -25,7 +25,7 @@ def made_of(rays: Array, x: Array) -> bool:
 @settings(max_examples=60)
 @given(seeds, st.integers(1, 6), st.integers(1, 12))
 def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> None:
-    """Any rays: too few to span the space, enough, or so many that they make lines or everything."""
+    """Any rays: too few to span the space, enough, or so many that they span lines or all."""
     rng = np.random.default_rng(seed)
     rays = rng.normal(size=(n, N)) + rng.uniform(0, 1.5) * np.eye(n)[:, :1]
     G, E = cone_face_matrix(rays)

@@ -76,7 +76,7 @@ def data_of(shown: Any) -> dict[str, Any]:
 def scene_at(
     data: dict[str, Any], stop: str | None = None, view: int = 0
 ) -> dict[tuple[str, ...], bytes]:
-    """Key -> command of the first scene, or of that of a stop, put together as pictures.js does it."""
+    """Key -> command of the first scene, or of a stop's, assembled as pictures.js does it."""
     commands, scene = static_export.commands(data), {}
     changes = data["stops"][stop][1 + view] if stop is not None else []
     for numbers in (data["first"][view], changes):
@@ -408,8 +408,10 @@ SIGNATURE = """() => {
   const found = {}, walk = (node, path) => {
     const drawn = node.children["<object>"], {matrix, visible} = node.object;
     node.object.updateMatrix();
-    found[path] = [...matrix.elements.map((x) => x.toFixed(4)), drawn ? drawn.object.material?.color?.getHex() : null].join();
-    for (const [name, child] of Object.entries(node.children)) if (name !== "<object>") walk(child, `${path}/${name}`);
+    const colour = drawn ? drawn.object.material?.color?.getHex() : null;
+    found[path] = [...matrix.elements.map((x) => x.toFixed(4)), colour].join();
+    for (const [name, child] of Object.entries(node.children))
+      if (name !== "<object>") walk(child, `${path}/${name}`);
   };
   walk(viewer.scene_tree.find(["meshcat"]), "");
   return found;

@@ -136,7 +136,7 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         assert np.allclose(wrench["moment"](forces), rate[3:], atol=1e-6 * scale)
 
 
-def test_a_force_up_at_the_left_feet_rolls_the_robot_to_the_right_and_footnote_10_would_roll_it_left() -> (
+def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would_roll_it_left() -> (
     None
 ):
     """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the course text prints x_c -
@@ -243,14 +243,12 @@ def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
 
 
 def split(f: Array, n: Array) -> tuple[float, float]:
-    """Tangential size and signed normal size of a force, by trigonometry rather than by projectors."""
+    """Tangential and signed normal size of a force, by trigonometry instead of projectors."""
     normal = float(f @ n)
     return float(np.sqrt(max(0.0, f @ f - normal**2))), normal
 
 
-def test_the_force_bias_is_the_squared_friction_plus_alpha_times_the_squared_distance_of_the_normal_force_from_a() -> (
-    None
-):
+def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_from_a() -> None:
     rng = np.random.default_rng(0)
     contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
     for _ in range(20):
@@ -405,7 +403,7 @@ def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
 
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
-    """What `TorquesFromForces` promises for d < k: min ‖J q̈ - b‖ with that λ, then the smallest τ."""
+    """What `TorquesFromForces` gives for d < k: min ‖J q̈ - b‖ with that λ, then the least τ."""
     eom = judges.at_rest("solo8", 0)
     desired = 10.0 * np.random.default_rng(3).normal(size=12)
     x = cp.Variable(8)
@@ -425,13 +423,15 @@ GO2 = judges.load("go2")
 STATE, FEET = GO2.standing(), fb.Contacts.points(GO2)
 MIXED = FEET + fb.Contacts([fixed_frame("base")])
 EOM = fb.equations_of_motion(STATE, FEET)
+SPACE = fb.feasible_space(EOM)
+NONE = np.zeros(3)
 
 
 @pytest.mark.parametrize(
     "case",
     [
         (lambda: objectives.com_wrench_map(STATE, MIXED), "bolts of base"),
-        (lambda: objectives.wrench_objective(STATE, MIXED, np.zeros(3), np.zeros(3)), "bolts of base"),
+        (lambda: objectives.wrench_objective(STATE, MIXED, NONE, NONE), "bolts of base"),
         (lambda: objectives.tangential_bias(MIXED), "bolts of base"),
         (lambda: objectives.force_bias(MIXED, 1.0, 0.0), "bolts of base"),
         (lambda: objectives.normal_bias(FEET, [1.0, 2.0, 3.0]), "a", 3, 4),
@@ -445,7 +445,7 @@ EOM = fb.equations_of_motion(STATE, FEET)
         (lambda: objectives.torques_from_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
         (lambda: objectives.cost_on_torques(Quadratic.zero(12), EOM), 18, 12),
         (
-            lambda: objectives.partial_minimum(Quadratic.zero(12), fb.feasible_space(EOM), "lambda"),
+            lambda: objectives.partial_minimum(Quadratic.zero(12), SPACE, "lambda"),
             "lambda", "qdd", "tau", "forces",
         ),
     ],

@@ -1,4 +1,4 @@
-"""Tasks: each residual is actual minus desired acceleration, judged by moving the robot a little."""
+"""Tasks: residuals are actual - desired acceleration, by finite differences of motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The active-set solver: right answers, an honest record of the way, and an end on every problem."""
+"""The active-set solver: right answers, a true record of the iterations, termination."""
 
 from __future__ import annotations
 

@@ -259,8 +259,11 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> Non
         solve(qp, solver)
     assert not missing(str(caught.value), *caught.value.constraints)
     kept = [names.index(row) for row in caught.value.constraints]
-    assert set(caught.value.constraints) in ({"x is 1", "x is 1.5"}, {"sum is 3", "x is 1.5", "y is 2"},
-                                      {"sum is 3", "x is 1.5", "y is 2 again"})  # fmt: skip
+    assert set(caught.value.constraints) in (
+        {"x is 1", "x is 1.5"},
+        {"sum is 3", "x is 1.5", "y is 2"},
+        {"sum is 3", "x is 1.5", "y is 2 again"},
+    )
     for row in kept:
         rest = [i for i in kept if i != row]
         assert QP(np.eye(2), np.zeros(2), A[rest], qp.b[rest], *NONE).equality_space.n_in >= 0
@@ -303,9 +306,7 @@ def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     )
 
 
-def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method_to_the_last_digits() -> (
-    None
-):
+def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method() -> None:
     """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H
     run from 1e-11 to 20.
     """

@@ -172,9 +172,10 @@ def two_links(
     )
 
 
-HUNG = """<link name="tip"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-</link><joint name="swing" type="prismatic"><parent link="top"/><child link="tip"/><limit effort="0" velocity="1"/></joint>
-</robot>"""
+HUNG = """<link name="tip"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="swing" type="prismatic"><parent link="top"/><child link="tip"/>
+<limit effort="0" velocity="1"/></joint></robot>"""
 
 
 @pytest.mark.parametrize(

@@ -119,9 +119,7 @@ def test_a_robot_that_stands_low_keeps_its_joint_limits_or_says_which_are_in_the
         talos.standing(height=0.3)
 
 
-def test_a_reference_posture_beyond_a_limit_is_the_same_pose_by_a_whole_turn_where_that_will_do() -> (
-    None
-):
+def test_a_reference_posture_beyond_a_limit_is_moved_by_a_whole_turn_where_that_suffices() -> None:
     theirs, robot = example_robot_data.load("kinova"), fb.load("kinova")
     data = theirs.model.createData()
     pin.framesForwardKinematics(theirs.model, data, theirs.q0)

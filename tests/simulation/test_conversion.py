@@ -73,9 +73,7 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
         assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_and_flies_as_it_must() -> (
-    None
-):
+def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_freely() -> None:
     """MuJoCo calls the ground "world" and would weld that link to it: ur5's own URDF, unbolted."""
     arm = judges.load("ur5")
     loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)

@@ -1,4 +1,4 @@
-"""The physics: gravity, pushes, motors, ground and measured forces are what Newton says they are."""
+"""The physics: gravity, pushes, motors, ground and measured forces obey Newton's laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The loop closed: robots stand on MuJoCo's floor under our controller, and come back after a push."""
+"""Closed loop: robots stand on MuJoCo's floor under our controller and recover from pushes."""
 
 from __future__ import annotations
 

@@ -94,18 +94,20 @@ class Client:
         return False
 
 
-_PAGE = """<!DOCTYPE html><html><head><link rel="icon" href="data:,"><style>.output { margin: 4px 0; }</style>
-</head><body><script type="module">
+_PAGE = """<!DOCTYPE html><html><head><link rel="icon" href="data:,">
+<style>.output { margin: 4px 0; }</style></head><body><script type="module">
 const outputs = document.body;
 // A widget's model as anywidget gives it, with a websocket in place of a comm.
 window.show = async (id, state) => {
   const heard = new Map(), el = document.createElement("div");
   const socket = new WebSocket(`ws://${location.host}/comm?id=${id}`);
-  const bytes = (text) => new DataView(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
+  const bytes = (text) =>
+    new DataView(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer);
   const fire = (name, ...args) => [...(heard.get(name) || [])].forEach((call) => call(...args));
   const layout = {comm_live: true};
   const model = {
-    get: (name) => name == "thumbnail" ? bytes(state.thumbnail) : name == "layout" ? layout : state[name],
+    get: (name) =>
+      name == "thumbnail" ? bytes(state.thumbnail) : name == "layout" ? layout : state[name],
     send: (content) => socket.send(JSON.stringify(content)),
     on: (name, call) => heard.set(name, [...(heard.get(name) || []), call]),
     off: (name, call) => heard.set(name, (heard.get(name) || []).filter((other) => other !== call)),

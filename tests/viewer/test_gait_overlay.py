@@ -303,12 +303,14 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
 TARGET = "viewer.controls.target.toArray()"
 # where the scale's bar begins, in our coordinates
 BAR = """() => {
-  const at = viewer.scene_tree.find(["meshcat", "scale", "bar"]).object.getWorldPosition(new MeshCat.THREE.Vector3());
+  const bar = viewer.scene_tree.find(["meshcat", "scale", "bar"]).object;
+  const at = bar.getWorldPosition(new MeshCat.THREE.Vector3());
   return [at.x, -at.z, at.y];
 }"""
 # where the two lights are that reach no farther than 10 m, in our coordinates
 LIGHTS = """() => ["PointLightNegativeX", "PointLightPositiveX"].map((name) => {
-  const at = viewer.scene_tree.find(["Lights", name, "<object>"]).object.getWorldPosition(new MeshCat.THREE.Vector3());
+  const light = viewer.scene_tree.find(["Lights", name, "<object>"]).object;
+  const at = light.getWorldPosition(new MeshCat.THREE.Vector3());
   return [at.x, -at.z, at.y];
 })"""
 SEEN = 0.01  # m: what the eye does not see
@@ -322,7 +324,7 @@ def moved(state: State, x: float, y: float, z: float = 0.0) -> State:
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("slope", [0.0, 0.3])
-def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_the_scale_comes_along(
+def test_a_live_picture_is_followed_smoothly_at_one_height_and_the_scale_comes_along(
     page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, slope: float
 ) -> None:
     page.set_viewport_size(SMALL)
@@ -337,7 +339,8 @@ def test_a_live_picture_is_followed_smoothly_at_one_height_over_the_ground_and_t
         ways = page.evaluate("""() => new Promise((resolve) => {
           const seen = [], look = () => {
             seen.push(viewer.controls.target.x);
-            if (document.getElementById("title").textContent == "gone" && !viewer.needs_render) resolve(seen);
+            const gone = document.getElementById("title").textContent == "gone";
+            if (gone && !viewer.needs_render) resolve(seen);
             else requestAnimationFrame(look);
           };
           look();

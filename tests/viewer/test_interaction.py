@@ -27,7 +27,7 @@ SCENE = "viewer.scene_tree.children.meshcat.children"
 def framed(
     page, go2: Robot, standing: State, contacts: Contacts, tmp_path: Path
 ) -> Iterator[tuple]:
-    """A page that scrolls, with a saved picture in a frame from 300 to 780 pixels, and that frame."""
+    """A page that scrolls, and its frame, with a saved picture, from 300 to 780 pixels."""
     view = Viewer(go2, facets=4)
     view.show(
         standing,

@@ -100,7 +100,8 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
         client.sendall(
             f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{window.port}\r\nUpgrade: websocket\r\n"
             f"Connection: Upgrade\r\n"
-            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            "Sec-WebSocket-Version: 13\r\n\r\n".encode()
         )
         until(lambda: window.n_pages == 1)
         yield client
@@ -237,7 +238,8 @@ robot = fb.load("go2")
 sim = fb.Simulation(robot)
 view = fb.Viewer(robot)
 view.show(sim.state)
-display(view, push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), view), view))
+controller = fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state))
+display(view, push_panel(live_run(sim, controller, view), view))
 field = playground("go2")
 display(field)
 print(repr(view), repr(field), type(view.widget()).__name__)"""

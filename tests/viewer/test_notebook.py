@@ -423,11 +423,13 @@ robot = fb.load("go2")
 view = fb.Viewer(robot, height=300)
 view.show(robot.standing())""",
     """other = fb.Viewer(robot, height=300)
-slider_panel(other, lambda z: other.show(robot.standing(), com=z > 0.5) and None, z=(0.0, 0.5, 1.0))""",
+show = lambda z: other.show(robot.standing(), com=z > 0.5) and None
+slider_panel(other, show, z=(0.0, 0.5, 1.0))""",
     """sim = fb.Simulation(robot)
 third = fb.Viewer(robot, height=300)
 third.show(sim.state)
-push_panel(live_run(sim, fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state)), third), third)""",
+controller = fb.WholeBodyController(robot, sim.feet, fb.standing_tasks(sim.state))
+push_panel(live_run(sim, controller, third), third)""",
 )
 
 

@@ -20,7 +20,10 @@ pytestmark = pytest.mark.front_end
 
 ENDS = """() => {
   for (const input of document.querySelectorAll('#panel input[type=range]'))
-    for (const end of [input.min, input.max]) { input.value = end; input.dispatchEvent(new Event('input')); }
+    for (const end of [input.min, input.max]) {
+      input.value = end;
+      input.dispatchEvent(new Event('input'));
+    }
 }"""
 BACK = (
     "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => "

@@ -351,7 +351,8 @@ def test_a_busy_page_shows_the_second_record_as_it_is(
     cone, arrow = page.evaluate(
         """() => ["cone/FL_foot/surface", "measured/FL_foot"].map((path) =>
           viewer.scene_tree.find(["meshcat", ...path.split("/")]).object)
-          .map((node) => [node.children.concat(node).find((o) => o.material).material.color.toArray(), node.scale.z])"""
+          .map((node) => [node.children.concat(node).find((o) => o.material), node.scale.z])
+          .map(([drawn, length]) => [drawn.material.color.toArray(), length])"""
     )
     np.testing.assert_allclose(cone[0], ALARM, atol=1e-3)
     length = viewer.scale * 0.25 * viewer.robot.weight * np.hypot(0.9, 1.0)
@@ -376,7 +377,10 @@ def test_every_record_has_one_clock_and_its_speed(
         """() => new Promise((resolve) => {
           const ask = window.requestAnimationFrame.bind(window);
           let frames = 0, ticks = 0;
-          window.requestAnimationFrame = (call) => { ticks += call.name == "tick"; return ask(call); };
+          window.requestAnimationFrame = (call) => {
+            ticks += call.name == "tick";
+            return ask(call);
+          };
           const count = () => ++frames > 10 ? resolve(ticks / (frames - 1)) : ask(count);
           ask(count);
         })"""

@@ -198,9 +198,14 @@ DEFICIENCIES = {
 
 def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
     for name, deficiency in DEFICIENCIES.items():
-        for one, other in [(MEASURED, PLANNED), (CONE["inside"], CONE["active"]), (CONE["inside"], CONE["outside"]),
-                           (CONE["active"], CONE["outside"]), (GREYS[1], PLANNED),
-                           *pairwise(GREYS)]:  # fmt: skip
+        for one, other in [
+            (MEASURED, PLANNED),
+            (CONE["inside"], CONE["active"]),
+            (CONE["inside"], CONE["outside"]),
+            (CONE["active"], CONE["outside"]),
+            (GREYS[1], PLANNED),
+            *pairwise(GREYS),
+        ]:
             assert (
                 np.linalg.norm(_simulated(one, deficiency) - _simulated(other, deficiency)) > 0.2
             ), name

@@ -28,10 +28,12 @@ SEEN = 3.0  # contrast that WCAG 2.2 asks for between parts of a picture and wha
 READ = 4.5  # and for text
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
 DARK = "document.body.classList.contains('dark')"
-COLOUR = """(path) => viewer.scene_tree.find([...path.split("/"), "<object>"]).object.material.color.getHexString()"""
+COLOUR = """(path) => viewer.scene_tree.find([...path.split("/"), "<object>"])
+  .object.material.color.getHexString()"""
 LATER = "new Promise((done) => setTimeout(done, 2 * RETRY))"
-GREY = """() => Math.min(...viewer.scene_tree.find(["meshcat", "label", "FL_foot", "<object>"]).object.material.map.image.data
-  .filter((_, i) => i % 2 == 0))"""
+GREY = """() => Math.min(
+  ...viewer.scene_tree.find(["meshcat", "label", "FL_foot", "<object>"])
+  .object.material.map.image.data.filter((_, i) => i % 2 == 0))"""
 
 
 def contrast(one: RGB, other: RGB) -> float:

@@ -405,10 +405,22 @@ STRANGE = [
     "", "hello", '{"type":', "null", "3", "[]", '"x"', "{}", "[" * 200_000, "9" * 6000, b"\x00\xff",
     b"\xff\xfe{}",
     *(json.dumps({"type": kind}) for kind in (3, [], {}, "nonsense", "image", "control")),
-    *(json.dumps({"type": "image", "id": number, "data": "x"}) for number in ([], {}, "7", 7, None)),
-    *(json.dumps({"type": "control", "name": name, "value": 1}) for name in (None, [], {}, 3, "unknown", "\ud800")),
-    *(json.dumps({"type": "control", "name": "slider", "value": v}) for v in (None, "1", [1], True, np.nan, np.inf, 10**400)),
-    *(json.dumps({"type": "control", "name": "box", "value": v}) for v in (None, "true", [True], 1, np.nan)),
+    *(
+        json.dumps({"type": "image", "id": number, "data": "x"})
+        for number in ([], {}, "7", 7, None)
+    ),
+    *(
+        json.dumps({"type": "control", "name": name, "value": 1})
+        for name in (None, [], {}, 3, "unknown", "\ud800")
+    ),
+    *(
+        json.dumps({"type": "control", "name": "slider", "value": v})
+        for v in (None, "1", [1], True, np.nan, np.inf, 10**400)
+    ),
+    *(
+        json.dumps({"type": "control", "name": "box", "value": v})
+        for v in (None, "true", [True], 1, np.nan)
+    ),
     '{"type": "control", "name": "slider"}',
     json.dumps({"type": "control", "name": "slider", "value": 0.5, "by": "\ud800"}),
 ]  # fmt: skip

@@ -238,9 +238,10 @@ class CompiledTick:
             [friction, limits.bounded_points(contacts), limited, limited, user_rows]
         )
         mu, active = result[self.forces.stop :].reshape(2, -1)[:, :n_active]
-        multipliers = np.zeros(has_row.size)
-        multipliers[active.astype(np.int64)] = np.maximum(mu, 0.0)
-        return multipliers[has_row]
+        all_rows = np.zeros(has_row.size)
+        all_rows[active.astype(np.int64)] = np.maximum(mu, 0.0)
+        multipliers: Array = all_rows[has_row]
+        return multipliers
 
     def inputs_at(self, q: Array, v: Array, t: float) -> TickInputs | None:
         """What the tick is given at time t, in arrays of its own, as other threads may run ticks

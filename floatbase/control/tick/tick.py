@@ -7,7 +7,10 @@ INFEASIBLE. Then the reference backend decides.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
@@ -67,7 +70,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
     return tree, links, contacts, tasks, limits
 
 
-def workspace_sizes(sizes, n_user_rows):
+def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
     """How many real and how many whole numbers a tick needs.
 
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.

@@ -57,7 +57,7 @@ def _rows_on_three_feet() -> int:
 
 
 def _judge_rows(answer: Any) -> Verdict:
-    """Rows G, whose G x ≤ 0 are tried on vectors x: any order and any length of the rows will do."""
+    """Rows G, judged by G x ≤ 0 on vectors x: rows may have any order and any length."""
     G = array_or_verdict(answer, (4, 42))
     if isinstance(G, Verdict):
         return G

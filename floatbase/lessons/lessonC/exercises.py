@@ -421,8 +421,20 @@ def _steps() -> list[Example]:
         (step(slack=lambda x, G, h: G @ x - h), "negative"),
         (step(slack=lambda x, G, h: h), "elsewhere"),
         (step(counts=lambda room, speed: speed > 1e-9), "speed_rounding"),
-        (step(counts=lambda room, speed: abs(speed) > 1e-6, length=lambda room, speed: room / abs(speed)), "away"),
-        (step(counts=lambda room, speed: speed >= 0, length=lambda room, speed: room / max(speed, 1e-3)), "along"),
+        (
+            step(
+                counts=lambda room, speed: abs(speed) > 1e-6,
+                length=lambda room, speed: room / abs(speed),
+            ),
+            "away",
+        ),
+        (
+            step(
+                counts=lambda room, speed: speed >= 0,
+                length=lambda room, speed: room / max(speed, 1e-3),
+            ),
+            "along",
+        ),
         (step(best=max), "nearest"), (by_room, "soonest"),
         (step(counts=lambda room, speed: speed > 1e-9, held=False), "held"),
         (step(counts=lambda room, speed: speed > 1e-6 and room > 0), "touches"),
@@ -446,7 +458,10 @@ def _drops() -> list[Example]:
         (drop(lambda W, prices: int(np.argmin(prices))), "place"),
         (drop(lambda W, prices: W[int(np.argmax(np.abs(prices)))]), "pulls"),
         (drop(hardest, 0.0), "rounding"),
-        (drop(lambda W, prices: next(r for r, p in zip(W, prices, strict=True) if p < 0)), "most_negative"),
+        (
+            drop(lambda W, prices: next(r for r, p in zip(W, prices, strict=True) if p < 0)),
+            "most_negative",
+        ),
         (lambda W, prices: hardest(W, prices) if len(W) else None, "pushes"),
         (drop(hardest, -0.2), "negative_alone"),
         (lambda W, prices: drop(hardest)(W, prices) if len(W) else 3, "place"),

@@ -135,6 +135,8 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
         if first in description["stops"]
         else ""
     )
+    if scenes:
+        scenes = f'<div class="floatbase-scenes">{scenes}</div>'
     controls = "".join(map(_control_html, description["controls"]))
     words = (
         f'<p class="floatbase-words">{html.escape(description["words"])}</p>'
@@ -144,9 +146,10 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
     return (
         f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
         f'data-picture="{name}">'
-        f'<div class="floatbase-seen">{f"""<div class="floatbase-scenes">{scenes}</div>""" if scenes else ""}'
+        f'<div class="floatbase-seen">{scenes}'
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
-        f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>'
+        f'<div class="floatbase-controls">{controls}</div>{words}'
+        f"<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>"
     )
 
 

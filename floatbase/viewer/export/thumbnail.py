@@ -156,7 +156,7 @@ def _setting(scene: Scene, kind: str, default: dict[str, Any]) -> dict[str, Any]
 
 
 def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
-    """The camera where it was set, gone with what it follows, at the same height over the ground."""
+    """The camera, moved with what it follows, at the same height over the ground."""
     set_to = _setting(
         scene, "set_camera", {"position": [2.0, 1.0, 0.0], "target": [0.0, 0.0, 0.0], "fov": 32.0}
     )

@@ -2,7 +2,7 @@
 push recovery.
 """
 
-from floatbase.viewer.plots import push_recovery_plots
+from floatbase.viewer.plots import push_recovery_plots, run_plots
 from floatbase.viewer.plots.run_plots import (
     friction_used,
     plot_com,
@@ -24,4 +24,5 @@ __all__ = [
     "plot_run",
     "plot_torques",
     "push_recovery_plots",
+    "run_plots",
 ]

@@ -101,7 +101,8 @@ def horizontal_force_limits(
     """The compass of `plot_horizontal_force_limits` on level ground below the centre of mass, with
     rings: items for `extra` of `Viewer.show`.
 
-        view.show(state, contacts, extra=push_recovery_plots.horizontal_force_limits(wrench_set(state, contacts)))
+        wrenches = wrench_set(state, contacts)
+        view.show(state, contacts, extra=push_recovery_plots.horizontal_force_limits(wrenches))
 
     wrenches, n: as for `plot_horizontal_force_limits`. scale: length of a drawn force, m/N; None
         makes it half as wide

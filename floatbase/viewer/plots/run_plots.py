@@ -1,4 +1,4 @@
-"""Plots of a rollout in the colours of the scene: centre of mass, forces, gait, friction, torques."""
+"""Plots of a rollout in the colours of the scene: CoM, forces, gait, friction, torques."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ LEVEL = Plane((0.0, 0.0, 1.0))
 
 
 def displacement(ground: Plane | Planes, start: Array, end: Array) -> Array:
-    """From one place to another, shapes (3,), m, and as much up or down as the ground between them."""
+    """The way between two places, shapes (3,), m, up or down with the ground between them."""
     x, y = (end - start)[:2]
     return np.array([x, y, ground.height(end) - ground.height(start)])
 

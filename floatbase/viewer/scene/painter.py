@@ -488,7 +488,7 @@ def _polyhedron(
 
 
 def round_1_2_5(value: float) -> float:
-    """Of the numbers 1, 2, 5 times a power of ten, the one whose ratio to `value` is nearest to 1."""
+    """1, 2 or 5 times a power of ten, whichever has the ratio to `value` nearest to 1."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
 

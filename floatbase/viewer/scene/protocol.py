@@ -137,7 +137,7 @@ def set_ground(planes: Iterable[tuple[npt.ArrayLike, float]]) -> Update:
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
-    """The views that the page offers by name, each as position, target and angle of `set_camera`."""
+    """The views that the page offers, each as position, target and angle of `set_camera`."""
     named = {
         name: {"position": _to_threejs(eye), "target": _to_threejs(at), "fov": fov}
         for name, (eye, at, fov) in views.items()

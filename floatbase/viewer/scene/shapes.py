@@ -342,7 +342,7 @@ def ground_grid(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
 
 
 def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
-    """The lines of `ground_grid` in pieces, two ends each, shape (2 n, 3), m. step, half: as there."""
+    """Line segments of `ground_grid`, two ends each, shape (2 n, 3), m. step, half: as there."""
     at = np.arange(-half, half + step / 2, step)
     # each line in pieces of one step: software renderers lose lines that begin far behind the
     # camera

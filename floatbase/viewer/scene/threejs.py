@@ -43,7 +43,7 @@ class Shape:
 
     @cached_property
     def packed(self) -> bytes:
-        """The object in MessagePack, for `protocol.set_object`. It is packed once for all pictures."""
+        """The object in MessagePack, for `protocol.set_object`, packed once for all pictures."""
         return umsgpack.packb(self.data)
 
 

@@ -186,7 +186,7 @@ class _WidgetChannel(Channel):
 
 @cache
 def _page_code() -> tuple[str, tuple[bytes, bytes]]:
-    """A name of this version of the page, and its HTML and the viewer's code, each packed by gzip."""
+    """The name of this page's version, its HTML and the viewer's code, each packed by gzip."""
     parts = pages.notebook_page().encode(), pages.viewer_code()
     packed = gzip.compress(parts[0], 9, mtime=0), gzip.compress(parts[1], 9, mtime=0)
     return hashlib.sha256(b"".join(parts)).hexdigest()[:16], packed

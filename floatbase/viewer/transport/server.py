@@ -201,7 +201,7 @@ class _Code(_Guarded):
 
 
 class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
-    """The way to a page over a websocket. tornado's `check_origin` refuses pages of other servers."""
+    """Websocket to a page. tornado's `check_origin` refuses pages of other servers."""
 
     def initialize(self, server: Server) -> None:
         self.server = server

@@ -123,7 +123,7 @@ class Window:
         self._server.notify(self.scene.put(updates))
 
     def on_control(self, callback: Callable[[str, Any], None] | None) -> None:
-        """Call `callback(name, value)`, in the window's thread, when a control of the page is used."""
+        """Call `callback(name, value)` in the window's thread when a page's control is used."""
         self._server.on_control = callback
 
     def wait(self, timeout: float = 30.0) -> None:
@@ -213,7 +213,7 @@ def _checked_port(port: int) -> int:
 
 
 def _bound_sockets(port: int) -> list[socket.socket]:
-    """Sockets that listen on the loopback address. Raises `ViewerError` for a port that is taken."""
+    """Sockets listening on the loopback address. Raises `ViewerError` for a port in use."""
     try:
         return tornado.netutil.bind_sockets(port, ADDRESS, family=socket.AF_INET)
     except OSError as error:

@@ -14,7 +14,7 @@ _MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
 
 
 def pages() -> dict[str, str]:
-    """File name -> text, reStructuredText, of all pages of the library, with one that lists them."""
+    """File name -> reStructuredText of all pages of the library, and of their index."""
     listed = "\n".join(f"   {package} <{package}>" for package in PACKAGES)
     rows = "\n".join(f"* :doc:`{package}`: {about}" for package, about in PACKAGES.items())
     index = (

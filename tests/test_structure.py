@@ -1,0 +1,287 @@
+"""The structure of the package: layers, public APIs, circular imports, sizes and docstrings."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple, get_origin
+
+from messages import raises
+
+import floatbase
+
+PACKAGE = Path(floatbase.__file__).parent
+ROOT = PACKAGE.parent
+# from the lowest; packages of one layer may import each other
+LAYERS = (
+    ("conventions", "errors", "_validation", "_assets", "_geometry", "affine", "linear_algebra"),
+    ("qp",),
+    ("robots",),
+    ("dynamics",),
+    ("objectives",),
+    ("friction",),
+    ("control",),
+    ("actuators",),
+    ("simulation",),
+    ("behaviours",),
+    ("viewer",),
+    ("playground", "lessons"),
+    ("__main__",),
+)
+LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
+MAX_LINES = 400  # of a module
+# modules that are still to be split
+TOO_LONG = {
+    "_validation.py", "behaviours/walk.py", "lessons/lesson03/exercises.py",
+    "lessons/lesson05/exercises.py", "lessons/lesson07/exercises.py",
+    "lessons/lesson08/exercises.py", "lessons/lessonC/exercises.py", "objectives/tasks.py",
+    "qp/active_set.py", "robots/robot.py", "simulation/physics.py", "simulation/sweep.py",
+    "viewer/export/thumbnail.py", "viewer/scene/painter.py", "viewer/scene/shapes.py",
+    "viewer/viewer.py",
+}  # fmt: skip
+MAX_LINE_LENGTH = 100
+# the price of robot.standing() and state.robot
+ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
+# numba loads with them, so no __init__ imports them
+COMPILED = {"floatbase.control.tick.jit", "floatbase.control.tick.tick"}
+BUILT = ("dist", "node_modules", "vendor")  # folders of JavaScript that nobody writes by hand
+MODULES = sorted(
+    path for path in PACKAGE.rglob("*.py") if "_assets" not in path.relative_to(PACKAGE).parts[:-1]
+)
+# floatbase/__init__.py may import every layer; test_environment checks what it loads
+LAYERED = [path for path in MODULES if path != PACKAGE / "__init__.py"]
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+USERS = [
+    *TESTS,
+    *sorted((ROOT / "benchmarks").rglob("*.py")),
+    *sorted((ROOT / "notebooks").glob("*.ipynb")),
+]
+PACKAGES = [
+    ".".join(path.parent.relative_to(ROOT).parts) for path in LAYERED if path.name == "__init__.py"
+]
+
+
+class Import(NamedTuple):
+    """One imported name, None for `import module`."""
+
+    line: int
+    module: str
+    name: str | None
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def layer(path: Path) -> int:
+    return LAYER_OF[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
+
+
+def file_of(module: str) -> Path | None:
+    """The file of a module of the package."""
+    folder = ROOT.joinpath(*module.split("."))
+    return next(
+        (path for path in (folder / "__init__.py", folder.with_suffix(".py")) if path in MODULES),
+        None,
+    )
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    source = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        source = "\n".join(
+            "".join(cell["source"])
+            for cell in json.loads(source)["cells"]
+            if cell["cell_type"] == "code"
+        )
+    return ast.parse(source)
+
+
+@cache
+def imports(path: Path) -> list[Import]:
+    """All imports of the package's modules at run time, also inside functions."""
+    blocks = [
+        node
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+    ]
+    for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
+    found = []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import) and node not in for_types:
+            found += [Import(node.lineno, alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node not in for_types:
+            assert not node.level or path not in MODULES, (
+                f"{relative(path)}:{node.lineno} is a relative import"
+            )
+            for name in [alias.name for alias in node.names]:
+                # `from floatbase import viewer` imports a module, `from floatbase import Viewer`
+                # a name
+                inner, outer = f"{node.module}.{name}", str(node.module)
+                found.append(
+                    Import(node.lineno, inner, None)
+                    if file_of(inner)
+                    else Import(node.lineno, outer, name)
+                )
+    return [one for one in found if one.module.split(".")[0] == "floatbase"]
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Sets of files that import one another, directly or not."""
+    reachable = {node: set(targets) for node, targets in graph.items()}
+    for middle in graph:  # Warshall's algorithm
+        for found in reachable.values():
+            if middle in found:
+                found |= reachable[middle]
+    rings = {
+        frozenset(other for other in reachable[node] if node in reachable[other]) for node in graph
+    }
+    return [set(ring) for ring in rings if ring]
+
+
+def test_every_module_has_a_layer() -> None:
+    assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in LAYERED} <= set(
+        LAYER_OF
+    )
+
+
+def test_modules_import_only_their_own_layer_and_lower_ones() -> None:
+    wrong = []
+    for path in LAYERED:
+        for found in imports(path):
+            if found.module == "floatbase":
+                if layer(path) < LAYER_OF["lessons"]:
+                    wrong.append(f"{relative(path)}:{found.line} imports floatbase itself")
+            elif LAYER_OF[found.module.split(".")[1]] > layer(path):
+                wrong.append(f"{relative(path)}:{found.line} imports {found.module}, a layer above")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_module_of_the_package_is_imported_by_a_string() -> None:
+    """Except by an `__init__`, which is lazy; lessons are found by the names of their folders."""
+    wrong = []
+    for path in [path for path in MODULES if path.name != "__init__.py"]:
+        for node in ast.walk(parsed(path)):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            called, module = ast.unparse(node.func).rpartition(".")[2], node.args[0]
+            if called in ("import_module", "__import__") and "floatbase" in ast.unparse(module):
+                by_folder = isinstance(module, ast.JoinedStr) and "lessons" in path.parts
+                if not by_folder:
+                    wrong.append(f"{relative(path)}:{node.lineno} imports {ast.unparse(module)}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_packages_are_imported_by_their_public_names() -> None:
+    """Or by a module with a leading underscore; a package whose `__all__` is empty has modules for
+    the packages above it. A package's own modules may import one another.
+    """
+    wrong = []
+    for path in [*LAYERED, *USERS]:
+        for found in imports(path):
+            outer, _, inner = found.module.rpartition(".")
+            package = file_of(outer) if outer and outer != "floatbase" else None
+            if found.module in COMPILED or inner.startswith("_"):
+                continue
+            if package and (top_folder(package) in path.parents):
+                continue
+            if found.module in PACKAGES:
+                public = import_module(found.module).__all__
+                if found.name and found.name not in public:
+                    wrong.append(
+                        f"{relative(path)}:{found.line} imports {found.name}, which "
+                        f"{found.module} does not export"
+                    )
+            elif package and inner not in (public := import_module(outer).__all__) and public:
+                wrong.append(f"{relative(path)}:{found.line} imports {found.module}, a module")
+    assert not wrong, "\n".join(dict.fromkeys(wrong))
+
+
+def top_folder(path: Path) -> Path:
+    return PACKAGE / path.relative_to(PACKAGE).parts[0]
+
+
+def test_only_robot_state_and_standing_import_one_another() -> None:
+    names = {path: path.relative_to(PACKAGE).as_posix() for path in LAYERED}
+    graph = {
+        names[path]: {
+            names[to] for found in imports(path) if (to := file_of(found.module)) in names
+        }
+        for path in LAYERED
+    }
+    others = [" - ".join(sorted(circle)) for circle in circles(graph) if circle != ALLOWED_CIRCLE]
+    assert not others, "\n".join(others)
+
+
+def test_modules_are_short_documented_and_finished() -> None:
+    wrong = []
+    for path in MODULES:
+        source, name = path.read_text(encoding="utf-8"), path.relative_to(PACKAGE).as_posix()
+        if len(source.splitlines()) > MAX_LINES and name not in TOO_LONG:
+            wrong.append(f"{relative(path)} has {len(source.splitlines())} lines")
+        if not ast.get_docstring(parsed(path)):
+            wrong.append(f"{relative(path)} has no docstring")
+        wrong += [
+            f"{relative(path)} contains {word}"
+            for word in ("TODO", "FIXME", "XXX")
+            if word in source
+        ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_lines_of_javascript_are_at_most_100_characters_long() -> None:
+    """Ruff checks those of Python."""
+    wrong = [
+        f"{relative(path)}:{number} has {len(line)} characters"
+        for path in sorted((PACKAGE / "viewer" / "web" / "src").rglob("*.js"))
+        if not set(BUILT) & set(path.parts)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if len(line) > MAX_LINE_LENGTH
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_public_name_resolves_and_has_a_docstring() -> None:
+    wrong = []
+    for package in ["floatbase", *PACKAGES]:
+        module = import_module(package)
+        for name in getattr(module, "__all__", []):
+            value = getattr(module, name)
+            doc = inspect.getdoc(value) or ""
+            needs_one = inspect.ismodule(value) or (callable(value) and not get_origin(value))
+            if needs_one and (not doc or doc.startswith(f"{name}(")):  # as dataclass writes it
+                wrong.append(f"{package}.{name} has no docstring of its own")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_floatbase_has_at_most_32_names_and_lists_them() -> None:
+    assert len(set(floatbase.__all__)) == len(floatbase.__all__) <= 32
+    assert set(floatbase.__all__) <= set(dir(floatbase))
+    with raises(AttributeError, "Robit"):
+        _ = floatbase.Robit
+
+
+def test_tests_use_public_names() -> None:
+    wrong = []
+    for path in TESTS:
+        for node in ast.walk(parsed(path)):
+            if (
+                isinstance(node, ast.Attribute)
+                and is_private(node.attr)
+                and ast.unparse(node.value) not in ("self", "cls")
+            ):
+                wrong.append(f"{relative(path)}:{node.lineno} uses {ast.unparse(node)}")
+        for found in imports(path):
+            if is_private(found.name or ""):
+                wrong.append(f"{relative(path)}:{found.line} imports {found.name}")
+    assert not wrong, "\n".join(wrong)
+
+
+def is_private(name: str) -> bool:
+    """Whether a name is internal; `_repr_html_` and `__main__` are agreed with others."""
+    return name.startswith("_") and not name.endswith("_")
