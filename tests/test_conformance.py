@@ -162,7 +162,7 @@ def right() -> dict[str, Any]:
         (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",
         "solver": "daqp",
-        "column": "force", "status": "inside", "root": "/robot", "lesson": "07",
+        "status": "inside", "root": "/robot", "lesson": "07",
         "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
     }  # fmt: skip
@@ -171,7 +171,7 @@ def right() -> dict[str, Any]:
 # what only the package makes
 RESULTS = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces Pose
-    Power Robot PushRecovery Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
+    Power Robot PushRecovery Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),
@@ -206,7 +206,7 @@ LEFT_OUT = {
     ),
     "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
-    "starts processes, with tests of its own": ("sweep", "push_recovery", "Table.read"),
+    "starts processes, with tests of its own": ("sweep", "read_sweep", "push_recovery"),
     "starts a thread": ("LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start", "LiveSimulation.reset"),
 }  # fmt: skip
 ALONE = {name for names in LEFT_OUT.values() for name in names}

@@ -32,7 +32,6 @@ WITHOUT_ARRAYS = (
     "Problem",
     "Residuals",
     "LinearInequality",
-    "Table",
     "Perturbation",
 )
 NO_VALUES = {

@@ -14,8 +14,8 @@ from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, rollout
+from floatbase.simulation.row_store import read_sweep
 from floatbase.simulation.sweep import sweep
-from floatbase.simulation.table import Table
 
 __all__ = [
     "ACTIVE_STATUSES",
@@ -32,8 +32,8 @@ __all__ = [
     "PushRecovery",
     "Rollout",
     "Simulation",
-    "Table",
     "push_recovery",
+    "read_sweep",
     "rollout",
     "status_message",
     "sweep",

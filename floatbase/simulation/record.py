@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -22,9 +21,6 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.physics import Push, Simulation
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
@@ -104,15 +100,6 @@ class Rollout(Value):
         """The state at the last row."""
         self._check_not_empty()
         return self.state(-1)
-
-    def plot(self) -> Figure:
-        """A figure of the record: centre of mass, normal forces, friction used, torques. More:
-        `floatbase.viewer.plots`.
-        """
-        figure: Figure = import_module("floatbase.viewer").plots.plot_run(
-            self
-        )  # a floor above, which loads when first used
-        return figure
 
     @cached_property
     def com(self) -> Array:

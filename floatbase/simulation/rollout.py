@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from floatbase._validation import (
     MAX_MAGNITUDE,
@@ -120,11 +119,12 @@ def rollout(
         )
         return record.to_rollout(pushes, outcome, error, controller_off_time)
 
-    for _ in (
-        tqdm(range(ticks), "rollout", unit=" ticks")
-        if as_bool("progress", progress)
-        else range(ticks)
-    ):
+    bar: Iterable[int] = range(ticks)
+    if as_bool("progress", progress):
+        from tqdm.auto import tqdm  # takes long to load
+
+        bar = tqdm(bar, "rollout", unit=" ticks")
+    for _ in bar:
         t, q, v = sim.time, sim.q, sim.v
         record.before_tick(t, q, v)
         try:
