@@ -180,6 +180,8 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
         "Simulation.advance", "PerturbedSimulation.advance",
+        "Simulation.contact_forces_of", "Simulation.torques_of", "Push.active_fraction",
+        "PerturbedSimulation.contact_forces_of", "PerturbedSimulation.torques_of",
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
         "raibert_foothold",

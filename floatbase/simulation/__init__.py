@@ -10,7 +10,8 @@ from floatbase.simulation.live import (
     status_message,
 )
 from floatbase.simulation.perturbed import Perturbation, PerturbedSimulation
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, rollout

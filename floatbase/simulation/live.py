@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from floatbase._validation import as_callable, as_instance, as_positive, as_string
 from floatbase.simulation.after_fall import is_at_rest, settling_rollout
-from floatbase.simulation.physics import Push, Simulation, active_pushes
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push, active_pushes
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 

@@ -24,7 +24,8 @@ from floatbase._validation import (
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +118,10 @@ class PerturbedSimulation(Simulation):
         model.geom_friction[:, 0] = (
             self.ground.mu if perturbation.friction is None else perturbation.friction
         )
-        model.geom_conaffinity[self._foot_geoms] = 1
+        model.geom_conaffinity[self.foot_contacts.geoms] = 1
         model.geom_conaffinity[
             [
-                self._foot_geoms[self.point_names.index(name)]
+                self.foot_contacts.geoms[self.point_names.index(name)]
                 for name in perturbation.disabled_contacts
             ]
         ] = 0
@@ -189,7 +190,7 @@ class PerturbedSimulation(Simulation):
         """Add the adhesion force on each ball that touches the ground."""
         # contacts where the feet are now: the step before found them where it began
         mujoco.mj_fwdPosition(self.model, self.data)
-        balls = set(self._foot_geoms.tolist())
+        balls = set(self.foot_contacts.geoms.tolist())
         for plane, ball in self.data.contact.geom.tolist():
             if ball in balls:
                 force = -self._perturbation.adhesion_force * self.ground.normals[plane]
@@ -198,15 +199,13 @@ class PerturbedSimulation(Simulation):
                     self.model, self.data, force, np.zeros(3), position, body, applied
                 )
 
-    def _contact_forces_from(
-        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
-    ) -> Array:
+    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
         """As there, less the adhesion force: the force between ground and foot."""
-        forces = super()._contact_forces_from(geoms, contact_frame_forces)
+        forces = super().contact_forces_of(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
-            rows, columns = np.nonzero(np.isin(foot_geoms, self._upright_foot_geoms))
-            points = np.argmax(foot_geoms[rows, columns, None] == self._upright_foot_geoms, axis=1)
+            rows, columns = np.nonzero(np.isin(foot_geoms, self.foot_contacts.geoms))
+            points = np.argmax(foot_geoms[rows, columns, None] == self.foot_contacts.geoms, axis=1)
             forces[rows, points] -= (
                 self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
             )

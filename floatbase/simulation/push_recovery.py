@@ -26,7 +26,8 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.row_store import require

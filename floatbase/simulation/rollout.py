@@ -23,7 +23,8 @@ from floatbase._validation import (
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.after_fall import record_settling
-from floatbase.simulation.physics import Push, Simulation, active_pushes, as_pushes
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push, active_pushes, as_pushes
 from floatbase.simulation.record import Outcome, Recorder, Rollout
 
 _MAX_STEPS = (
