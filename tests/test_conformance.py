@@ -182,7 +182,7 @@ LEFT_OUT = {
         "Simulation.advance", "PerturbedSimulation.advance",
         "Simulation.contact_forces_of", "Simulation.torques_of", "Push.active_fraction",
         "PerturbedSimulation.contact_forces_of", "PerturbedSimulation.torques_of",
-        "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
+        "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
         "raibert_foothold",
         "target_shapes", "targets_at",

@@ -43,7 +43,6 @@ NO_VALUES = {
     "an answer that rollout copies": "Torques",
     "with a memory of what they do": "Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
-    "views of a MuJoCo model": "Conversion",
     "shapes of a picture": "Item Piece View",
     "made of functions of a lesson": "ConstantTorques Exercise LeastCost Numeric Shaped Verdict",
 }

@@ -1,14 +1,7 @@
 """Physics that shares no code with the controller: MuJoCo, built from the same URDF."""
 
 from floatbase.simulation.build import Ground
-from floatbase.simulation.conversion import Conversion
-from floatbase.simulation.live import (
-    ACTIVE_STATUSES,
-    AUTO_PAUSED,
-    PUSH_DISPLAY_TIME,
-    LiveSimulation,
-    status_message,
-)
+from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
 from floatbase.simulation.perturbed import Perturbation, PerturbedSimulation
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
@@ -20,11 +13,8 @@ from floatbase.simulation.sweep import sweep
 
 __all__ = [
     "ACTIVE_STATUSES",
-    "AUTO_PAUSED",
-    "PUSH_DISPLAY_TIME",
     "Actuators",
     "Controller",
-    "Conversion",
     "Ground",
     "LiveSimulation",
     "Perturbation",
@@ -36,6 +26,5 @@ __all__ = [
     "push_recovery",
     "read_sweep",
     "rollout",
-    "status_message",
     "sweep",
 ]  # fmt: skip

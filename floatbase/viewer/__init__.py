@@ -8,6 +8,7 @@ makes figures of a rollout and of push recovery.
 
 from floatbase.viewer import plots
 from floatbase.viewer.camera import PRESETS, View
+from floatbase.viewer.live import PUSH_DISPLAY_TIME, status_message
 from floatbase.viewer.scene import colours, markers, shapes
 from floatbase.viewer.scene.painter import prefixed
 from floatbase.viewer.scene.shapes import Item, Picture
@@ -15,6 +16,7 @@ from floatbase.viewer.viewer import Viewer
 
 __all__ = [
     "PRESETS",
+    "PUSH_DISPLAY_TIME",
     "Item",
     "Picture",
     "View",
@@ -24,4 +26,5 @@ __all__ = [
     "plots",
     "prefixed",
     "shapes",
+    "status_message",
 ]

@@ -383,6 +383,6 @@ def test_an_error_while_a_fall_is_drawn_is_said() -> None:
 
     run = LiveSimulation(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), show)
     run.push(FALL)
-    until(lambda: "no window" in run.status)
+    until(lambda: "no window" in run.reason)
     until(lambda: not run.is_simulating)
     run.close()
