@@ -62,7 +62,9 @@ def distance_to_polygon(points: Array, polygon: Array) -> Array:
         edges[:, 0] * from_corners[..., 1] - edges[:, 1] * from_corners[..., 0]
     ) / lengths  # of the points above the edges' lines
     nearest = heights.min(axis=-1)
+    inside = (nearest >= 0.0) & (len(polygon) > 2)
+    if np.all(inside):
+        return np.asarray(nearest)
     fractions = np.clip(np.sum(from_corners * edges, axis=-1) / lengths**2, 0.0, 1.0)
     to_edges = np.linalg.norm(from_corners - fractions[..., None] * edges, axis=-1).min(axis=-1)
-    inside = (nearest >= 0.0) & (len(polygon) > 2)
     return np.asarray(np.where(inside, nearest, -to_edges))

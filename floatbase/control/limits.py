@@ -33,12 +33,8 @@ from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, as_torque_limits
 
-BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
-SIZES = {
-    "qdd": "nv",
-    "tau": "d",
-    "forces": "k",
-}  # of each block: its name among the equations of motion
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of the blocks of x, attributes of (7)
+BLOCKS = tuple(SIZES)
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -193,7 +189,7 @@ class Limits(Value):
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
-        """Options of the friction polyhedra: what `FrictionPolyhedron` takes after normal and mu."""
+        """Options of the friction polyhedra: arguments of `FrictionPolyhedron` after mu."""
         return self.facets, self.inner_approximation, self.facet_rotation
 
     @cached_property

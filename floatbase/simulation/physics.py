@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from math import isfinite
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -13,7 +13,6 @@ import pinocchio as pin
 
 from floatbase._validation import (
     Array,
-    FixedAttributes,
     as_array,
     as_bool,
     as_instance,
@@ -37,14 +36,12 @@ _FALLEN_COSINE = float(
 # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
-_RECREATE_HINT = "make another, fb.Simulation(robot, ground=…, timestep=…)"
-_RESET_HINT = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
 
 
-class Simulation(FixedAttributes):
+class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat
@@ -54,24 +51,17 @@ class Simulation(FixedAttributes):
 
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one;
     timestep in s. `model` and `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`.
-    Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with does not
-    change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
+    Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with cannot
+    be set; what `model` and `data` hold may change. A copy has `model` and `data` of its own.
     """
 
-    _hints: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(
-            ("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _RECREATE_HINT
-        ),
-        **dict.fromkeys(("state", "q", "v", "joint_state", "time"), _RESET_HINT),
-    }
-
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
-        self.robot = as_instance("robot", robot, Robot)
-        self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
-        self.timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
-        self.feet = Contacts.feet(robot)
-        self.model = build_model(robot, self.ground, self.timestep)
-        self.data = mujoco.MjData(self.model)
+        self._robot = as_instance("robot", robot, Robot)
+        self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
+        self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
+        self._feet = Contacts.feet(robot)
+        self._model = build_model(robot, self.ground, self.timestep)
+        self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
@@ -90,7 +80,6 @@ class Simulation(FixedAttributes):
         self._base_body = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._refresh_views()
         self.reset()
-        self._initialised = True
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # two robots with the same data would move each other
@@ -116,6 +105,36 @@ class Simulation(FixedAttributes):
         self._refresh_views()
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def ground(self) -> Ground:
+        """The ground that it stands on."""
+        return self._ground
+
+    @property
+    def timestep(self) -> float:
+        """Length of a step [s]."""
+        return self._timestep
+
+    @property
+    def feet(self) -> Contacts:
+        """The robot's feet."""
+        return self._feet
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model; while `link_collisions` are on, another one."""
+        return self._model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of `model`."""
+        return self._data
+
+    @property
     def point_names(self) -> tuple[str, ...]:
         """Names of the points of the robot that can touch the ground: feet, or corners of flat
         feet.
@@ -129,7 +148,10 @@ class Simulation(FixedAttributes):
 
     @property
     def q(self) -> Array:
-        """Configuration in the package's convention, shape (nq,)."""
+        """Configuration in the package's convention, shape (nq,).
+
+        `sim.reset(sim.state.replace(q=…))` puts the robot into another one, at time 0.
+        """
         return self._conversion.q(self._qpos)
 
     @property

@@ -53,9 +53,9 @@ def cache_warning() -> str:
     """What to add to a message where compiled code cannot be kept on disk, or ""."""
     from floatbase.control.tick import jit
 
-    remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
+    remedy = "set NUMBA_CACHE_DIR to an empty folder that has room and can be written to"
     return (
-        f"; what is compiled cannot be kept ({jit.cache_error}): {remedy}"
+        f"; compiled code cannot be kept on disk ({jit.cache_error}): {remedy}"
         if jit.cache_error
         else ""
     )
@@ -125,7 +125,7 @@ class CompiledTick:
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._time_varying_tasks = pack_problem(problem)
         self.user_terms, time_varying = (
-            UserTerms(problem, self.dynamics),
+            UserTerms(problem),
             {each.task_index for each in self._time_varying_tasks},
         )
         self.unchecked_tasks = [
@@ -178,27 +178,30 @@ class CompiledTick:
 
         Returns why that is not possible, or "".
         """
-        standing = self._problem.robot.standing()
-        q, v = np.array(standing.q), np.array(standing.v)
+        from floatbase.control.tick import jit, tick
+
         with announce_if_slow(
             f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."
         ):
             try:
-                with self.dynamics.lock:
-                    self.dynamics.update(q, v)
-                    self._tick(
-                        q,
-                        v,
-                        self.default_inputs.packed,
-                        *self.arguments,
-                        self.empty_result(),
-                        self._n_stages,
-                    )
-            except Exception as error:
-                # whatever numba raises, the reference backend does without; no code of the user's
-                # runs
-                return f"numba could not compile the tick ({type(error).__name__}: {error})"
+                self._tick_standing()
+            except Exception as cache_failure:  # damaged files may raise anything
+                try:
+                    self._tick = tick.tick = jit.without_cache(self._tick)
+                    self._tick_standing()
+                except Exception as error:
+                    # whatever numba raises, the reference backend does without; no code of the
+                    # user's runs
+                    return f"numba could not compile the tick ({type(error).__name__}: {error})"
+                jit.cache_error = f"{type(cache_failure).__name__}: {cache_failure}"
         return ""
+
+    def _tick_standing(self) -> None:
+        standing = self._problem.robot.standing()
+        q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs.packed
+        with self.dynamics.lock:
+            self.dynamics.update(q, v)
+            self._tick(q, v, inputs, *self.arguments, self.empty_result(), self._n_stages)
 
     def empty_result(self) -> Array:
         """An array for the numbers of one tick."""

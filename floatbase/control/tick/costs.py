@@ -279,7 +279,7 @@ def hessian(cost: Cost, H, grad):
 
 @jit
 def gradient(cost: Cost, beta, grad):
-    """The slope (nb,) at β, residual by residual, which keeps the digits that the Hessian has lost."""
+    """The slope (nb,) at β, residual by residual, with the digits that the Hessian has lost."""
     R, diagonal, linear = cost
     nb = beta.size
     for c in range(nb):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
+from typing import Any, ClassVar, NamedTuple, TypeAlias, cast
 from weakref import WeakSet
 
 import numpy as np
@@ -18,6 +18,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array
+from floatbase.control.limits import BLOCKS
+from floatbase.control.problem import Problem
 from floatbase.dynamics import Contact, FlatFootContact, PointContact
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import (
@@ -33,9 +35,6 @@ from floatbase.objectives import (
 )
 from floatbase.robots import Robot
 
-if TYPE_CHECKING:
-    from floatbase.control.problem import Problem
-
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
 TASK_KINDS: dict[type, int] = {
     CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE,
@@ -43,8 +42,7 @@ TASK_KINDS: dict[type, int] = {
 }  # fmt: skip
 POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
-QDD, TAU, FORCES = range(3)
-BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
+QDD, TAU, FORCES = range(len(BLOCKS))
 _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
 PolyhedronOptions: TypeAlias = tuple[
@@ -87,7 +85,7 @@ class Dynamics:
 
     @property
     def layout_supported(self) -> bool:
-        """Whether this version of Pinocchio lays its results out in memory as the views take them."""
+        """Whether this Pinocchio has the memory layout that the views assume."""
         with self.lock:
             self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
             poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
@@ -190,7 +188,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 def _pack_contact(
     robot: Robot, contact: Contact, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
+    """One contact: row of the table, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = len(contact.point_names)
@@ -219,7 +217,7 @@ def _pack_builtin_contact(
 
 
 def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
-    """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
+    """Facets and -normal of each point with their lengths, and a zero, (p (F + 1), 5)."""
     if not contact.point_names:
         return np.zeros((0, 5))
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)

@@ -1,20 +1,8 @@
 """The tick, compiled: (26)(27) over plain arrays, which `compiled.py` fills and passes on.
 
-The same problem as `build_qp` makes, solved in another way that costs a fraction:
-
-    kinematics    velocities and drifts of all joints; A, b, J of the contacts                (1)(4)(5)
-    elimination   q̈, λ and τ as functions of β: Gauss-Jordan on the equalities
-                  (13)(16)(17)
-    costs         the tasks as one quadratic cost in β
-                  (18)(26)
-    inequalities  rows that β violates
-                                                                                               (27)(28)
-    dual_search   the optimum without inequalities, then one violated row after the other      App.
-                  C
-
-A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an
-orientation is too far off), INACCURATE (its last digits are lost), INFEASIBLE. Then the reference
-backend decides.
+README.md explains its stages. A tick without an answer says why: INVALID (a value is not finite, a
+quaternion is none, an orientation is too far off), INACCURATE (its last digits are lost),
+INFEASIBLE. Then the reference backend decides.
 """
 
 from __future__ import annotations
