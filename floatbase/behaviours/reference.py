@@ -148,7 +148,7 @@ class Reference:
         return self.feet[foot], np.zeros(3), np.zeros(3)
 
     def foot_rotation_target(self, foot: str, t: float) -> Motion:
-        """Target of a flat foot's rotation in the air at t in s: flat, and turning with the path."""
+        """Target of a flat foot's rotation in the air at t in s: flat, turning with the path."""
         flat, each = self.nominal_state.frame_pose(foot).rotation, self.swinging.get(foot)
         if each is None:
             return rotation_z(self.yaw) @ flat, np.zeros(3), np.zeros(3)
