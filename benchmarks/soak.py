@@ -172,7 +172,7 @@ def walking() -> Soak:
             time.sleep(1.0)
             paces.append((run.sim.time - begin) / (time.monotonic() - clock))
             if run.status != "running":
-                raise AssertionError(f"the walk ended: {run.status}")
+                raise AssertionError(f"the walk ended: {run.status} {run.reason}")
 
         yield step
         run.close()

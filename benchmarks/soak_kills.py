@@ -21,7 +21,7 @@ from unittest.mock import patch
 
 from floatbase.lessons import progress
 from floatbase.lessons.publish import MY_FOLDER, prepare_workspace
-from floatbase.simulation import Table
+from floatbase.simulation import read_sweep
 
 POINTS = 200  # of the sweep that is killed: two workers need about a second for them
 IN_FLIGHT = 4  # points at most that a kill lets two workers compute again
@@ -99,8 +99,8 @@ def sweeps() -> Iterator[Callable[[], object]]:
             assert lines[: len(before)] == before, "a kill changed rows that were there"
             lost += running.returncode != 0
             if running.returncode == 0:
-                table = Table.read(rows)
-                assert [row["result"] for row in table.rows] == [i / 7 for i in range(POINTS)], (
+                table = read_sweep(rows)
+                assert table["result"].tolist() == [i / 7 for i in range(POINTS)], (
                     "the table is another one"
                 )
                 twice = len(calls.read_text().split()) - POINTS

@@ -166,7 +166,7 @@ def right() -> dict[str, Any]:
         (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",
         "solver": "daqp",
-        "column": "force", "status": "inside", "root": "/robot", "lesson": "07",
+        "status": "inside", "root": "/robot", "lesson": "07",
         "path": "floatbase-view.html",
         "load_urdf.path": str(judges.load("ur5").urdf),
     }  # fmt: skip
@@ -175,7 +175,7 @@ def right() -> dict[str, Any]:
 # what only the package makes
 RESULTS = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition
-    TorquesFromForces CylinderGeometry PowerBalance Robot PushRecovery Table StepPlan
+    TorquesFromForces CylinderGeometry PowerBalance Robot PushRecovery StepPlan
     AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
@@ -186,8 +186,9 @@ LEFT_OUT = {
     ),
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
-        "Simulation.advance",
-        "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
+        "Simulation.advance", "Simulation.contact_forces_of", "Simulation.torques_of",
+        "Push.active_fraction",
+        "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
         "raibert_foothold",
         "target_shapes", "targets_at",
@@ -217,7 +218,7 @@ LEFT_OUT = {
     ),
     "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
-    "starts processes, with tests of its own": ("sweep", "push_recovery", "Table.read"),
+    "starts processes, with tests of its own": ("sweep", "read_sweep", "push_recovery"),
     "starts a thread": (
         "LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start",
         "LiveSimulation.reset",

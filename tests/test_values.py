@@ -31,7 +31,6 @@ WITHOUT_ARRAYS = (
     "Problem",
     "Residuals",
     "LinearInequality",
-    "Table",
 )
 NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
@@ -41,7 +40,6 @@ NO_VALUES = {
     "an answer that rollout copies": "TorqueCommand",
     "with a memory of what they do": "Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
-    "views of a MuJoCo model": "Conversion",
     "shapes of a picture": "Item View",
     "made of functions of a lesson": "ConstantTorques Exercise MinimumCostController NumericJudge ShapeJudge Verdict",
 }

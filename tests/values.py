@@ -23,7 +23,7 @@ from floatbase.dynamics import (
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.objectives import torques_from_forces
 from floatbase.qp import active_set, table_top
-from floatbase.simulation import PushRecovery, Table
+from floatbase.simulation import PushRecovery
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -79,7 +79,6 @@ def values() -> dict[str, Any]:
         "bias forces": bias_forces(state), "contact space": contact_space(eom),
         "drive": moving_frame("base", np.zeros_like),
         "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))),
-        "Table": Table(({"force": 1.0, "error": None},)),
         "PushRecovery": PushRecovery(
             np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts
         ),

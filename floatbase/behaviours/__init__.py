@@ -12,9 +12,10 @@ from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
+from floatbase.behaviours.planner import StepPlan
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
-from floatbase.behaviours.walk import StepPlan, Walk, raibert_foothold
+from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
     "LIPM",

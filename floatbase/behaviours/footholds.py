@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import convex_hull, distance_to_polygon
 from floatbase._validation import Array, as_array, as_number, as_positive, read_only
 from floatbase.errors import InputError
 
@@ -73,38 +74,7 @@ def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
         raise InputError(
             "a robot in the air has no support region: feet must hold one point at least."
         )
-    corners = _convex_hull(feet)
-    ends = np.roll(corners, -1, axis=0)
-    edges = ends - corners
-    lengths = np.linalg.norm(edges, axis=1)
-    from_corners = point - corners
-    distances = (edges[:, 0] * from_corners[:, 1] - edges[:, 1] * from_corners[:, 0]) / np.where(
-        lengths > 0.0, lengths, 1.0
-    )
-    if len(corners) > 2 and distances.min() >= 0.0:
-        return float(distances.min())
-    fractions = np.clip(
-        np.sum(from_corners * edges, axis=1) / np.where(lengths > 0.0, lengths, 1.0) ** 2, 0.0, 1.0
-    )
-    return -float(np.linalg.norm(from_corners - fractions[:, None] * edges, axis=1).min())
-
-
-def _convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points, (n, 2), counter-clockwise. Source: Andrew, Another
-    efficient algorithm, 1979.
-    """
-    ordered = sorted(set(map(tuple, points.tolist())))
-    halves: list[list[tuple[float, ...]]] = []
-    for line in (ordered, ordered[::-1]):
-        half: list[tuple[float, ...]] = []
-        for x, y in line:
-            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (
-                half[-1][1] - half[-2][1]
-            ) * (x - half[-2][0]):
-                half.pop()
-            half.append((x, y))
-        halves.append(half[:-1])
-    return np.array(halves[0] + halves[1] or ordered)
+    return float(distance_to_polygon(point, convex_hull(feet)))
 
 
 def step_adjustment(

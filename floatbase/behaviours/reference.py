@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from floatbase._geometry import rotation_z
 from floatbase._validation import Array, frozen
 from floatbase.affine import Affine
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
@@ -137,7 +138,7 @@ class Reference:
     def base_target(self, t: float) -> Motion:
         """Target of the base's rotation at t in s: as in the posture, turned by the path's yaw."""
         yaw = self.yaw + self.velocity[2] * (t - self.time)
-        rotation = frozen(yaw_rotation(yaw) @ self.nominal_state.frame_pose("base").rotation)
+        rotation = frozen(rotation_z(yaw) @ self.nominal_state.frame_pose("base").rotation)
         return rotation, frozen(np.array([0.0, 0.0, self.velocity[2]])), _ZERO
 
     def foot_target(self, foot: str, t: float) -> Motion:
@@ -150,12 +151,12 @@ class Reference:
         """Target rotation of a flat foot in the air at t [s]: flat, and turning with the path."""
         flat, each = self.nominal_state.frame_pose(foot).rotation, self.swinging.get(foot)
         if each is None:
-            return yaw_rotation(self.yaw) @ flat, np.zeros(3), np.zeros(3)
+            return rotation_z(self.yaw) @ flat, np.zeros(3), np.zeros(3)
         (first, last), up = each.yaws, np.array([0.0, 0.0, 1.0])
         part, rate, acceleration = Swing(
             np.zeros(3), (last - first) * up, each.path.lift_off, each.path.touchdown, 0.0
         )(t)
-        return yaw_rotation(first + part[2]) @ flat, rate, acceleration
+        return rotation_z(first + part[2]) @ flat, rate, acceleration
 
     def normal_force_bound(self, foot: str, t: float, ramp: float, full_load: float) -> float:
         """Bound of a normal force, N, at t in s: it falls from `full_load` to 0 in `ramp` s before
@@ -181,12 +182,6 @@ def rotated_by_yaw(vector: Array, yaw: float) -> Array:
     """A horizontal vector, (2,), turned to the left by yaw, rad."""
     c, s = cos(yaw), sin(yaw)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
-
-
-def yaw_rotation(yaw: float) -> Array:
-    """The rotation to the left by yaw, rad, shape (3, 3)."""
-    c, s = cos(yaw), sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def yaw_of(rotation: Array) -> float:

@@ -6,27 +6,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from math import copysign, hypot, inf, sqrt
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import (
-    Array,
-    as_array,
-    as_callable,
-    as_instance,
-    as_number,
-    as_positive,
-)
-from floatbase.behaviours.footholds import capture_point, neutral_point, step_adjustment
+from floatbase._validation import Array, as_array, as_callable, as_instance, as_number, as_positive
+from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
-from floatbase.behaviours.lipm import LIPM, ZMPSegment
+from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains, check_gait_feet, check_options, flat_foot_names
-from floatbase.behaviours.reference import Motion, Reference, SwingState, rotated_by_yaw, yaw_of
+from floatbase.behaviours.planner import Planner, StepPlan
+from floatbase.behaviours.reference import Motion, Reference, rotated_by_yaw
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
@@ -35,50 +28,11 @@ from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTas
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
-Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
-_PLANNED_PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
-_PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
 _RESTART_GAP = 0.2  # s without a tick, after which another controller may have moved the robot
-# s after which the height of a foot shows that of the ground: feet that aim where others just
-# touched climb
-_TOUCHDOWN_SETTLING_TIME = 0.05
-# s before the first lift-off and after the last landing in which the ZMP moves
-_ZMP_SHIFT_TIME = 0.8
-# m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω
-# 1.2 s}
-_DCM_DEAD_ZONE = 0.02
-# m by which steps have moved, from which on the path moves along, or the robot runs back to it and
-# falls
-_PATH_SHIFT_THRESHOLD = 0.05
-# part of its distance from the middle that a foot keeps to its own side: legs must not cross
-_MIN_SIDE_FRACTION = 0.25
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-# times its even share of the weight: the normal force from which a ramp comes down
-_RAMP_LOAD_FACTOR = 2.0
+_RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force a ramp comes down from
 _MAX_SPEED = 10.0  # m/s and rad/s: more is a slip of units
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
-
-
-@dataclass(frozen=True)
-class StepPlan:
-    """What a `Walk` planned at one change of stance, or where it stood on and the plan came to its
-    end.
-
-    time: s.
-    stance: the feet that stand from then on.
-    feet: (3,) m, world, where each foot's frame stands or stood.
-    footholds: (3,) m, world, where each foot that is in the air, or lifts next, is to land, as
-        planned then.
-    plan: of the centre of mass.
-    swings: the paths of the feet that are in the air, as planned then.
-    """
-
-    time: float
-    stance: tuple[str, ...]
-    feet: dict[str, Array]
-    footholds: dict[str, Array]
-    plan: LIPM
-    swings: dict[str, Swing]
 
 
 class Walk:
@@ -131,22 +85,14 @@ class Walk:
         gains: Gains | None = None,
         **options: Any,
     ):
-        self._robot, self._all_contacts = (
-            as_instance("robot", robot, Robot),
-            as_instance("contacts", contacts, Contacts),
-        )
-        self._flat_feet = flat_foot_names(contacts)
+        self._robot = as_instance("robot", robot, Robot)
+        self._all_contacts = as_instance("contacts", contacts, Contacts)
         self._reference: Reference | None = None
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
         self._clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
-        self._reach = as_positive(
-            "reach",
-            (_DEFAULT_REACH_FLAT if self._flat_feet else _DEFAULT_REACH)
-            if reach is None
-            else reach,
-            "m",
-            maximum=1.0,
-        )
+        if reach is None:
+            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
+        self._reach = as_positive("reach", reach, "m", maximum=1.0)
         self._ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
         self._foothold = (
             raibert_foothold
@@ -162,15 +108,7 @@ class Walk:
         ).limits  # what does not fit is told now
         self._options, self._standing_state = options, robot.standing()
         self._single_contacts = {contact.name: Contacts([contact]) for contact in contacts}
-        positions = {contact.name: self._standing_state.point(contact.name) for contact in contacts}
-        centre = np.mean(
-            [self._foot_centre(name, position, 0.0) for name, position in positions.items()], axis=0
-        )
-        self._nominal_feet = {
-            name: position - [*centre, 0.0] for name, position in positions.items()
-        }
-        ground = float(contacts.positions(self._standing_state)[:, 2].mean())
-        self._omega = sqrt(robot.gravity / (self._standing_state.com[2] - ground))
+        self._planner = Planner(contacts, self._standing_state, self._clearance, self._reach)
         self._clear()
 
     @property
@@ -206,7 +144,7 @@ class Walk:
     @property
     def omega(self) -> float:
         """1/s, of the pendulum."""
-        return self._omega
+        return self._planner.omega
 
     @property
     def history(self) -> deque[StepPlan]:
@@ -265,20 +203,15 @@ class Walk:
         """Where each foot that is in the air, or lifts next, is to land: (3,) m, world, of its
         frame.
         """
-        return (
-            {**self._ref.footholds, **{foot: path.end for foot, path in self.swings.items()}}
-            if self._reference
-            else {}
-        )
+        ends = {foot: path.end for foot, path in self.swings.items()}
+        return self._ref.footholds | ends if self._reference else {}
 
     @property
     def swings(self) -> dict[str, Swing]:
         """The paths of the feet that are in the air."""
-        return (
-            {foot: each.path for foot, each in self._ref.swinging.items()}
-            if self._reference
-            else {}
-        )
+        if self._reference is None:
+            return {}
+        return {foot: each.path for foot, each in self._reference.swinging.items()}
 
     @property
     def plan(self) -> LIPM | None:
@@ -291,7 +224,7 @@ class Walk:
         """
         foot = self._all_contacts[foot].name  # an `UnknownNameError` tells what there is
         position, yaw, _ = self._path_at(as_number("t", t, "s"))
-        return position + rotated_by_yaw(self._nominal_feet[foot][:2], yaw)
+        return position + rotated_by_yaw(self._planner.nominal_feet[foot][:2], yaw)
 
     def velocity_at(self, t: float) -> Array:
         """The body's velocity at time t in s, (2,) m/s, world, if the desired one goes on."""
@@ -310,17 +243,15 @@ class Walk:
         (ref.position, ref.yaw, ref.velocity), ref.time = self._path_at(t), t
         stance = self._stance_at(t)
         if stance != ref.stance or t >= ref.replan_time:
-            self._replan(state, stance)
-        self._adjust_footholds(state)
+            plan = self._planner.replan(ref, state, stance, self._foothold_at, self._yaw_at)
+            self._history.append(plan)
+        self._planner.adjust_footholds(ref, state)
         return self._stance_controller()(q, v, t)
 
     @property
     def _ref(self) -> Reference:
         if self._reference is None:
-            raise InputError(
-                "a Walk has no path before its first tick: call it as walk(q, v, t), or run a "
-                "rollout."
-            )
+            raise InputError("A Walk has no path before its first walk(q, v, t), as in a rollout.")
         return self._reference
 
     def _continues(self, t: float) -> bool:
@@ -359,179 +290,21 @@ class Walk:
         elif ref.gait.stop is None or ref.gait.stop > t:
             ref.requested_gait, ref.gait = None, replace(ref.gait, stop=t)
 
+    def _initialize(self, state: State, t: float) -> None:
+        """Start from the measured state."""
+        self._reference = self._planner.start(state, self._gait, t)
+        self._history.clear()
+
+    def _foothold_at(self, foot: str, touchdown: float) -> npt.ArrayLike:
+        return self._foothold(foot, touchdown, self)
+
+    def _yaw_at(self, t: float) -> float:
+        return self._path_at(t)[1]
+
     def _stance_at(self, t: float) -> tuple[str, ...]:
         gait = self._ref.gait
         swinging = {foot for foot in gait.feet if gait.swing_at(foot, t)}
         return tuple(name for name in self._all_contacts.names if name not in swinging)
-
-    def _initialize(self, state: State, t: float) -> None:
-        """Start from the measured state: the path begins in the middle of the feet."""
-        yaw = yaw_of(state.frame_pose("base").rotation)
-        feet = {name: state.point(name) for name in self._all_contacts.names}
-        positions = [
-            feet[name][:2] - rotated_by_yaw(nominal_foot[:2], yaw)
-            for name, nominal_foot in self._nominal_feet.items()
-        ]
-        gait, position = self._gait, np.mean(positions, axis=0)
-        self._reference = Reference(
-            self._standing_state,
-            self._nominal_feet,
-            gait,
-            gait.starting_at(t),
-            t,
-            t,
-            position,
-            yaw,
-            feet,
-        )
-        self.history.clear()
-
-    def _replan(self, state: State, stance: tuple[str, ...]) -> None:
-        """Another stance begins, or its plan ends: take the feet where they are, and plan anew."""
-        ref = self._ref
-        for foot in ref.stance or stance:
-            if ref.time > ref.touchdown_times.get(foot, -inf) + _TOUCHDOWN_SETTLING_TIME:
-                ref.feet[foot] = state.point(foot)
-        self._register_touchdowns(state, [foot for foot in stance if foot in ref.swinging])
-        phases = ref.gait.phases(ref.time, _PLANNED_PHASES, _PLAN_HORIZON)
-        begin, until = ref.stance_interval[0] if stance == ref.stance else ref.time, phases[0][1]
-        ref.stance_interval, ref.replan_time, ref.stance, ref.footholds = (
-            (begin, until),
-            inf,
-            stance,
-            {},
-        )
-        if len(phases) == 1:  # it stands, and no end is in sight
-            ref.stance_interval, ref.replan_time = (begin, inf), until - _ZMP_SHIFT_TIME
-        ref.fit_ground()
-        ref.plan = LIPM(self._zmp_segments(phases), state.com[:2], self.omega)
-        for foot in self._all_contacts.names:
-            times = ref.gait.swing_at(foot, ref.time) if foot in ref.gait.feet else None
-            if times and foot not in ref.swinging:
-                end, yaw = (
-                    ref.footholds[foot],
-                    yaw_of(state.frame_pose(foot).rotation @ self._nominal_rotation(foot).T),
-                )
-                path = Swing(state.point(foot), end, *times, self.clearance)
-                ref.swinging[foot] = SwingState(path, end, (yaw, self._path_at(times[1])[1]))
-        self.history.append(
-            StepPlan(ref.time, stance, dict(ref.feet), dict(ref.footholds), ref.plan, self.swings)
-        )
-
-    def _register_touchdowns(self, state: State, feet: Sequence[str]) -> None:
-        """These feet have landed; the path moves along where they were moved far."""
-        ref, offsets = self._ref, []
-        for foot in feet:
-            each = ref.swinging.pop(foot)
-            ref.feet[foot] = np.array([*state.point(foot)[:2], each.path.end[2]])
-            offsets.append((ref.feet[foot] - each.planned_end)[:2])
-            ref.touchdown_times[foot] = ref.time
-        if not offsets:
-            return
-        before, ref.step_offset = ref.step_offset, np.mean(offsets, axis=0)
-        mean_offset = (
-            before + ref.step_offset
-        ) / 2.0  # swinging legs sway the body to one side and to the other
-        if np.linalg.norm(mean_offset) > _PATH_SHIFT_THRESHOLD:
-            ref.position = ref.position + mean_offset
-
-    def _zmp_segments(self, phases: Sequence[Phase]) -> list[ZMPSegment]:
-        """The ZMP of the coming phases: in the middle of the feet that stand, and shifting while
-        all stand.
-        """
-        ref, centres = self._ref, self._stance_centres(phases)
-        zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
-        segments: list[ZMPSegment] = []
-        for i, (begin, end, names) in enumerate(phases):
-            all_stand, last = len(names) == len(ref.gait.feet), i + 1 == len(phases)
-            goal = centres[i] if last or not all_stand else centres[i + 1]
-            if not all_stand:
-                segments.append((begin, end, goal, goal))
-            elif end - begin <= _ZMP_SHIFT_TIME:
-                segments.append((begin, end, zmp, goal))
-            elif last:  # come to the middle, and stay
-                segments += [
-                    (begin, begin + _ZMP_SHIFT_TIME, zmp, goal),
-                    (begin + _ZMP_SHIFT_TIME, end, goal, goal),
-                ]
-            else:  # stay, then shift before the foot lifts
-                segments += [
-                    (begin, end - _ZMP_SHIFT_TIME, zmp, zmp),
-                    (end - _ZMP_SHIFT_TIME, end, zmp, goal),
-                ]
-            zmp = goal
-        return segments
-
-    def _stance_centres(self, phases: Sequence[Phase]) -> list[Array]:
-        """The middle of the feet that stand in each phase, (2,) m; finds the footholds of those
-        that swing.
-        """
-        ref, feet, centres = self._ref, dict(self._ref.feet), []
-        for begin, end, names in phases:
-            stance = [
-                name
-                for name in self._all_contacts.names
-                if name in names or name not in ref.gait.feet
-            ]
-            centres.append(
-                np.mean([self._foot_centre(name, feet[name], ref.yaw) for name in stance], axis=0)
-            )
-            for foot in ref.gait.feet:
-                times = ref.gait.swing_at(foot, begin)
-                if times is not None:
-                    position = as_array(
-                        f"the foothold of {foot}", self.foothold(foot, times[1], self), (2,), "m"
-                    )
-                    ref.footholds.setdefault(foot, ref.on_ground(foot, position))
-                    if abs(times[1] - end) < 2.0 * TIME_TOLERANCE:
-                        feet[foot] = ref.on_ground(foot, position)
-        return centres
-
-    def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
-        """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball.
-        position: (3,) m, of its frame.
-        """
-        contact = self._all_contacts[foot]
-        to_ground = (
-            getattr(contact, "radius", 0.0) * contact.normal
-        )  # a ball touches there however it is turned
-        offset = (
-            contact.positions(self._standing_state).mean(axis=0)
-            - self._standing_state.point(foot)
-            + to_ground
-        )
-        return position[:2] + rotated_by_yaw(offset[:2], yaw) - to_ground[:2]
-
-    def _adjust_footholds(self, state: State) -> None:
-        """Shift the ends of the swings by what the DCM misses of the plan, as far as the legs
-        reach.
-        """
-        ref = self._ref
-        if not ref.swinging:
-            return
-        assert ref.plan is not None
-        error = capture_point(state.com, state.com_velocity, self.omega) - ref.plan.dcm(ref.time)
-        dead_zone = _DCM_DEAD_ZONE if len(ref.stance) > 2 or self._flat_feet else 0.0
-        for touchdown in {
-            each.path.touchdown for each in ref.swinging.values()
-        }:  # feet of a trot land together
-            shift = step_adjustment(error, touchdown - ref.time, self.omega, dead_zone)
-            com_at_touchdown = state.com[:2] + state.com_velocity[:2] * (touchdown - ref.time)
-            for foot, each in ref.swinging.items():
-                if each.path.touchdown == touchdown:
-                    end = self._clamp_to_reach(foot, each.planned_end[:2] + shift, com_at_touchdown)
-                    each.path = each.path.with_end(ref.on_ground(foot, end))
-
-    def _clamp_to_reach(self, foot: str, end: Array, body: Array) -> Array:
-        """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and
-        that is on the foot's side.
-        """
-        nominal, yaw = self._nominal_feet[foot][:2], self._ref.yaw
-        offset = rotated_by_yaw(end - body, -yaw) - nominal
-        position = nominal + offset * min(1.0, self.reach / (hypot(*offset) or 1.0))
-        side = copysign(1.0, nominal[1])
-        position[1] = side * max(side * position[1], _MIN_SIDE_FRACTION * abs(nominal[1]))
-        return body + rotated_by_yaw(position, yaw)
 
     def _stance_controller(self) -> WholeBodyController:
         """The controller of the present stance, made when it is first needed."""
@@ -559,18 +332,12 @@ class Walk:
             PostureTask(self._standing_state.q, kp=posture, weight=posture_weight),
         ]
         for foot in [name for name in self._all_contacts.names if name not in stance]:
-            tasks.append(
-                FrameTask(foot, partial(self._foot_target, foot), kp=swing, weight=swing_weight)
+            position, rotation = (
+                partial(target, foot) for target in (self._foot_target, self._foot_rotation_target)
             )
-            if foot in self._flat_feet:
-                tasks.append(
-                    OrientationTask(
-                        foot,
-                        partial(self._foot_rotation_target, foot),
-                        kp=swing,
-                        weight=swing_weight,
-                    )
-                )
+            tasks.append(FrameTask(foot, position, kp=swing, weight=swing_weight))
+            if foot in self._planner.flat_feet:
+                tasks.append(OrientationTask(foot, rotation, kp=swing, weight=swing_weight))
         return tasks
 
     def _foot_target(self, foot: str, t: float) -> Motion:
@@ -578,10 +345,6 @@ class Walk:
 
     def _foot_rotation_target(self, foot: str, t: float) -> Motion:
         return self._ref.foot_rotation_target(foot, t)
-
-    def _nominal_rotation(self, foot: str) -> Array:
-        rotation: Array = self._standing_state.frame_pose(foot).rotation
-        return rotation
 
     def _normal_force_bounds(
         self, stance: Sequence[str]

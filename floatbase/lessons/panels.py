@@ -17,15 +17,8 @@ import ipywidgets as widgets
 
 from floatbase.errors import FloatbaseError
 from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, recorded_pushes
-from floatbase.simulation import (
-    PUSH_DISPLAY_TIME,
-    Controller,
-    LiveSimulation,
-    Rollout,
-    Simulation,
-    status_message,
-)
-from floatbase.viewer import Viewer
+from floatbase.simulation import Controller, LiveSimulation, Rollout, Simulation
+from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.recording import push_at
 from floatbase.viewer.export.thumbnail import with_thumbnail
@@ -216,7 +209,7 @@ def live_run(
             push=push_at(record, -1, PUSH_DISPLAY_TIME),
         )
 
-    return LiveSimulation(sim, controller, show, **options)
+    return LiveSimulation(sim, controller, show, push_memory=PUSH_DISPLAY_TIME, **options)
 
 
 def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> widgets.VBox:
@@ -313,9 +306,8 @@ class _StatusLine(widgets.Label):
         ):  # the status is read in here, so that the last line is never about an earlier one
             self._news = self._news if news is None else news
             status = self._run.status
-            self.value = (
-                self._news if status == "running" and self._news else status_message(status)
-            )
+            told = status_message(status, self._run.reason)
+            self.value = self._news if status == "running" and self._news else told
 
 
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:

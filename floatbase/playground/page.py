@@ -20,8 +20,8 @@ from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import Settings
 from floatbase.playground.term_arrows import term_arrows
 from floatbase.robots import Robot
-from floatbase.simulation import ACTIVE_STATUSES, PUSH_DISPLAY_TIME, LiveSimulation, status_message
-from floatbase.viewer import Picture
+from floatbase.simulation import ACTIVE_STATUSES, LiveSimulation
+from floatbase.viewer import PUSH_DISPLAY_TIME, Picture, status_message
 from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
@@ -80,7 +80,7 @@ class Playground:
         self.run = LiveSimulation(
             session.sim, session.controller, self._on_slice, control_period=PERIOD,
             actuators=session.actuators,
-            after_reset=self._after_reset,
+            after_reset=self._after_reset, push_memory=PUSH_DISPLAY_TIME,
         )  # fmt: skip
         self.run.on_status(self._on_status)
         self.real_time_factor = RealTimeFactor()
@@ -239,10 +239,10 @@ class Playground:
 
     def _on_status(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
-        self.outcome = "" if status == "running" else status_message(status)
+        self.outcome = "" if status == "running" else status_message(status, self.run.reason)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:
-            judge.run_ended(status, self.session)
+            judge.run_ended(": ".join(filter(None, [status, self.run.reason])), self.session)
             self._update_text()
         self._redraw()
 

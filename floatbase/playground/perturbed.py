@@ -92,17 +92,14 @@ class PerturbedSimulation(Simulation):
         as_instance("robot", robot, Robot)
         self._perturbation = Perturbation()
         self._base_wrench: Array = np.zeros(6)
-        self._beside: tuple[mujoco.MjModel, mujoco.MjData] | None = None
         super().__init__(robot, ground, timestep)
         model = self.model
+        self._scratch = mujoco.MjData(model)  # for what is computed beside the step
         self._nominal = {
             name: np.array(getattr(model, name))
             for name in ("body_mass", "body_inertia", "dof_armature")
         }
         self._nominal_gravity = np.array(model.opt.gravity)
-        self._point_geoms = np.array(
-            self._foot_geom_ids(), dtype=int
-        )  # as `_raw_contacts` numbers them, also after a fall
         self.perturbation = Perturbation() if perturbation is None else perturbation
 
     @property
@@ -116,26 +113,16 @@ class PerturbedSimulation(Simulation):
         for name in as_instance("perturbation", perturbation, Perturbation).disabled_contacts:
             if name not in self.point_names:
                 raise unknown_name("contact point", name, self.point_names)
-        model, foot_geoms, self._perturbation = self.model, self._foot_geom_ids(), perturbation
+        model, self._perturbation = self.model, perturbation
         for name, nominal in self._nominal.items():
             getattr(model, name)[:] = perturbation.mass * nominal
         model.opt.gravity[:] = perturbation.gravity * self._nominal_gravity
         model.geom_friction[:, 0] = (
             self.ground.mu if perturbation.friction is None else perturbation.friction
         )
-        for name, ball in zip(self.point_names, foot_geoms, strict=True):
+        for name, ball in zip(self.point_names, self.foot_contacts.geoms, strict=True):
             model.geom_conaffinity[ball] = name not in perturbation.disabled_contacts
-        mujoco.mj_setConst(model, self._scratch())
-
-    def _scratch(self) -> mujoco.MjData:
-        """Data of the present model for what is computed beside the step."""
-        if self._beside is None or self._beside[0] is not self.model:
-            self._beside = self.model, mujoco.MjData(self.model)
-        return self._beside[1]
-
-    def _foot_geom_ids(self) -> list[int]:
-        """The numbers of the feet's geoms in the present model, in the order of `point_names`."""
-        return [int(self.model.geom(name).id) for name in self.point_names]
+        mujoco.mj_setConst(model, self._scratch)
 
     @property
     def base_wrench(self) -> Array:
@@ -181,7 +168,7 @@ class PerturbedSimulation(Simulation):
         base's velocity is along world axes. In (7) it is along the base's own, which turn: M times
         ω × v of the base comes to it.
         """
-        model, data = self.model, self._scratch()
+        model, data = self.model, self._scratch
         data.qpos[:], data.qvel[:] = self.data.qpos, self.data.qvel
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -200,7 +187,7 @@ class PerturbedSimulation(Simulation):
         """Add the adhesion force on each ball that touches the ground."""
         # contacts where the feet are now: the step before found them where it began
         mujoco.mj_fwdPosition(self.model, self.data)
-        foot_geoms = set(self._foot_geom_ids())
+        foot_geoms = set(self.foot_contacts.geoms.tolist())
         for plane, ball in self.data.contact.geom.tolist():
             if ball in foot_geoms:
                 force = -self._perturbation.adhesion_force * self.ground.normals[plane]
@@ -209,15 +196,13 @@ class PerturbedSimulation(Simulation):
                     self.model, self.data, force, np.zeros(3), position, body, applied
                 )
 
-    def _contact_forces_from(
-        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
-    ) -> Array:
+    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
         """As there, less the adhesion force: the force between ground and foot."""
-        forces = super()._contact_forces_from(geoms, contact_frame_forces)
+        forces = super().contact_forces_of(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
-            rows, columns = np.nonzero(np.isin(foot_geoms, self._point_geoms))
-            points = np.argmax(foot_geoms[rows, columns, None] == self._point_geoms, axis=1)
+            rows, columns = np.nonzero(np.isin(foot_geoms, self.foot_contacts.geoms))
+            points = np.argmax(foot_geoms[rows, columns, None] == self.foot_contacts.geoms, axis=1)
             forces[rows, points] -= (
                 self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
             )

@@ -8,7 +8,8 @@ import numpy as np
 
 from floatbase._validation import Array, read_only
 from floatbase.dynamics import Contacts
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 from floatbase.simulation.record import Recorder, Rollout
 
 # s, time constant with which the damping stops a joint that nothing else moves
@@ -56,7 +57,7 @@ def record_settling(
 def settling_rollout(
     sim: Simulation, previous: Rollout, ticks: int, substeps: int, pushes: tuple[Push, ...]
 ) -> Rollout:
-    """The next ticks after a record at whose end the controller is off, as a record of their own."""
+    """Record the next ticks after a record at whose end the controller is off."""
     stance = previous.contacts_at(-1) if len(previous) else previous.contacts
     record = Recorder(sim, stance, ticks, substeps)
     record_settling(sim, record, stance, ticks, substeps, pushes)

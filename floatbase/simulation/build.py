@@ -1,7 +1,7 @@
 """A MuJoCo model from a robot's URDF: ground, feet, torque motors.
 
-Only the ground's planes and balls at the feet touch, or hulls of the other links, too, for a robot
-that falls. Links that are welded together are one body, which has all their inertia.
+Balls at the feet and hulls of the links can touch the ground's planes, and nothing else touches.
+Links that are welded together are one body, which has all their inertia.
 """
 
 from __future__ import annotations
@@ -35,13 +35,15 @@ _CONTACT_IMPEDANCE = (
     2.0,
 )  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-# s in which a link comes out that was in the ground before it touched
-_PENETRATION_RECOVERY_TIME = 0.2
-# m: a flat foot stands on small balls whose lowest points are its corners
-_CORNER_BALL_RADIUS = 0.005
-HULL_PREFIX = "hull of"  # so begin the names of the links' geoms
-# m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
-_MIN_BALL_RADIUS = 1e-4
+_PENETRATION_RECOVERY_TIME = (
+    0.2  # s in which a link comes out that was in the ground before it touched
+)
+_CORNER_BALL_RADIUS = (
+    0.005  # m: a flat foot stands on small balls whose lowest points are its corners
+)
+_MIN_BALL_RADIUS = (
+    1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+)
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
 # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for
 # rounding
@@ -91,14 +93,12 @@ class Ground(Value):
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
-def build_model(
-    robot: Robot, ground: Ground, timestep: float, link_collisions: bool = False
-) -> mujoco.MjModel:
+def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
     """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact
     points, motors as joints.
 
-    link_collisions: whether the ground touches the links' hulls, too. Raises `SimulationError` when
-        MuJoCo cannot build it.
+    The ground touches the feet and the links' hulls. Raises `SimulationError` when MuJoCo cannot
+    build it.
     """
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
@@ -132,8 +132,7 @@ def build_model(
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
         _add_foot_balls(spec, foot, feet.point_names)
-    if link_collisions:
-        _add_link_hulls(spec, robot)
+    _add_link_hulls(spec, robot)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -272,7 +271,7 @@ def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
     for joint_id, points in link_hulls(robot):
         joint = spec.joint(robot.model.names[joint_id])  # the free base's has another name
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
-        mesh = spec.add_mesh(name=f"{HULL_PREFIX} {body.name}", uservert=points.ravel())
+        mesh = spec.add_mesh(name=f"hull of {body.name}", uservert=points.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         hull = body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0

@@ -7,13 +7,15 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from types import EllipsisType
+from typing import Literal
 
 import numpy.typing as npt
 
-from floatbase._validation import as_callable, as_instance, as_positive, as_string
+from floatbase._validation import as_callable, as_instance, as_positive
 from floatbase.simulation.after_fall import is_at_rest, settling_rollout
-from floatbase.simulation.physics import Push, Simulation, active_pushes
-from floatbase.simulation.record import Rollout
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push, active_pushes
+from floatbase.simulation.record import Outcome, Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 
 _SLICE_DURATION = (
@@ -21,21 +23,8 @@ _SLICE_DURATION = (
 )  # s of simulated time in a slice, about: as often as a picture is drawn
 _JOIN_TIMEOUT = 5.0  # s that `close` waits for a slice: far longer than one takes
 _MAX_SETTLING_TIME = 1.5  # s after a fall in which a robot comes to lie, at most
-AUTO_PAUSED = "paused by itself, untouched for long"  # a status
-ACTIVE_STATUSES = ("running", "paused", AUTO_PAUSED)  # the statuses of a run that nothing has ended
-# s for which a slice still lists a push that is over: the eye misses an arrow of a tenth of a
-# second
-PUSH_DISPLAY_TIME = 0.4
-
-
-def status_message(status: str) -> str:
-    """A status of `LiveSimulation` as a line for who watches: what stopped the run, in a sentence,
-    and what to do about it.
-    """
-    if as_string("status", status) in ACTIVE_STATUSES:
-        return status if status != AUTO_PAUSED else f"{AUTO_PAUSED}: press run"
-    reason = status.split("\n")[0].split(". ")[0].rstrip(".")
-    return f"{reason}: press reset, or push again"
+Status = Literal["running", "paused", "idle", "fell", "diverged", "controller failed", "stopped"]
+ACTIVE_STATUSES = ("running", "paused", "idle")  # of a run that nothing has ended
 
 
 class LiveSimulation:
@@ -43,18 +32,18 @@ class LiveSimulation:
     to `show`.
 
     sim, controller, control_period (s), actuators: as for `rollout`.
-    show: called with each slice's record, in that thread; its `pushes` are those that act or ended
-        less than `PUSH_DISPLAY_TIME` s ago.
+    show: called with each slice's record, in that thread.
     after_reset: called after each reset, in that thread, to reset what has a memory of its own,
         such as the actuators.
     idle_timeout: s without any call here after which the run pauses by itself, so that a forgotten
         page costs nothing.
+    push_memory: s for which the `pushes` of a slice still have those that are over.
 
-    `status` is "running", "paused", `AUTO_PAUSED` where it has paused by itself, or why the run
-    stopped: "fell", "diverged", "controller failed: …", "stopped: …" for an exception, which
-        `error` holds. A fall or a failure is told at once; slices go
-    on with the controller off, as `settling_time` of `rollout` says, until the robot lies still, or
-    for 1.5 s at most. Calls act between slices, and none but `close` waits.
+    `status` is "running", "paused", "idle" after `idle_timeout`, or why the run stopped: "fell",
+    "diverged", "controller failed", or "stopped" by an exception, which `error` holds. `reason` is
+    the message of the error. A fall or a failure is reported at once; slices go on with the
+    controller off, as `settling_time` of `rollout` says, until the robot lies still, or for 1.5 s
+    at most. Calls act between slices, and none but `close` waits.
     """
 
     def __init__(
@@ -67,6 +56,7 @@ class LiveSimulation:
         actuators: Actuators | None = None,
         after_reset: Callable[[], None] | None = None,
         idle_timeout: float = 120.0,
+        push_memory: float = 0.0,
     ):
         self.sim = as_instance("sim", sim, Simulation)
         as_callable("the controller", controller, "controller(q, v, t)")
@@ -84,25 +74,33 @@ class LiveSimulation:
         self._period = as_positive("control_period", control_period, "s")
         self._slice_duration = _slice_duration_for(self._period)  # s
         self._idle_timeout = as_positive("idle_timeout", idle_timeout, "s")
+        self._push_memory = as_positive("push_memory", push_memory, "s", allow_zero=True)
         self._time_scale = 1.0
         self._lock = threading.Lock()  # over all that follows
         self._pushes: tuple[Push, ...] = ()  # of the last slice
         self._requested_pushes: list[Push] = []  # for the next one
         self._reset_requested = False
         self._calls: list[Callable[[], None]] = []
-        self._status = "paused"
-        # the last slice where the controller is off; only the thread has to do with it
-        self._last_record: Rollout | None = None
-        self._listener: Callable[[str], None] | None = None
+        self._status: Status = "paused"
+        self._reason = ""
+        self._last_record: Rollout | None = (
+            None  # the last slice where the controller is off; only the thread has to do with it
+        )
+        self._listener: Callable[[Status], None] | None = None
         self._last_call = time.monotonic()
         self._stop = threading.Event()  # ends the present thread; set while paused
         self._stop.set()
         self._thread: threading.Thread | None = None
 
     @property
-    def status(self) -> str:
-        """ "running", "paused", `AUTO_PAUSED`, or why it stopped: see the class."""
+    def status(self) -> Status:
+        """ "running", "paused", "idle", or why it stopped: see the class."""
         return self._status
+
+    @property
+    def reason(self) -> str:
+        """The message of the error that ended the run; "" if none did."""
+        return self._reason
 
     @property
     def controller(self) -> Controller:
@@ -116,7 +114,7 @@ class LiveSimulation:
         """
         return not self._stop.is_set()
 
-    def on_status(self, listener: Callable[[str], None] | None) -> None:
+    def on_status(self, listener: Callable[[Status], None] | None) -> None:
         """Call `listener(status)` whenever the status changes, in the thread that changed it."""
         self._listener = (
             None if listener is None else as_callable("listener", listener, "listener(status)")
@@ -153,12 +151,12 @@ class LiveSimulation:
         actuators: Actuators | EllipsisType | None = ...,
         control_period: float | None = None,
     ) -> None:
-        """Continue under another controller from the next slice.
+        """Use another controller from the next slice on, and what else is given.
 
-        controller, sim, actuators: as for `rollout`. Actuators that are not given stay; None
-            removes them.
+        controller, sim, actuators: as for `rollout`; without actuators the present ones stay, and
+            None removes them.
         control_period: s.
-        """  # fmt: skip
+        """
         as_callable("the controller", controller, "controller(q, v, t)")
         if actuators is not ...:
             check_actuators(actuators)
@@ -219,9 +217,9 @@ class LiveSimulation:
             changed = self._set_status("running")
         self._notify(changed)
 
-    def _set_status(self, status: str) -> bool:
+    def _set_status(self, status: Status, reason: str = "") -> bool:
         """Take a status; whether it differs from the one before."""
-        previous, self._status = self._status, status
+        previous, self._status, self._reason = self._status, status, reason
         return previous != status
 
     def _notify(self, changed: bool) -> None:
@@ -243,67 +241,78 @@ class LiveSimulation:
             stop.wait(max(0.0, due - time.monotonic()))
 
     def _run_slice(self, stop: threading.Event) -> None:
-        """One slice of physics, shown; then go on, or stop because of its outcome or because nobody
-        has called for long.
-        """
-        with self._lock:
-            calls, self._calls = self._calls, []
+        """Run what was called for, simulate a slice and show it, and go on or stop."""
         try:
-            for call in calls:
-                call()
-            with self._lock:
-                requested, reset = self._requested_pushes, self._reset_requested
-                self._requested_pushes, self._reset_requested = [], False
-            if reset:
-                self.sim.reset()
-                self._pushes, self._last_record = (), None
-                if self._after_reset is not None:
-                    self._after_reset()
-            with self._lock:
-                sim, controller, actuators = self.sim, self._controller, self._actuators
-                period, duration = self._period, self._slice_duration
-            now = sim.time
-            self._pushes = tuple(
-                p for p in self._pushes if now < p.start + p.duration + PUSH_DISPLAY_TIME
-            )
-            self._pushes += tuple(replace(push, start=now) for push in requested)
-            active = active_pushes(
-                self._pushes, now, now + duration
-            )  # the others are only listed, to be seen
-            if self._last_record is None:
-                record = rollout(sim, controller, duration, active, period, actuators)
-            else:
-                substeps = round(period / sim.timestep)
-                record = settling_rollout(
-                    sim, self._last_record, round(duration / period), substeps, active
-                )
-            record = replace(record, pushes=self._pushes)
+            self._run_calls()
+            record = self._simulate_slice(self._start_of_slice())
             self._last_record = record if record.controller_off_time is not None else None
             if len(record):
                 self._show(record)
-            outcome = (
-                record.outcome if record.error is None else f"{record.outcome}: {record.error}"
-            )
+            outcome: Outcome | Literal["stopped"] = record.outcome
+            reason = "" if record.error is None else str(record.error)
         except Exception as error:
             # whatever a learner's controller raises must show, or the picture just stands still
-            outcome, self.error, self._last_record = (
-                f"stopped: {type(error).__name__}: {error}",
-                error,
-                None,
-            )
+            outcome, reason = "stopped", f"{type(error).__name__}: {error}"
+            self.error, self._last_record = error, None
+        self._end_slice(stop, outcome, reason)
+
+    def _run_calls(self) -> None:
+        """Make the calls of `call_soon`."""
+        with self._lock:
+            calls, self._calls = self._calls, []
+        for call in calls:
+            call()
+
+    def _start_of_slice(self) -> list[Push]:
+        """Reset the robot if that is requested; returns the pushes that begin now."""
+        with self._lock:
+            requested, reset = self._requested_pushes, self._reset_requested
+            self._requested_pushes, self._reset_requested = [], False
+        if reset:
+            self.sim.reset()
+            self._pushes, self._last_record = (), None
+            if self._after_reset is not None:
+                self._after_reset()
+        return requested
+
+    def _simulate_slice(self, requested: list[Push]) -> Rollout:
+        """Run one slice of physics, with the controller or after a fall without."""
+        with self._lock:
+            sim, controller, actuators = self.sim, self._controller, self._actuators
+            period, duration = self._period, self._slice_duration
+        now = sim.time
+        self._pushes = tuple(
+            p for p in self._pushes if now < p.start + p.duration + self._push_memory
+        )
+        self._pushes += tuple(replace(push, start=now) for push in requested)
+        active = active_pushes(self._pushes, now, now + duration)
+        if self._last_record is None:
+            record = rollout(sim, controller, duration, active, period, actuators)
+        else:
+            ticks, substeps = round(duration / period), round(period / sim.timestep)
+            record = settling_rollout(sim, self._last_record, ticks, substeps, active)
+        return replace(record, pushes=self._pushes)
+
+    def _end_slice(
+        self, stop: threading.Event, outcome: Outcome | Literal["stopped"], reason: str
+    ) -> None:
+        """Take the status that follows from a slice, and stop where it ends the run."""
         with self._lock:
             if self._reset_requested:  # the outcome is about a robot that is put back next
                 return
-            if outcome == "completed":
-                if stop.is_set() or time.monotonic() - self._last_call <= self._idle_timeout:
+            status: Status
+            if outcome != "completed":
+                status = outcome
+                if stop is not self._stop:  # paused and started again meanwhile
+                    self._reset_requested = True
                     return
-                outcome = AUTO_PAUSED
-            elif stop is not self._stop:  # paused and started again meanwhile
-                self._reset_requested = True
+            elif stop.is_set() or time.monotonic() - self._last_call <= self._idle_timeout:
                 return
+            else:
+                status = "idle"
             if self._last_record is None or self._has_settled:
                 stop.set()
-            changed = self._set_status(outcome)
+            changed = self._set_status(status, reason)
         self._notify(changed)
 
     @property

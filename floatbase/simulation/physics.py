@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Self
 
@@ -15,22 +13,19 @@ import pinocchio as pin
 
 from floatbase._validation import (
     Array,
-    Value,
     as_array,
     as_bool,
     as_instance,
-    as_number,
     as_positive,
-    as_string,
     cross,
-    short_repr,
 )
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 from floatbase.simulation.build import Ground, body_name, build_model
 from floatbase.simulation.conversion import Conversion
-from floatbase.simulation.fallen_model import FallenModel, build_fallen_model
+from floatbase.simulation.foot_contacts import FootContacts
+from floatbase.simulation.push import Push, as_pushes
 
 # part of the base's height at the last reset: a crouch keeps more, lying down does not
 _FALLEN_HEIGHT_FRACTION = 0.4
@@ -40,70 +35,9 @@ _FALLEN_COSINE = float(
 # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
-# s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
-_CLOCK_TOLERANCE = 1e-9
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
-
-
-@dataclass(frozen=True, eq=False)
-class Push(Value):
-    """A force on the robot for a while.
-
-    A timestep that the push covers in part gets that part of the force: its impulse is force times
-    duration.
-
-    force: (3,) N, world, at the origin of the frame.
-    start, duration: s, on the simulation's clock.
-    frame: name of a frame of the robot; "base" is the base link.
-    """
-
-    force: Array
-    start: float = 0.0
-    duration: float = 0.1
-    frame: str = "base"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "force", as_array("force of the push", self.force, (3,), "N"))
-        object.__setattr__(
-            self, "start", as_positive("start of the push", self.start, "s", allow_zero=True)
-        )
-        object.__setattr__(
-            self, "duration", as_positive("duration of the push", self.duration, "s")
-        )
-        as_string("frame of the push", self.frame)
-
-    def acts_at(self, t: float) -> bool:
-        """Whether the push acts at t, s."""
-        t = as_number("t", t, "s")
-        return self.start - _CLOCK_TOLERANCE <= t < self.start + self.duration - _CLOCK_TOLERANCE
-
-    def _active_fraction(self, t: float, timestep: float) -> float:
-        """The part of the step from t to t + timestep, s, in which the push acts: 0 to 1."""
-        active_time = min(self.start + self.duration, t + timestep) - max(self.start, t)
-        return max(0.0, active_time) / timestep
-
-
-def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
-    """A list of pushes as a tuple, checked."""
-    if not isinstance(pushes, Sequence):
-        raise InputError(
-            f"pushes must be a list, as in pushes=[fb.Push(…)], not {short_repr(pushes)}."
-        )
-    return tuple(
-        as_instance("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])")
-        for push in pushes
-    )
-
-
-def active_pushes(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ...]:
-    """Those that act at any time from begin to end, s."""
-    return tuple(
-        p
-        for p in pushes
-        if p.start < end - _CLOCK_TOLERANCE and begin < p.start + p.duration - _CLOCK_TOLERANCE
-    )
 
 
 class Simulation:
@@ -118,8 +52,6 @@ class Simulation:
     timestep in s. `model` and `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`.
     Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with cannot
     be set; what `model` and `data` hold may change. A copy has `model` and `data` of its own.
-    While `link_collisions` touch the ground they are another pair, which has what was changed in
-    the first.
     """
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
@@ -133,26 +65,17 @@ class Simulation:
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
-        self._foot_geoms = np.array(
-            [self.model.geom(name).id for name in self.point_names], dtype=int
-        )
-        self._upright_foot_geoms = (
-            self._foot_geoms
-        )  # the same in `_raw_contacts`, which count as the upright model does
-        # of each plane, which is a geom; known from its first contact on
-        self._contact_frames, self._planes_without_frame = (
-            np.zeros((self.model.ngeom, 3, 3)),
-            set(range(len(self.ground.normals))),
-        )
-        self._max_contacts = len(self._foot_geoms) * len(
-            self.ground.normals
-        )  # of feet: in a valley a ball touches two planes
+        self.foot_contacts = FootContacts(self.model, self.ground, self.point_names)
         self._planes = list(
             zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
         )
-        self._radii = self.model.geom_size[self._foot_geoms, :1]
-        self._upright, self._link_collisions = (self.model, self.data), False
-        self._fallen_model: FallenModel | None = None  # from the first fall on
+        # the hulls are the only meshes; a body that has a foot can always touch
+        self._hull_geoms = np.flatnonzero(self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
+        self._hull_bodies = np.setdiff1d(
+            self.model.geom_bodyid[self._hull_geoms],
+            self.model.geom_bodyid[self.foot_contacts.geoms],
+        )
+        self._set_hulls_touch(False)
         self._base_body = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._refresh_views()
         self.reset()
@@ -276,7 +199,6 @@ class Simulation:
 
         A fallen robot lies on them, as `rollout(…, settling_time=1.0)` shows. Before a fall only
         feet touch, as in (7), and links in the ground come out slowly. Links go through each other.
-        The first time takes longer: the shapes are read.
         """
         return self._link_collisions
 
@@ -284,28 +206,15 @@ class Simulation:
     def link_collisions(self, enabled: bool) -> None:
         if as_bool("link_collisions", enabled) == self._link_collisions:
             return
-        self._link_collisions = bool(enabled)
-        if self._fallen_model is None:
-            self._fallen_model = build_fallen_model(self.robot, self.ground, self.timestep)
-        if self._fallen_model is None:  # nothing could touch
-            return
-        if enabled:
-            self._fallen_model.copy_from_upright(*self._upright)
-            self._activate_model(
-                self._fallen_model.model,
-                self._fallen_model.data,
-                self._fallen_model.from_upright[self._upright_foot_geoms],
-            )
-        else:
-            self._fallen_model.copy_to_upright(*self._upright)
-            self._activate_model(*self._upright, self._upright_foot_geoms)
+        self._set_hulls_touch(bool(enabled))
+        if self._hull_geoms.size:
+            mujoco.mj_forward(self.model, self.data)
 
-    def _activate_model(
-        self, model: mujoco.MjModel, data: mujoco.MjData, foot_geoms: npt.NDArray[np.int_]
-    ) -> None:
-        """Go on with another model and its data, in which the feet's balls have these numbers."""
-        self._model, self._data, self._foot_geoms = model, data, foot_geoms
-        self._refresh_views()
+    def _set_hulls_touch(self, enabled: bool) -> None:
+        """Let the ground touch the links' hulls, or not."""
+        self._link_collisions = enabled
+        self.model.geom_conaffinity[self._hull_geoms] = enabled
+        self.model.body_conaffinity[self._hull_bodies] = enabled  # bodies that MuJoCo looks at
 
     def reset(self, state: State | None = None) -> None:
         """Put the robot into a state, standing on the ground by default, at time 0.
@@ -342,87 +251,41 @@ class Simulation:
         self.data.ctrl[self._actuator_ids] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:
-            fraction = push._active_fraction(self.data.time, self.timestep)
+            fraction = push.active_fraction(self.data.time, self.timestep)
             if fraction > 0.0:
                 self._apply_push(push, fraction * push.force)
         mujoco.mj_step(self.model, self.data)
 
     def torques(self) -> Array:
-        """Torques that the motors gave during the last step, within their limits, shape (d,), N·m."""
-        return self._torques_from(self.data.actuator_force)
+        """Torques of the motors during the last step, within their limits, shape (d,), N·m."""
+        return self.torques_of(self.data.actuator_force)
 
-    def _torques_from(self, actuator_force: Array) -> Array:
-        """`torques` for MuJoCo's forces of all its actuators, shape (…, d)."""
+    def torques_of(self, actuator_force: Array) -> Array:
+        """`torques` for MuJoCo's forces of all its actuators, shape (…, d), unchecked."""
         return actuator_force[..., self._actuator_ids]
 
     def contact_forces(self) -> Array:
         """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world,
         ordered as `point_names`.
         """
-        geoms, contact_frame_forces = self._raw_contacts()
-        forces: Array = self._contact_forces_from(geoms[None], contact_frame_forces[None])[0]
-        return forces
+        geoms, contact_frame_forces = self.read_contacts()
+        return self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
 
-    def _raw_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """What MuJoCo has of n contacts of feet now: geoms as the upright model has them, (n, 2),
-        and forces in their frame, (3 n,), N.
-        """
-        data = self.data
-        contact, forces, n_limits = data.contact, data.efc_force, data.nl
-        if n_limits:  # behind the joints at their limits come the contacts
-            forces = forces[n_limits:]
-        geoms = contact.geom  # from the plane to a ball or a link
-        if forces.size != 3 * len(
-            geoms
-        ):  # a ball that only just touches has none, another cone than ours has others
-            forces = np.zeros((len(geoms), 6))
-            for i, wrench in enumerate(forces):
-                mujoco.mj_contactForce(self.model, data, i, wrench)
-            forces = forces[:, :3].ravel()
-        if self._planes_without_frame and len(
-            geoms
-        ):  # all balls on a plane have one contact frame at all times
-            for i, (plane, geom) in enumerate(geoms.tolist()):
-                if geom in self._foot_geoms:
-                    self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
-                    self._planes_without_frame.discard(plane)
-        if self._link_collisions and self._fallen_model is not None:
-            geoms = self._fallen_model.to_upright[geoms].astype(np.int32)
-            feet = geoms[:, 1] >= 0
-            geoms, forces = geoms[feet], forces.reshape(-1, 3)[feet].ravel()
-        return geoms, forces
+    def read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
+        """The feet's contacts now, as `FootContacts.read` gives them."""
+        return self.foot_contacts.read(self.model, self.data, self._link_collisions)
 
-    def _contact_forces_from(
-        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
-    ) -> Array:
-        """`contact_forces` of N instants, shape (N, n_points, 3), N, from their `_raw_contacts`,
-        with geom 0 for none.
+    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
+        """`contact_forces` at N instants, shape (N, n_points, 3), N, for what `read_contacts` gave
+        then, unchecked.
         """
-        n, planes, foot_geoms = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
-        forces, per_contact = (
-            np.zeros((n, self._upright[0].ngeom, 3)),
-            contact_frame_forces.reshape(*foot_geoms.shape, 3),
-        )
-        for plane in range(len(self._planes)):
-            rows, columns = np.nonzero(
-                planes == plane
-            )  # no ball touches a plane twice, so nothing is added to a sum twice
-            forces[rows, foot_geoms[rows, columns]] += (
-                per_contact[rows, columns] @ self._contact_frames[plane]
-            )  # rows: normal, tangents
-        return forces[:, self._upright_foot_geoms]
+        return self.foot_contacts.forces(geoms, contact_frame_forces)
 
     def contact_positions(self) -> Array:
         """World positions of the points, shape (n_points, 3), m: the point of each ball that is
         nearest to the ground.
         """
-        return self._lowest_points(self.data.geom_xpos[self._foot_geoms])
-
-    def _lowest_points(self, centres: Array) -> Array:
-        """`contact_positions` for centres of the balls, shape (…, n_points, 3), m."""
-        nearest = np.argmin(self.ground.clearances(centres), axis=-1)
-        lowest: Array = centres - self._radii * self.ground.normals[nearest]
-        return lowest
+        return self.foot_contacts.positions(self.data.geom_xpos[self.foot_contacts.geoms])
 
     def pushed_body(self, push: Push) -> int:
         """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted
@@ -459,7 +322,7 @@ class Simulation:
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
     def _standing_state(self) -> State:
-        """The robot standing on the ground; on a slope turned with it, so that every foot touches."""
+        """The robot standing on the ground, turned with a slope so that every foot touches."""
         if len(self._planes) > 1:
             return self.robot.standing(normal=self.ground.normals, offset=self.ground.offsets)
         state = self.robot.standing()

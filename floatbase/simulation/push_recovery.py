@@ -11,7 +11,6 @@ from functools import partial
 from math import ceil
 from typing import Any
 
-import cloudpickle
 import numpy as np
 
 from floatbase._validation import (
@@ -27,9 +26,11 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SimulationError
 from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
-from floatbase.simulation.physics import Push, Simulation
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
+from floatbase.simulation.row_store import require
 from floatbase.simulation.sweep import sweep
 
 _MIN_DIRECTIONS = 3  # directions: fewer are no closed line
@@ -197,12 +198,12 @@ def push_recovery(
     table = sweep(
         largest_push, {"direction": angles}, workers=workers, cluster=cluster, progress=progress
     )
-    for row in table.errors:
-        raise SimulationError(
-            f"the push towards {np.rad2deg(row['direction']):.0f}° ended with {row['error']}"
-        )
+    for angle, error in zip(angles, table["error"], strict=True):
+        if isinstance(error, str):
+            raise SimulationError(f"The push towards {np.rad2deg(angle):.0f}° ended with {error}")
     return PushRecovery(
-        read_only(angles), read_only(table["result"]), settings["resolution"], settings["duration"],
+        read_only(angles), read_only(table["result"].to_numpy(dtype=float)),
+        settings["resolution"], settings["duration"],
         frame, sim.state,
         contacts if isinstance(contacts, Contacts) else sim.feet,
     )  # fmt: skip
@@ -224,7 +225,8 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         return partial(_simulation_and_controller, controller)
     try:
         return partial(
-            _simulation_and_controller, partial(pickle.loads, cloudpickle.dumps(controller))
+            _simulation_and_controller,
+            partial(pickle.loads, require("cloudpickle").dumps(controller)),
         )
     except Exception as error:
         raise InputError(

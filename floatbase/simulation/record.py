@@ -1,10 +1,9 @@
-"""`Rollout`: what happened under a controller on the physics, row by row; `Recorder` collects it."""
+"""`Rollout`: what happened under a controller, row by row; `Recorder` collects it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -21,10 +20,8 @@ from floatbase._validation import (
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
-from floatbase.simulation.physics import Push, Simulation
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
@@ -104,15 +101,6 @@ class Rollout(Value):
         """The state at the last row."""
         self._check_not_empty()
         return self.state(-1)
-
-    def plot(self) -> Figure:
-        """A figure of the record: centre of mass, normal forces, friction used, torques. More:
-        `floatbase.viewer.plots`.
-        """
-        figure: Figure = import_module("floatbase.viewer").plots.plot_run(
-            self
-        )  # a floor above, which loads when first used
-        return figure
 
     @cached_property
     def com(self) -> Array:
@@ -207,29 +195,21 @@ class Recorder:
         )
         self._tau_desired = np.empty((ticks, d))
         # MuJoCo's own numbers, which `to_rollout` turns into ours, all rows at once
-        self._refresh_views()
+        self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
         self._step_actuator_forces = np.empty((ticks * substeps, sim.model.nu))
-        max_contacts = sim._max_contacts
+        max_contacts = sim.foot_contacts.max_contacts
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
         self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
         self._rows_with_plan: list[int] = []  # the rows of those
 
-    def _refresh_views(self) -> None:
-        """Views into the memory of MuJoCo's data."""
-        self._geom_positions, self._actuator_forces = (
-            self._sim.data.geom_xpos,
-            self._sim.data.actuator_force,
-        )
-
     def enable_link_collisions(self) -> None:
         """Go on with links that touch. Timesteps of a tick that was begun and is not completed are
         forgotten.
         """
         self._sim.link_collisions = True
-        self._refresh_views()
         first = self._n * self._substeps
         self._step_contact_geoms[first : self._n_steps] = 0
         self._step_contact_forces[first : self._n_steps] = 0.0
@@ -239,13 +219,12 @@ class Recorder:
         """Keep clock, state and feet before a tick. They count when `complete_tick` does."""
         n = self._n
         self._time[n], self._q[n], self._v[n] = t, q, v
-        self._geom_positions.take(
-            self._sim._foot_geoms, 0, self._foot_centres[n], "clip"
-        )  # "clip": it is the fastest
+        geoms = self._sim.foot_contacts.geoms
+        self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
 
     def after_step(self) -> None:
         """Keep what motors and ground did in a timestep of the tick."""
-        i, (geoms, forces) = self._n_steps, self._sim._raw_contacts()
+        i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = (
             geoms,
@@ -296,7 +275,7 @@ class Recorder:
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
             tau=self._mean_over_substeps(
-                self._sim._torques_from(self._step_actuator_forces[: self._n * self._substeps])
+                self._sim.torques_of(self._step_actuator_forces[: self._n * self._substeps])
             ),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
@@ -348,11 +327,9 @@ class Recorder:
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
-            sim._contact_forces_from(
-                self._step_contact_geoms[steps], self._step_contact_forces[steps]
-            )
+            sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
         )
-        lowest = sim._lowest_points(self._foot_centres[:n])
+        lowest = sim.foot_contacts.positions(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             forces, positions = (

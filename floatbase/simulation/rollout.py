@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from floatbase._validation import (
     MAX_MAGNITUDE,
@@ -24,7 +23,8 @@ from floatbase._validation import (
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.after_fall import record_settling
-from floatbase.simulation.physics import Push, Simulation, active_pushes, as_pushes
+from floatbase.simulation.physics import Simulation
+from floatbase.simulation.push import Push, active_pushes, as_pushes
 from floatbase.simulation.record import Outcome, Recorder, Rollout
 
 _MAX_STEPS = (
@@ -119,11 +119,12 @@ def rollout(
         )
         return record.to_rollout(pushes, outcome, error, controller_off_time)
 
-    for _ in (
-        tqdm(range(ticks), "rollout", unit=" ticks")
-        if as_bool("progress", progress)
-        else range(ticks)
-    ):
+    bar: Iterable[int] = range(ticks)
+    if as_bool("progress", progress):
+        from tqdm.auto import tqdm  # takes long to load
+
+        bar = tqdm(bar, "rollout", unit=" ticks")
+    for _ in bar:
         t, q, v = sim.time, sim.q, sim.v
         record.before_tick(t, q, v)
         try:

@@ -1,4 +1,4 @@
-"""`sweep`: a function at every point of a grid, in processes on this machine or on a Dask cluster."""
+"""`sweep`: a function at every point of a grid, in several processes or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -9,28 +9,31 @@ import threading
 import time
 import traceback
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import cloudpickle
-import loky
-from tqdm.auto import tqdm
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from floatbase._validation import signature_error
 from floatbase.errors import InputError, SimulationError
-from floatbase.simulation.table import RESERVED_NAMES, Row, RowStore, Table, as_json_value
+from floatbase.simulation.row_store import (
+    RESERVED_NAMES,
+    Row,
+    RowStore,
+    as_frame,
+    as_json_value,
+    require,
+)
 
-# s after which a worker without work ends; the next sweep within them saves its start
-_WORKER_IDLE_TIMEOUT = 60.0
-# s between a worker's looks whether the program that started it is still there
-_PARENT_CHECK_PERIOD = 1.0
-_POINTS_PER_WORKER = 2  # points handed out for each worker: one that it is at, and the next
-# threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
-_MIN_CLUSTER_THREADS = 32
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+_WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
+_POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
+_MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep
+_PARENT_CHECK_PERIOD = 1.0  # s
 _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
 _SINGLE_THREAD_ENV = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -46,50 +49,54 @@ def sweep(
     workers: int | None = None,
     cluster: Any = None,
     progress: bool = True,
-) -> Table:
-    """Call a function at every point of a grid, in several processes, and collect what it returns
-    in a table.
+) -> DataFrame:
+    """Call a function at every point of a grid, in several processes, and return a table.
 
-        def setup():                                         # heavy things, made once in each process
+        def setup():  # what is slow to make, made once in each process
             robot = fb.load("go2")
-            controller = fb.WholeBodyController(robot, fb.Contacts.points(robot, mu=0.7),
-            fb.standing_tasks(robot.standing())) return fb.Simulation(robot), controller
+            contacts = fb.Contacts.points(robot, mu=0.7)
+            tasks = fb.standing_tasks(robot.standing())
+            return fb.Simulation(robot), fb.WholeBodyController(robot, contacts, tasks)
 
         def push(made, force, angle):
             sim, controller = made
             sim.reset()
-            run = fb.rollout(sim, controller, 0.6, [fb.Push([force * np.cos(angle), force *
-            np.sin(angle), 0.0])]) return {"outcome": run.outcome, "moved": run.com[-1] -
-            run.com[0]}
+            forces = [force * np.cos(angle), force * np.sin(angle), 0.0]
+            run = fb.rollout(sim, controller, 0.6, [fb.Push(forces)])
+            return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
 
         grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
         table = fb.sweep(push, grid, setup=setup, file="pushes.jsonl")
+        table.groupby("force")["outcome"].value_counts()
 
-    function: takes the parameters by their names, after what `setup` returned where there is one.
-        It returns a dict, a column for each name, or one value, the column "result": numbers,
-        texts, booleans, lists and numpy arrays. An exception makes the row's "error", and the sweep
-        goes on.
-    grid: name -> values, for all combinations, the last name the fastest; or a list of dicts, one
-        for each point.
-    setup: called once in each process (on Dask in each thread), for what is heavy or cannot be
-        sent.
-    file: path of a file that keeps each row as it comes. The same sweep into the same file goes on
-        where it was ended, however it was; two points for each worker are lost at most. The
-        function is known by its name: after changing what it does, give another file. A file of
-        another function or grid is refused. `Table.read` reads a file.
-    workers: how many processes, by default as many as the machine has cores for this program. Each
-        uses one thread for linear algebra, so that the rows are the same, bit for bit, whatever
-        their number.
-    cluster: a `dask.distributed.Client`, or the address of a scheduler, to work there: pip install
-        "floatbase[cluster]".
-    progress: whether to show a bar.
+    function: takes the parameters by their names, after the result of `setup` if there is one.
+        It returns a dict, one entry for each column, or one value for the column "result". Values
+        are numbers, strings, booleans, lists and numpy arrays, which become lists. An exception is
+        stored in the row's "error", and the sweep continues.
+    grid: name -> values, for all combinations, the last name changing fastest; or a list of dicts,
+        one for each point.
+    setup: called once in each process (on Dask in each thread), for objects that are slow to make
+        or cannot be sent.
+    file: path of a JSON Lines file to which each row is written as it finishes. The same sweep with
+        the same file resumes, also after it was killed; at most two points for each worker are
+        computed again. The function is identified by its name: after changing what it does, use
+        another file. A file of another function or grid is refused. `read_sweep` reads a file.
+    workers: number of processes, by default one for each core. Each uses one thread for linear
+        algebra, so the rows are bit-identical for any number of workers.
+    cluster: a `dask.distributed.Client` or the address of a scheduler, to work there. Install it
+        with pip install "floatbase[cluster]".
+    progress: whether to show a progress bar.
 
-    Functions, lambdas and classes of a notebook or script can be used: they are sent by value. What
-    is imported must be importable by the workers.
-    Raises `InputError` for a grid that does not fit the function, for an answer that cannot be
-    stored, for a file of something else or that takes no more, as on a full disc; `SimulationError`
-    when a process or the cluster breaks down; and what `setup` raises. What is in the file stays
-    there, after an interrupt too.
+    Returns a `pandas.DataFrame`, a row for each point in the order of the grid: parameters,
+    results, and "error", None or the type and message of an exception.
+
+    Functions, lambdas and classes of a notebook or script are sent by value. Modules that they
+    import must be importable in the workers.
+
+    Raises `InputError` for a grid that does not fit the function, for a result that cannot be
+    stored, and for a file of another sweep or one that cannot be written to; `SimulationError` when
+    a process or the cluster breaks down; and what `setup` raises. Rows in the file are kept, also
+    after an interrupt.
     """
     points = _grid_points(grid)
     json_points = [
@@ -99,36 +106,31 @@ def sweep(
     name = _function_name(function, file)
     _check_function(function, setup, points)
     if cluster is not None and workers is not None:
-        raise InputError(
-            "workers counts processes on this machine; a cluster has its own. Leave one of the two "
-            "out."
-        )
-    workers = _worker_count(workers)
-    job = _make_job(function, setup)
+        raise InputError("workers counts processes on this machine; a cluster has its own.")
+    require("pandas")  # before hours of work
+    job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
     with closing(RowStore(file, name, json_points)) as store:
         pending = [i for i in range(len(points)) if i not in store.rows]
         failed = sum(row["error"] is not None for row in store.rows.values())
-        bar = tqdm(
+        bar = require("tqdm.auto").tqdm(
             total=len(points),
             initial=len(store.rows),
             desc=name,
             unit="point",
             disable=not progress,
         )
-        with bar, _open_pool(workers, cluster, bool(pending)) as pool:
-            for i, answer in _completed_points(pool, job, points, pending):
+        with bar, closing(_completed_points(executor, job, points, pending)) as answers:
+            for i, answer in answers:
                 store.add(i, json_points[i] | answer)
                 failed += answer["error"] is not None
                 if failed:
                     bar.set_postfix(failed=failed, refresh=False)
                 bar.update()
-        return Table(tuple(store.rows[i] for i in range(len(points))))
+        return as_frame(store.rows)
 
 
 class _Job(NamedTuple):
-    """What a worker needs for all points: `payload` is function and setup, pickled, and `token`
-    says of which sweep.
-    """
+    """What a worker needs for all points: the sweep's token, and the pickled function and setup."""
 
     token: str
     payload: bytes
@@ -207,7 +209,7 @@ def _check_function(function: Callable[..., Any], setup: Any, points: list[Row])
 
 def _worker_count(workers: Any) -> int:
     if workers is None:
-        return int(loky.cpu_count())
+        return int(require("loky").cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
         raise InputError(
             f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
@@ -218,7 +220,9 @@ def _worker_count(workers: Any) -> int:
 
 def _make_job(function: Any, setup: Any) -> _Job:
     try:
-        return _Job(uuid.uuid4().hex, cloudpickle.dumps((function, setup)))
+        return _Job(uuid.uuid4().hex, require("cloudpickle").dumps((function, setup)))
+    except InputError:
+        raise
     except Exception as error:
         raise InputError(
             f"the function cannot be sent to other processes ({type(error).__name__}: {error}). "
@@ -227,45 +231,44 @@ def _make_job(function: Any, setup: Any) -> _Job:
         ) from error
 
 
-class _Pool(NamedTuple):
-    """Who computes: an executor, and how many points it is given at a time; no others are lost when
-    the program is killed.
-    """
-
-    executor: Executor
-    max_pending: int
-
-
 @contextmanager
-def _open_pool(workers: int, cluster: Any, needed: bool) -> Iterator[_Pool | None]:
-    """Processes on this machine or the cluster's; what is not done when an exception comes is
-    dropped.
+def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
+    """Processes on this machine or the cluster's, and how many points to submit at a time.
+
+    On an exception, points that are not finished are dropped.
     """
-    if not needed:
-        yield None
-    elif cluster is None:
-        executor = loky.get_reusable_executor(
+    if cluster is None:
+        executor = require("loky").get_reusable_executor(
             workers,
             timeout=_WORKER_IDLE_TIMEOUT,
-            initializer=_exit_with_parent,
+            initializer=_watch_parent,
             initargs=(os.getpid(),),
             env=_SINGLE_THREAD_ENV,
         )
         try:
-            yield _Pool(executor, _POINTS_PER_WORKER * workers)
+            yield executor, _POINTS_PER_WORKER * workers
         except BaseException:
             executor.shutdown(kill_workers=True)
             raise
-    else:
-        with _dask_client(cluster) as client:
-            executor = client.get_executor(pure=False)
-            try:
-                yield _Pool(
-                    executor,
-                    _POINTS_PER_WORKER * max(sum(client.nthreads().values()), _MIN_CLUSTER_THREADS),
-                )
-            finally:
-                executor.shutdown(wait=False)
+        return
+    with _dask_client(cluster) as client:
+        executor = client.get_executor(pure=False)
+        threads = max(sum(client.nthreads().values()), _MIN_CLUSTER_THREADS)
+        try:
+            yield executor, _POINTS_PER_WORKER * threads
+        finally:
+            executor.shutdown(wait=False)
+
+
+def _watch_parent(parent: int) -> None:
+    """In a worker: end soon after the program that started it was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_CHECK_PERIOD)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager
@@ -299,55 +302,45 @@ def _dask_client(cluster: Any) -> Iterator[Any]:
 
 
 def _completed_points(
-    pool: _Pool | None, job: _Job, points: list[Row], pending: list[int]
-) -> Iterator[tuple[int, Row]]:
-    """Number and answer of each open point, as they come."""
-    if pool is None:
+    executor: AbstractContextManager[tuple[Executor, int]],
+    job: _Job,
+    points: list[Row],
+    pending: list[int],
+) -> Generator[tuple[int, Row], None, None]:
+    """Number and row of each pending point, as they finish."""
+    if not pending:
         return
-    remaining = iter(pending)
-    indices: dict[Future[Row | Exception], int] = {}
-    try:
+    remaining, submitted = iter(pending), dict[Future[Row | Exception], int]()
+    with executor as (pool, max_submitted):
         while True:
-            for i in itertools.islice(remaining, pool.max_pending - len(indices)):
-                indices[pool.executor.submit(_run_point, job, points[i])] = i
-            if not indices:
+            for i in itertools.islice(remaining, max_submitted - len(submitted)):
+                submitted[pool.submit(_run_point, job, points[i])] = i
+            if not submitted:
                 return
-            for future in wait(indices, return_when=FIRST_COMPLETED).done:
-                answer = _future_result(future)
+            for future in wait(submitted, return_when=FIRST_COMPLETED).done:
+                try:
+                    answer = future.result()
+                except BrokenExecutor as error:
+                    raise SimulationError(
+                        "A worker process died at a point. Use fewer workers if it ran out of "
+                        "memory; otherwise compiled code crashed."
+                    ) from error
+                except Exception as error:  # of the cluster: `_run_point` raises nothing
+                    raise SimulationError(
+                        f"The cluster broke down at a point ({type(error).__name__}: {error})."
+                    ) from error
                 if isinstance(answer, Exception):
                     raise answer
-                yield indices.pop(future), answer
-    except BrokenExecutor as error:
-        raise SimulationError(
-            "a worker process ended in the middle of a point: it was out of memory, where fewer "
-            "workers help, or compiled "
-            "code crashed."
-        ) from error
+                yield submitted.pop(future), answer
 
 
-def _future_result(future: Future[Row | Exception]) -> Row | Exception:
-    """What `_run_point` returned. It raises nothing itself: what is raised is the engine's."""
-    try:
-        return future.result()
-    except BrokenExecutor:
-        raise
-    except Exception as error:
-        raise SimulationError(
-            f"the cluster broke down at a point ({type(error).__name__}: {error})."
-        ) from error
-
-
-_parent_pid: int | None = None  # in a process of this machine: the program that started it
-_this_thread = (
-    threading.local()
-)  # of a worker's thread: function and token of the sweep that it works for
+_this_thread = threading.local()  # of a worker: function and token of the sweep that it works for
 
 
 def _run_point(job: _Job, point: Row) -> Row | Exception:
     """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would
     log it for each point.
     """
-    _exit_if_orphaned()
     try:
         return _evaluate(job, point)
     except Exception as error:
@@ -388,21 +381,3 @@ def _evaluate(job: _Job, point: Row) -> Row:
         name: as_json_value(f"the function's result {name!r}", value)
         for name, value in results.items()
     } | {"error": None}
-
-
-def _exit_with_parent(parent: int) -> None:
-    """In a worker: end when the program that started it is gone. One that was killed tells nobody."""
-    global _parent_pid
-    _parent_pid = parent
-
-    def watch_parent() -> None:
-        while True:
-            time.sleep(_PARENT_CHECK_PERIOD)
-            _exit_if_orphaned()
-
-    threading.Thread(target=watch_parent, daemon=True).start()
-
-
-def _exit_if_orphaned() -> None:
-    if _parent_pid is not None and os.getppid() != _parent_pid:
-        os._exit(1)

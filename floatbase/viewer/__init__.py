@@ -11,6 +11,7 @@ from floatbase.errors import ViewerError
 try:
     from floatbase.viewer import plots
     from floatbase.viewer.camera import PRESETS, View
+    from floatbase.viewer.live import PUSH_DISPLAY_TIME, status_message
     from floatbase.viewer.scene import colours, markers, shapes
     from floatbase.viewer.scene.painter import prefixed
     from floatbase.viewer.scene.shapes import Item, Picture
@@ -22,6 +23,7 @@ except ModuleNotFoundError as error:
 
 __all__ = [
     "PRESETS",
+    "PUSH_DISPLAY_TIME",
     "Item",
     "Picture",
     "View",
@@ -31,4 +33,5 @@ __all__ = [
     "plots",
     "prefixed",
     "shapes",
+    "status_message",
 ]

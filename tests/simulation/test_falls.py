@@ -219,16 +219,6 @@ def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_fe
     assert sim.contact_forces()[0, 2] > 0.0
 
 
-def test_links_are_read_at_the_first_fall() -> None:
-    sim = fb.Simulation(judges.load("go2"))
-    model, data = sim.model, sim.data
-    assert model.nmesh == 0 and model.ngeom == 5
-    sim.link_collisions = True
-    assert sim.model.nmesh > 0
-    sim.reset()
-    assert sim.model is model and sim.data is data
-
-
 def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
     """State, clock, forces and places of the feet are the same with links that touch, and without
     them again.
@@ -247,22 +237,6 @@ def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
         assert after[0] == before[0] and np.array_equal(after[1], before[1])
         assert np.allclose(after[2], before[2], atol=2e-3)  # those are of a timestep before
         assert sim.contact_forces().shape == (4, 3) and np.all(sim.contact_forces()[:, 2] >= 0.0)
-
-
-def test_what_is_changed_in_the_model_holds_in_a_fall_and_after_it() -> None:
-    sim = fb.Simulation(judges.load("go2"))
-    sim.model.opt.gravity[2] = -3.0
-    sim.model.geom("FL_foot").friction[0] = 0.3
-    sim.model.body_mass[1] += 1.0
-    sim.link_collisions = True
-    assert sim.model.opt.gravity[2] == -3.0 and sim.model.geom("FL_foot").friction[0] == 0.3
-    assert sim.model.geom("FR_foot").friction[0] == 1.0
-    assert sim.model.body_mass.sum() == pytest.approx(sim.robot.mass + 1.0)
-    sim.model.body_mass[1] -= 1.0
-    sim.model.opt.gravity[2] = -9.81
-    sim.reset()
-    assert sim.model.opt.gravity[2] == -9.81 and sim.model.geom("FL_foot").friction[0] == 0.3
-    assert sim.model.body_mass.sum() == pytest.approx(sim.robot.mass)
 
 
 def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None:
@@ -410,6 +384,6 @@ def test_an_error_while_a_fall_is_drawn_is_said() -> None:
 
     run = LiveSimulation(fb.Simulation(judges.load("go2")), judges.controller_of("go2"), show)
     run.push(FALL)
-    until(lambda: "no window" in run.status)
+    until(lambda: "no window" in run.reason)
     until(lambda: not run.is_simulating)
     run.close()

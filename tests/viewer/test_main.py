@@ -209,7 +209,7 @@ def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> Non
     until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
-    assert "window" in playground.run.status
+    assert "window" in playground.run.reason
     playground.run.close()
 
 

@@ -408,7 +408,7 @@ def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     used = plots.friction_used(rollout, rollout.measured)
     assert used[0, 1000] == pytest.approx(0.9 / 0.6) and used[1, 1000] == 0.0
     assert np.isnan(used[3, -1])
-    figure = rollout.plot()
+    figure = plots.plot_run(rollout)
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "centre of mass moved [mm]", "normal forces [N]", "friction used, of μ · normal force",
         "torques, of their limits"

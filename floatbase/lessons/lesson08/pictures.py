@@ -20,8 +20,8 @@ import floatbase as fb
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.panels import live_run
 from floatbase.lessons.slider_samples import recorded_pushes
-from floatbase.simulation import LiveSimulation, Rollout, status_message
-from floatbase.viewer import Picture, Viewer, shapes
+from floatbase.simulation import LiveSimulation, Rollout
+from floatbase.viewer import Picture, Viewer, shapes, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.scene import geometry
@@ -179,7 +179,7 @@ class PushComparison(widgets.VBox):
             run.reset()
 
     def _tell(self, title: str, status: str) -> None:
-        self.lines[title].value = status_message(status)
+        self.lines[title].value = status_message(status, self.runs[title].reason)
 
     def close(self) -> None:
         """Stop the runs and close the pictures."""

@@ -1,4 +1,4 @@
-"""`Table`: what a sweep found, row by row; `RowStore` keeps it in a file that outlives the sweep."""
+"""The rows of a sweep in a JSON Lines file, from which an interrupted sweep resumes."""
 
 from __future__ import annotations
 
@@ -6,98 +6,53 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from floatbase._validation import Value, cached_property, short_repr
-from floatbase.errors import InputError, unknown_name
+from floatbase._validation import short_repr
+from floatbase.errors import InputError
 
-RESERVED_NAMES = ("point", "error")  # names of the store's own
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+RESERVED_NAMES = ("point", "error")  # columns that the store itself writes
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Table(Value):
-    """Rows with named columns: one row for each point of a sweep's grid, in the grid's order.
+def require(library: str) -> Any:
+    """Import an optional library of sweeps. Raises `InputError` if it is not installed."""
+    try:
+        return import_module(library)
+    except ImportError:
+        raise InputError(f'A sweep needs {library}: pip install "floatbase[sweep]".') from None
 
-    rows: name -> value, for each point: its parameters, then what the function returned, then
-        "error": None, or type and message of the exception that ended this point. Values are
-            numbers, texts, booleans, lists and None.
 
-    `table["force"]` is a column as an array, `table.to_pandas()` a DataFrame.
+def read_sweep(path: str | Path) -> DataFrame:
+    """Read the file of a sweep, finished or not, as a `pandas.DataFrame` like that of `sweep`.
+
+    The index holds the numbers of the points that are done. Raises `InputError` for a file that
+    cannot be read or holds no sweep.
     """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    return as_frame(_read_rows(path, content))
 
-    rows: tuple[Row, ...]
 
-    @classmethod
-    def read(cls, path: str | Path) -> Table:
-        """The table in the file of a sweep, also while the sweep goes on: the points that are done.
-        `InputError` for others.
-        """
-        try:
-            content = Path(path).read_bytes()
-        except OSError as error:
-            raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-        rows = _read_rows(path, content)
-        return cls(tuple(rows[i] for i in sorted(rows)))
-
-    @cached_property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the columns: parameters, results, "error"."""
-        names = dict.fromkeys(name for row in self.rows for name in row if name != "error")
-        return (*names, "error")
-
-    @property
-    def errors(self) -> tuple[Row, ...]:
-        """The rows whose point failed."""
-        return tuple(row for row in self.rows if row["error"] is not None)
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __getitem__(self, column: str) -> npt.NDArray[Any]:
-        """A column as a read-only array; where a row has no number there is NaN, where it has
-        nothing else None.
-        """
-        if not isinstance(column, str) or column not in self.columns:
-            raise unknown_name("column", column, self.columns, "table.rows are its rows.")
-        values = [row.get(column) for row in self.rows]
-        if any(_is_number(value) for value in values):
-            values = [np.nan if value is None else value for value in values]
-        try:
-            array = np.array(values)
-        except ValueError:  # lists of different lengths
-            array = np.empty(0, dtype=object)
-        if array.dtype.kind not in "biuf":  # texts stay Python's own, and so does a mixture
-            array = np.empty(len(values), dtype=object)
-            for i, value in enumerate(values):
-                array[i] = value
-        array.flags.writeable = False
-        return array
-
-    def to_pandas(self) -> Any:
-        """The table as a `pandas.DataFrame`. Raises `InputError` where pandas is not installed."""
-        try:
-            import pandas
-        except ImportError:
-            raise InputError(
-                'a DataFrame needs pandas: pip install pandas. Without it, table["name"] is a '
-                "column."
-            ) from None
-        return pandas.DataFrame(list(self.rows), columns=list(self.columns))
-
-    def __repr__(self) -> str:
-        failed = (
-            f"; {len(self.errors)} failed, the first with {self.errors[0]['error']}"
-            if self.errors
-            else ""
-        )
-        return f"Table({len(self)} rows: {', '.join(self.columns)}{failed})"
+def as_frame(rows: Mapping[int, Row]) -> DataFrame:
+    """Rows, number of the point -> row, as a `pandas.DataFrame` whose last column is "error"."""
+    pandas, points = require("pandas"), sorted(rows)
+    names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
+    return pandas.DataFrame(
+        [rows[i] for i in points],
+        index=pandas.Index(points, name="point"),
+        columns=[*names, "error"],
+    )
 
 
 class RowStore:
@@ -141,16 +96,13 @@ class RowStore:
             raise
 
     def add(self, i: int, row: Row) -> None:
-        """Keep the row of point i. A row is written at once and whole: what ends the program loses
-        no earlier one.
+        """Keep the row of point i, in plain values, and write it to the file at once.
 
-        Raises `InputError` where the file takes no more.
+        Raises `InputError` if the file cannot be written to, such as on a full disk.
         """
-        line = json.dumps({"point": i, **row})
-        self.rows[i] = json.loads(line)
-        del self.rows[i]["point"]
+        self.rows[i] = row
         if self._file >= 0:
-            self._write(line)
+            self._write(json.dumps({"point": i, **row}))
 
     def close(self) -> None:
         """Close the file, and free it for others."""
@@ -183,7 +135,7 @@ class RowStore:
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
-            if not point or _as_json_text({name: row.get(name) for name in point}) != _as_json_text(
+            if not point or json.dumps({name: row.get(name) for name in point}) != json.dumps(
                 point
             ):
                 raise _wrong_file_error(
@@ -227,16 +179,10 @@ def _from_numpy(value: Any) -> Any:
     raise TypeError(f"it holds a value of type {type(value).__name__}")
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _header(name: str, points: Sequence[Row]) -> Row:
     """The first line of a file: what is swept."""
     parameters = list(dict.fromkeys(name for point in points for name in point))
-    digest = hashlib.sha256(
-        "\n".join(_as_json_text(point) for point in points).encode()
-    ).hexdigest()
+    digest = hashlib.sha256("\n".join(json.dumps(point) for point in points).encode()).hexdigest()
     return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
 
 
@@ -265,10 +211,6 @@ def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
                 f"line {number} of {path} is no row of a sweep: {line[:80]!r}. {advice}"
             ) from None
     return rows
-
-
-def _as_json_text(row: Row) -> str:
-    return json.dumps(row)
 
 
 def _joined(value: Any) -> str:

@@ -1,0 +1,272 @@
+"""`Planner`: where a `Walk` steps and how its centre of mass moves, from its state and its gait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import copysign, hypot, inf, sqrt
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._validation import Array, as_array
+from floatbase.behaviours.footholds import capture_point, step_adjustment
+from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
+from floatbase.behaviours.lipm import LIPM, ZMPSegment
+from floatbase.behaviours.options import flat_foot_names
+from floatbase.behaviours.reference import Reference, SwingState, rotated_by_yaw, yaw_of
+from floatbase.behaviours.swing import Swing
+from floatbase.dynamics import Contacts
+from floatbase.robots import State
+
+Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
+_PLANNED_PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
+_PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
+# s after which the height of a foot shows that of the ground: feet that aim where others just
+# touched climb
+_TOUCHDOWN_SETTLING_TIME = 0.05
+# s before the first lift-off and after the last landing in which the ZMP moves
+_ZMP_SHIFT_TIME = 0.8
+# m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω
+# 1.2 s}
+_DCM_DEAD_ZONE = 0.02
+# m by which steps have moved, from which on the path moves along, or the robot runs back to it and
+# falls
+_PATH_SHIFT_THRESHOLD = 0.05
+# part of its distance from the middle that a foot keeps to its own side: legs must not cross
+_MIN_SIDE_FRACTION = 0.25
+
+
+@dataclass(frozen=True)
+class StepPlan:
+    """What a `Walk` planned at one change of stance, or where it stood on and the plan came to its
+    end.
+
+    time: s.
+    stance: the feet that stand from then on.
+    feet: (3,) m, world, where each foot's frame stands or stood.
+    footholds: (3,) m, world, where each foot that is in the air, or lifts next, is to land, as
+        planned then.
+    plan: of the centre of mass.
+    swings: the paths of the feet that are in the air, as planned then.
+    """
+
+    time: float
+    stance: tuple[str, ...]
+    feet: dict[str, Array]
+    footholds: dict[str, Array]
+    plan: LIPM
+    swings: dict[str, Swing]
+
+
+class Planner:
+    """Plans footholds, swings and the centre of mass of a robot with some contacts.
+
+    standing_state: the robot's posture. clearance, reach: m, as of `Walk`.
+    nominal_feet: (3,) m, where each foot's frame is in the posture, from the middle of the feet on
+        the ground.
+    omega: 1/s, of the pendulum.
+    """
+
+    def __init__(self, contacts: Contacts, standing_state: State, clearance: float, reach: float):
+        self.contacts, self.standing_state = contacts, standing_state
+        self.clearance, self.reach = clearance, reach
+        self.flat_feet = flat_foot_names(contacts)
+        positions = {contact.name: standing_state.point(contact.name) for contact in contacts}
+        centre = np.mean(
+            [self._foot_centre(name, position, 0.0) for name, position in positions.items()], axis=0
+        )
+        self.nominal_feet = {
+            name: position - [*centre, 0.0] for name, position in positions.items()
+        }
+        ground = float(contacts.positions(standing_state)[:, 2].mean())
+        self.omega = sqrt(standing_state.robot.gravity / (standing_state.com[2] - ground))
+
+    def start(self, state: State, gait: Gait, t: float) -> Reference:
+        """The reference from the measured state on: its path begins in the middle of the feet."""
+        yaw = yaw_of(state.frame_pose("base").rotation)
+        feet = {name: state.point(name) for name in self.contacts.names}
+        positions = [
+            feet[name][:2] - rotated_by_yaw(nominal_foot[:2], yaw)
+            for name, nominal_foot in self.nominal_feet.items()
+        ]
+        return Reference(
+            self.standing_state,
+            self.nominal_feet,
+            gait,
+            gait.starting_at(t),
+            t,
+            t,
+            np.mean(positions, axis=0),
+            yaw,
+            feet,
+        )
+
+    def replan(
+        self,
+        ref: Reference,
+        state: State,
+        stance: tuple[str, ...],
+        foothold: Callable[[str, float], npt.ArrayLike],
+        yaw_at: Callable[[float], float],
+    ) -> StepPlan:
+        """Another stance begins, or its plan ends: take the feet where they are, and plan anew.
+
+        foothold: (foot, touchdown in s) -> (2,) m, world. yaw_at: t in s -> rad, of the path.
+        """
+        for foot in ref.stance or stance:
+            if ref.time > ref.touchdown_times.get(foot, -inf) + _TOUCHDOWN_SETTLING_TIME:
+                ref.feet[foot] = state.point(foot)
+        self._register_touchdowns(ref, state, [foot for foot in stance if foot in ref.swinging])
+        phases = ref.gait.phases(ref.time, _PLANNED_PHASES, _PLAN_HORIZON)
+        begin, until = ref.stance_interval[0] if stance == ref.stance else ref.time, phases[0][1]
+        ref.stance_interval, ref.replan_time, ref.stance, ref.footholds = (
+            (begin, until),
+            inf,
+            stance,
+            {},
+        )
+        if len(phases) == 1:  # it stands, and no end is in sight
+            ref.stance_interval, ref.replan_time = (begin, inf), until - _ZMP_SHIFT_TIME
+        ref.fit_ground()
+        ref.plan = LIPM(self._zmp_segments(ref, phases, foothold), state.com[:2], self.omega)
+        for foot in self.contacts.names:
+            times = ref.gait.swing_at(foot, ref.time) if foot in ref.gait.feet else None
+            if times and foot not in ref.swinging:
+                end, yaw = (
+                    ref.footholds[foot],
+                    yaw_of(state.frame_pose(foot).rotation @ self._nominal_rotation(foot).T),
+                )
+                path = Swing(state.point(foot), end, *times, self.clearance)
+                ref.swinging[foot] = SwingState(path, end, (yaw, yaw_at(times[1])))
+        swings = {foot: each.path for foot, each in ref.swinging.items()}
+        return StepPlan(ref.time, stance, dict(ref.feet), dict(ref.footholds), ref.plan, swings)
+
+    def adjust_footholds(self, ref: Reference, state: State) -> None:
+        """Shift the ends of the swings by what the DCM misses of the plan, as far as the legs
+        reach.
+        """
+        if not ref.swinging:
+            return
+        assert ref.plan is not None
+        error = capture_point(state.com, state.com_velocity, self.omega) - ref.plan.dcm(ref.time)
+        dead_zone = _DCM_DEAD_ZONE if len(ref.stance) > 2 or self.flat_feet else 0.0
+        for touchdown in {
+            each.path.touchdown for each in ref.swinging.values()
+        }:  # feet of a trot land together
+            shift = step_adjustment(error, touchdown - ref.time, self.omega, dead_zone)
+            com_at_touchdown = state.com[:2] + state.com_velocity[:2] * (touchdown - ref.time)
+            for foot, each in ref.swinging.items():
+                if each.path.touchdown == touchdown:
+                    end = self._clamp_to_reach(
+                        ref.yaw, foot, each.planned_end[:2] + shift, com_at_touchdown
+                    )
+                    each.path = each.path.with_end(ref.on_ground(foot, end))
+
+    def _register_touchdowns(self, ref: Reference, state: State, feet: Sequence[str]) -> None:
+        """These feet have landed; the path moves along where they were moved far."""
+        offsets = []
+        for foot in feet:
+            each = ref.swinging.pop(foot)
+            ref.feet[foot] = np.array([*state.point(foot)[:2], each.path.end[2]])
+            offsets.append((ref.feet[foot] - each.planned_end)[:2])
+            ref.touchdown_times[foot] = ref.time
+        if not offsets:
+            return
+        before, ref.step_offset = ref.step_offset, np.mean(offsets, axis=0)
+        mean_offset = (
+            before + ref.step_offset
+        ) / 2.0  # swinging legs sway the body to one side and to the other
+        if np.linalg.norm(mean_offset) > _PATH_SHIFT_THRESHOLD:
+            ref.position = ref.position + mean_offset
+
+    def _zmp_segments(
+        self,
+        ref: Reference,
+        phases: Sequence[Phase],
+        foothold: Callable[[str, float], npt.ArrayLike],
+    ) -> list[ZMPSegment]:
+        """The ZMP of the coming phases: in the middle of the feet that stand, and shifting while
+        all stand.
+        """
+        centres = self._stance_centres(ref, phases, foothold)
+        zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
+        segments: list[ZMPSegment] = []
+        for i, (begin, end, names) in enumerate(phases):
+            all_stand, last = len(names) == len(ref.gait.feet), i + 1 == len(phases)
+            goal = centres[i] if last or not all_stand else centres[i + 1]
+            if not all_stand:
+                segments.append((begin, end, goal, goal))
+            elif end - begin <= _ZMP_SHIFT_TIME:
+                segments.append((begin, end, zmp, goal))
+            elif last:  # come to the middle, and stay
+                segments += [
+                    (begin, begin + _ZMP_SHIFT_TIME, zmp, goal),
+                    (begin + _ZMP_SHIFT_TIME, end, goal, goal),
+                ]
+            else:  # stay, then shift before the foot lifts
+                segments += [
+                    (begin, end - _ZMP_SHIFT_TIME, zmp, zmp),
+                    (end - _ZMP_SHIFT_TIME, end, zmp, goal),
+                ]
+            zmp = goal
+        return segments
+
+    def _stance_centres(
+        self,
+        ref: Reference,
+        phases: Sequence[Phase],
+        foothold: Callable[[str, float], npt.ArrayLike],
+    ) -> list[Array]:
+        """The middle of the feet that stand in each phase, (2,) m; finds the footholds of those
+        that swing.
+        """
+        feet, centres = dict(ref.feet), []
+        for begin, end, names in phases:
+            stance = [
+                name for name in self.contacts.names if name in names or name not in ref.gait.feet
+            ]
+            centres.append(
+                np.mean([self._foot_centre(name, feet[name], ref.yaw) for name in stance], axis=0)
+            )
+            for foot in ref.gait.feet:
+                times = ref.gait.swing_at(foot, begin)
+                if times is not None:
+                    position = as_array(
+                        f"the foothold of {foot}", foothold(foot, times[1]), (2,), "m"
+                    )
+                    ref.footholds.setdefault(foot, ref.on_ground(foot, position))
+                    if abs(times[1] - end) < 2.0 * TIME_TOLERANCE:
+                        feet[foot] = ref.on_ground(foot, position)
+        return centres
+
+    def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
+        """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball.
+        position: (3,) m, of its frame.
+        """
+        contact = self.contacts[foot]
+        to_ground = (
+            getattr(contact, "radius", 0.0) * contact.normal
+        )  # a ball touches there however it is turned
+        offset = (
+            contact.positions(self.standing_state).mean(axis=0)
+            - self.standing_state.point(foot)
+            + to_ground
+        )
+        return position[:2] + rotated_by_yaw(offset[:2], yaw) - to_ground[:2]
+
+    def _clamp_to_reach(self, yaw: float, foot: str, end: Array, body: Array) -> Array:
+        """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and
+        that is on the foot's side.
+        """
+        nominal = self.nominal_feet[foot][:2]
+        offset = rotated_by_yaw(end - body, -yaw) - nominal
+        position = nominal + offset * min(1.0, self.reach / (hypot(*offset) or 1.0))
+        side = copysign(1.0, nominal[1])
+        position[1] = side * max(side * position[1], _MIN_SIDE_FRACTION * abs(nominal[1]))
+        return body + rotated_by_yaw(position, yaw)
+
+    def _nominal_rotation(self, foot: str) -> Array:
+        rotation: Array = self.standing_state.frame_pose(foot).rotation
+        return rotation
