@@ -26,7 +26,7 @@ Update = tuple[Key, bytes]
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "set_control_value", "set_camera", "set_follow", "set_title", "set_legend",
-    "set_theme", "set_frozen",
+    "set_theme",
     "set_text", "add_plot_point", "set_views", "set_disconnect_message", "set_ground",
 )  # fmt: skip
 

@@ -25,7 +25,6 @@ function startViewer() {
       interaction.describe(command.text);
     },
     set_legend: (command) => { legend.show(command.items); },
-    set_frozen: (command) => { part("kept").style.display = command.frozen ? "block" : "none"; },
     set_theme: theme.ask,
     set_disconnect_message: (command) => { part("notice").textContent = command.text; },
     set_animation: (command) => { meshcat(command); player.load(command); },
@@ -268,7 +267,7 @@ const REST_AFTER = 1000;  // ms out of sight
 
 function startRest(viewer) {
   const canvas = viewer.renderer.domElement, pane = part("meshcat-pane");
-  let seen = true, resting = false, waiting = [], timer = 0;
+  let seen = true, resting = false, timer = 0;
   const later = () => {
     clearTimeout(timer);
     if (!seen) timer = setTimeout(rest, REST_AFTER);
@@ -287,7 +286,6 @@ function startRest(viewer) {
     viewer.render();
     canvas.style.visibility = "";
     pane.style.backgroundImage = "";
-    waiting.splice(0).forEach((go) => go());
   });
   viewer.resting = () => resting;
   return {
@@ -296,12 +294,6 @@ function startRest(viewer) {
       if (seen) wake();
       later();
     },
-    awake: () => new Promise((go) => {
-      if (!viewer.renderer.getContext().isContextLost()) return go();
-      waiting.push(go);
-      wake();
-      later();
-    }),
   };
 }
 
@@ -314,7 +306,7 @@ function startWhenSeen(start, sight = onSight) {
       blind = viewer === null;
       if (blind) return;
       rest = startRest(viewer);
-      start(rest);
+      start();
     }
     if (rest !== null) rest.sight(seen);
   });
@@ -336,28 +328,20 @@ function afterDrawing(call) {
 }
 
 // What a page that follows a window does with a message of the window's. connection: its send says something to the window.
-function listener(rest, connection) {
+function listener(connection) {
   viewer.connection = connection;
-  part("kept").querySelector("button").onclick = () => connection.send('{"type": "live"}');
-  return async (message) => {
-    if (typeof message == "string") {
-      const request = JSON.parse(message);
-      await rest.awake();
-      viewer.set_3d_pane_size();
-      connection.send(JSON.stringify({type: "image", id: request.id, data: viewer.capture_image()}));
-    } else {
-      apply(message);
-      viewer.num_messages_received++;
-      afterDrawing(() => connection.send('{"type": "done"}'));
-    }
+  return (message) => {
+    apply(message);
+    viewer.num_messages_received++;
+    afterDrawing(() => connection.send('{"type": "done"}'));
   };
 }
 
 // The live page: follow a window. When the window closes, wait for one at the same address.
-function follow(rest) {
+function follow() {
   const socket = new WebSocket(`${location.protocol == "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
-  const hear = listener(rest, socket);
+  const hear = listener(socket);
   socket.onmessage = ({data}) => hear(data);
   socket.onclose = () => {
     part("notice").style.display = "block";
@@ -373,8 +357,8 @@ function waitForPort() {
     load(data.code);
     let hear = () => {};
     port.onmessage = ({data: message}) => message.notice ? say(message.notice) : hear(message);
-    startWhenSeen((rest) => {
-      window.hear = hear = listener(rest, {send: (words) => port.postMessage(words)});
+    startWhenSeen(() => {
+      window.hear = hear = listener({send: (words) => port.postMessage(words)});
       port.postMessage("hello");
     });
   };

@@ -13,10 +13,8 @@ import html
 import json
 from collections.abc import Iterable
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
-from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import BACKGROUNDS, DARK_SHADES, hex_code
 
@@ -30,8 +28,6 @@ _BODY = """
 <div id="legend"><div id="lines"></div><button aria-controls="lines" aria-expanded="false"><span></span>legend</button></div>
 <div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address \
 comes back by itself.</div>
-<div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·
-<button>make live</button></div>
 <div id="player"><button title="play or pause">▶</button><input type="range" min="0" step="0.001" title="time">
 <output></output><select title="speed"><option value="1">1×</option><option value="0.5">½×</option>
 <option value="0.25">¼×</option><option value="0.1">⅒×</option></select></div>
@@ -40,17 +36,8 @@ comes back by itself.</div>
 
 @cache
 def viewer_code() -> bytes:
-    """meshcat's viewer, one JavaScript file of the installed package. Raises `ViewerError` without
-    meshcat.
-    """
-    spec = find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise ViewerError(
-            "meshcat is not installed; the viewer needs it. Install it with: pip install meshcat"
-        )
-    return (
-        Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
-    ).read_bytes()
+    """meshcat's viewer, one JavaScript file; vendor/README.md says where it comes from."""
+    return Path(__file__).with_name("vendor").joinpath("meshcat.min.js").read_bytes()
 
 
 @cache

@@ -14,6 +14,7 @@ const codes = (globalThis.floatbaseCodes ??= new Map());  // version -> promise 
 const PATIENCE = 20000;  // ms; then each picture asks for the code itself: the one that had asked may be gone
 const DONE = '{"type": "done"}';
 const GONE = "The viewer is closed, or its kernel was restarted: run its cell again.";
+const RETIRED = "This viewer is live in a newer output. Run this cell again to have it here.";
 const WAITING = "The 3-D picture comes here. Where it does not, run its cell.";
 const TOO_OLD = "This browser is too old to open the picture. Open it in a current one: Chrome or Edge from 80, Firefox from " +
   "113, Safari from 16.4.";
@@ -43,7 +44,7 @@ async function code(model, page) {
 }
 
 // The still picture, and a line of text over it.
-function thumbnail(model, box) {
+function thumbnail(model, box, words = "") {
   const picture = document.createElement("img"), line = document.createElement("div");
   const data = model.get("thumbnail");
   picture.alt = `picture of ${model.get("name")}`;
@@ -51,7 +52,7 @@ function thumbnail(model, box) {
   if (data?.byteLength) picture.src = URL.createObjectURL(new Blob([bytes(data)], {type: "image/png"}));
   line.style.cssText = "position: absolute; left: 12px; top: 8px; right: 12px; font: 13px system-ui, sans-serif; opacity: 0.75";
   box.append(picture.src ? picture : "", line);
-  line.textContent = picture.src ? "" : WAITING;
+  line.textContent = words || (picture.src ? "" : WAITING);
   return {
     say(words) { line.textContent = words; },
     remove() {
@@ -66,6 +67,7 @@ async function render({model, el}) {
   const page = Math.random().toString(36).slice(2), box = document.createElement("div");
   box.style.cssText = `position: relative; width: 100%; height: ${model.get("height")}px; border-radius: 6px; overflow: hidden`;
   el.append(box);
+  if (!model.get("is_live")) return void thumbnail(model, box, RETIRED);
   const before = thumbnail(model, box);
   if (!window.DecompressionStream) return before.say(TOO_OLD);
   const frame = document.createElement("iframe");
@@ -100,7 +102,7 @@ async function render({model, el}) {
     let hear = null;
     try { hear = frame.contentWindow.hear; } catch (error) { /* a frame that nobody may reach into */ }
     if (hear) hear(said);
-    else port.postMessage(said, typeof said === "string" ? [] : [said]);
+    else port.postMessage(said, [said]);
   }
   function again() {
     if (lost) return;
@@ -111,7 +113,6 @@ async function render({model, el}) {
     if (message.closed) return leave();
     if (message.page !== page || port === null) return;
     if (message.lost) again();
-    else if (message.text) give(message.text);
     else if (message.frame && !lost) {
       // one got lost, so what it said must come again; before the first, those of an earlier connection may still come
       if (message.frame !== received + 1) return received ? again() : undefined;
@@ -134,22 +135,33 @@ async function render({model, el}) {
       else if (was) again();
     });
   }
-  window.addEventListener("message", start);
-  model.on("msg:custom", hear);
-  model.on("comm_live_update", live);
-  code(model, page).then(({html}) => {
+  function stop() {
     if (ended) return;
-    frame.srcdoc = html;
-    box.append(frame);
-  });
-  return () => {
     tell("bye");
     ended = true;
     window.removeEventListener("message", start);
     model.off("msg:custom", hear);
     model.off("comm_live_update", live);
+    model.off("change:is_live", retire);
     port?.close();
-  };
+  }
+  // A newer output shows this viewer: the picture with which this one opened stays.
+  function retire() {
+    stop();
+    frame.remove();
+    before.remove();
+    thumbnail(model, box, RETIRED);
+  }
+  window.addEventListener("message", start);
+  model.on("msg:custom", hear);
+  model.on("comm_live_update", live);
+  model.on("change:is_live", retire);
+  code(model, page).then(({html}) => {
+    if (ended) return;
+    frame.srcdoc = html;
+    box.append(frame);
+  });
+  return stop;
 }
 
 export default {render};
