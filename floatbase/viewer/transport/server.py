@@ -23,7 +23,7 @@ from floatbase.viewer.transport.notebook_events import CellEvents
 from floatbase.viewer.web import pages
 
 FRAME_INTERVAL = 1.0 / 60.0  # s, the least time between two frames
-MAX_MESSAGE_SIZE = 1 << 16  # bytes of a message from a page: the longest reports a control
+MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest reports a control
 
 
 class Server:
