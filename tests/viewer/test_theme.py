@@ -23,7 +23,7 @@ from .looks import picture
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
 DARK = "document.body.classList.contains('dark')"
 COLOUR = """(path) => viewer.scene_tree.find([...path.split("/"), "<object>"]).object.material.color.getHexString()"""
-LATER = "new Promise((done) => setTimeout(done, 2 * RETRY))"
+LATER = "new Promise((done) => setTimeout(done, 800))"
 GREY = """() => Math.min(...viewer.scene_tree.find(["meshcat", "label", "FL_foot", "<object>"]).object.material.map.image.data
   .filter((_, i) => i % 2 == 0))"""
 
@@ -68,10 +68,10 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
         ".map((code) => '#' + code)"
     )
     assert picture(page, "dark")[300, 100].max() < 100
-    inner.evaluate("() => { part('lines').firstChild.marked = true; }")
+    inner.evaluate("() => { document.getElementById('lines').firstChild.marked = true; }")
     page.evaluate("document.body.className = 'busy'")  # as JupyterLab changes it all the time
     inner.evaluate(LATER)
-    assert inner.evaluate("part('lines').firstChild.marked"), "drawn anew, for nothing"
+    assert inner.evaluate("document.getElementById('lines').firstChild.marked"), "drawn anew, for nothing"
     page.evaluate("document.body.style.color = '#222'")
     inner.wait_for_function(f"!{DARK} && !viewer.needs_render")
     assert {part: inner.evaluate(*part) for part in seen} == seen
