@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import until
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
@@ -18,12 +19,6 @@ from floatbase.viewer.transport.window import Window
 from .looks import SMALL, WHERE, hue_pixels, picture, settle
 
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
-# of 600 x 400 pixels
-LIGHT, DARK, CHANGE = (
-    220,
-    70,
-    60,
-)  # brightness of 255 of a push's arrow or outline, and its least difference to what it hides
 
 
 def test_a_page_has_what_is_shown(
@@ -64,39 +59,14 @@ def test_a_page_has_what_is_shown(
 def test_the_page_comes_back_when_the_window_does(page) -> None:
     first = Window()
     page.goto(first.web_url)
-    first.wait()
+    until(lambda: first.n_pages == 1)
     first.close()
     page.wait_for_function(f"{NOTICE} == 'block'")
     with Window(port=first.port) as second:
         second.put([protocol.page_command("set_title", text="back again")])
-        second.wait()
-        assert second.n_pages == 1
+        until(lambda: second.n_pages == 1)
         settle(page, "back again")
         assert page.evaluate(NOTICE) == "none"
-
-
-LINES = "getComputedStyle(document.getElementById('lines')).visibility == 'visible'"
-FOLDED = "document.getElementById('legend').classList.contains('folded')"
-BOX = """(selector) => {
-  const {left, top, right, bottom} = document.querySelector(selector).getBoundingClientRect();
-  return {left, top, right, bottom};
-}"""
-# how many of the robot's vertices lie behind the legend
-HIDDEN = """() => {
-  const {left, top, right, bottom} = document.getElementById("lines").getBoundingClientRect();
-  const at = new MeshCat.THREE.Vector3();
-  let n = 0, hidden = 0;
-  viewer.scene_tree.find(["meshcat", "robot"]).object.traverse(({geometry, matrixWorld}) => {
-    const points = geometry?.attributes.position;
-    for (let i = 0; i < (points?.count ?? 0); i++) {
-      at.fromBufferAttribute(points, i).applyMatrix4(matrixWorld).project(viewer.camera);
-      const x = (1 + at.x) * innerWidth / 2, y = (1 - at.y) * innerHeight / 2;
-      hidden += x > left && x < right && y > top && y < bottom;
-      n++;
-    }
-  });
-  return [n, hidden];
-}"""
 
 
 NAMES = ('<img src=x onerror="hit = true">', "x<y & z > w", "&amp;", "__proto__", 'it\'s \\ "so" τ')

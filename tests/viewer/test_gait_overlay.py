@@ -330,17 +330,3 @@ def test_normal_forces_are_those_of_each_foot_beside_the_gait(biped: tuple[Rollo
         np.testing.assert_allclose(measured, run.force(name)[:, 2])
     assert axes[1].get_legend() is None and axes[0].get_legend() is not None
     plt.close("all")
-
-
-def test_a_record_of_one_stance_has_a_gait_diagram_too(
-    go2: Robot, standing: State, contacts: Contacts
-) -> None:
-    controller = fb.WholeBodyController(go2, contacts, fb.standing_tasks(standing))
-    run = fb.rollout(Simulation(go2), controller, 0.05)
-    assert not run.stances
-    axis = plots.plot_gait(run)
-    for bars in axis.collections:
-        ((begin, end),) = [path.get_extents().intervalx for path in bars.get_paths()]
-        assert (begin, end) == (run.time[0], run.time[-1])
-    assert len(plots.plot_normal_forces(run)) == len(contacts)
-    plt.close("all")

@@ -22,10 +22,6 @@ ENDS = """() => {
   for (const input of document.querySelectorAll('#panel input[type=range]'))
     for (const end of [input.min, input.max]) { input.value = end; input.dispatchEvent(new Event('input')); }
 }"""
-BACK = (
-    "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => "
-    "one.dispatchEvent(new Event('dblclick')))"
-)
 
 
 @pytest.fixture

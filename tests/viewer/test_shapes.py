@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import umsgpack
 from messages import raises, refused
 
 from floatbase.control import WholeBodyController
@@ -65,22 +64,6 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
     np.testing.assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
-
-
-def test_a_curled_arrow_has_heads_all_round_so_that_its_sense_is_seen_from_anywhere() -> None:
-    data = markers.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.data["geometries"][0][
-        "data"
-    ]["attributes"]["position"]
-    points = np.frombuffer(data["array"].data, "<i2").reshape(-1, 3).astype(float)
-    points *= 1.0 / np.median(np.linalg.norm(points[:, :2], axis=1))
-    beside = (
-        np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1
-    )  # what is wider than the ring
-    angles = np.unique(np.round(np.arctan2(points[beside, 1], points[beside, 0]), 1)) % (
-        2.0 * np.pi
-    )
-    gaps = np.diff(np.sort(angles), append=np.sort(angles)[0] + 2.0 * np.pi)
-    assert np.sum(gaps > 1.0) == 3 and gaps.max() < np.radians(200.0)
 
 
 NAN = float("nan")
@@ -325,19 +308,3 @@ def test_no_path_of_a_picture_lies_below_another(
     )  # fmt: skip
     paths = sorted(drawn)
     assert not [(a, b) for a in paths for b in paths if b.startswith(a + "/")]
-
-
-def test_a_drawing_redraws_what_has_another_shape(viewer: Viewer) -> None:
-    one, other = (
-        shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4))
-        for c in (MEASURED, PLANNED)
-    )
-    for picture_of, kinds in (
-        ({"a": one}, ["set_object", "set_transform"]),
-        ({"a": other}, ["set_object"]),
-        ({}, ["delete"]),
-    ):
-        newest = viewer.window.scene.newest
-        viewer.draw(picture_of)
-        sent = [umsgpack.unpackb(command) for command in viewer.window.scene.since(newest)[1]]
-        assert [command["type"] for command in sent if command["path"] == "/meshcat/a"] == kinds

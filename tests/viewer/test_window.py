@@ -141,14 +141,6 @@ def test_threads_that_ask_for_the_port_at_once_get_the_same_one(window: Window) 
     assert len(ports) == 1 and listening() - before == ports
 
 
-def test_a_closed_window_that_had_no_page_opens_none() -> None:
-    window = Window()
-    window.close()
-    with pytest.raises(ViewerError):
-        _ = window.port
-    assert repr(window) == "Window(closed)"
-
-
 def test_fifty_windows_opened_and_dropped_leave_no_thread_no_port_and_no_process() -> None:
     before = len(window_threads())
     files = len(os.listdir("/proc/self/fd"))
