@@ -307,8 +307,10 @@ def leaning(
 
 # the page answers "done" when it has drawn; a page whose answer is withheld is busy for the window
 WITHHOLD = """() => {
-  const socket = viewer.connection, send = socket.send.bind(socket);
-  socket.send = (message) => { window.release = () => { socket.send = send; send(message); }; };
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (message) {
+    window.release = () => { WebSocket.prototype.send = send; send.call(this, message); };
+  };
 }"""
 
 
