@@ -104,7 +104,9 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
     inner.evaluate("() => { document.getElementById('lines').firstChild.marked = true; }")
     page.evaluate("document.body.className = 'busy'")  # as JupyterLab changes it all the time
     inner.evaluate(LATER)
-    assert inner.evaluate("document.getElementById('lines').firstChild.marked"), "drawn anew, for nothing"
+    assert inner.evaluate("document.getElementById('lines').firstChild.marked"), (
+        "drawn anew, for nothing"
+    )
     page.evaluate("document.body.style.color = '#222'")
     inner.wait_for_function(f"!{DARK} && !viewer.needs_render")
     assert {part: inner.evaluate(*part) for part in seen} == seen
