@@ -48,7 +48,9 @@ COMPILED = {
     "floatbase.control.tick.tick",
 }  # numba loads with them, so no front imports them
 MODULES = sorted(
-    path for path in PACKAGE.rglob("*.py") if "_assets" not in path.relative_to(PACKAGE).parts[:-1]
+    path
+    for path in PACKAGE.rglob("*.py")
+    if not {"_assets", "node_modules"} & set(path.relative_to(PACKAGE).parts[:-1])
 )
 # the front door sees every floor; what it may load at once is the business of test_environment
 INDOORS = [path for path in MODULES if path != PACKAGE / "__init__.py"]

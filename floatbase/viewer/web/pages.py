@@ -54,7 +54,7 @@ def embedded_page(code: str) -> str:
 
 @cache
 def notebook_page() -> str:
-    """A page for a frame in a notebook, which gives it the viewer's code and a port to the kernel."""
+    """A page for a frame in a notebook, which gives it meshcat and a port to the kernel."""
     return _page("notebook")
 
 
@@ -70,7 +70,7 @@ def _embedded_viewer_code() -> str:
 
 
 def _embedded_data(name: str, data: bytes) -> str:
-    """Data as a script element with the id `name`: compressed, in base64, as loader.js unpacks it."""
+    """Data as a script element with the id `name`: gzip in base64, as loader.js unpacks it."""
     packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="text/plain" id="{name}">{packed}</script>'
 

@@ -7,6 +7,20 @@ export const three = () => MeshCat.THREE;
 
 export const pathNames = (path) => path.split("/").filter((name) => name);
 
+// Run meshcat's script, where the page does not load it by itself.
+export function runMeshcat(code) {
+  const script = document.createElement("script");
+  script.textContent = code;
+  document.body.append(script);
+  detachGifWorker();
+}
+
+// Why: the script contains a worker of gif.js. Where it is not run as a worker, it takes the page's
+// own `onmessage` and answers every message to the page with another one to itself.
+export function detachGifWorker() {
+  window.onmessage = null;
+}
+
 // meshcat's viewer in an element. Throws where the browser has no WebGL.
 export function createViewer(pane) {
   const viewer = new MeshCat.Viewer(pane);

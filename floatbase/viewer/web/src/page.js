@@ -5,6 +5,7 @@
 import {element, showNotice} from "./dom.js";
 import {canUnpack, unpack, unpackText} from "./loader.js";
 import {CLOSED, TOO_OLD} from "./messages.js";
+import {detachGifWorker, runMeshcat} from "./meshcat.js";
 import {afterDrawing, startWhenSeen} from "./visibility.js";
 
 const RETRY = 500; // ms
@@ -12,7 +13,8 @@ const MODES = {live, notebook, file, frame};
 
 // config: {mode, backgrounds, shades}; see theme.js.
 export function open(config) {
-  return MODES[config.mode](config);
+  detachGifWorker();
+  MODES[config.mode](config);
 }
 
 // The live page. When the window closes, it waits for one at the same address.
@@ -54,7 +56,7 @@ function notebook(config) {
   window.addEventListener("message", function connect({data, ports: [port], source}) {
     if (source !== parent || !port) return;
     window.removeEventListener("message", connect);
-    runScript(data.code);
+    runMeshcat(data.code);
     let receive = () => {};
     port.onmessage = ({data: message}) => {
       if (message.notice) showNotice(message.notice);
@@ -72,7 +74,7 @@ function notebook(config) {
 // The file: it contains meshcat's code and the scene, packed.
 async function file(config) {
   if (!canUnpack()) return showNotice(TOO_OLD);
-  runScript(await unpackText(element("viewer-code").textContent));
+  runMeshcat(await unpackText(element("viewer-code").textContent));
   const frame = await unpack(element("scene").textContent);
   startWhenSeen(config, (scene) => show(scene, frame));
 }
@@ -108,10 +110,4 @@ function change(scene, {ended, gone, frame: commands}) {
 function show(scene, commands) {
   scene.apply(commands);
   scene.fit();
-}
-
-function runScript(code) {
-  const script = document.createElement("script");
-  script.textContent = code;
-  document.body.append(script);
 }
