@@ -9,7 +9,7 @@
 #   LOCK_ARGS=…    more options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
-.PHONY: help lab test test-all site setup lock clean python
+.PHONY: help lab test test-all site setup lock web clean python
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -52,6 +52,7 @@ help:
 	@echo "make site    run the lessons and build the web site, into build/site"
 	@echo "make setup   only make .venv"
 	@echo "make lock    write environment.txt anew from pyproject.toml"
+	@echo "make web     check and build the pages' JavaScript (needs node 20 or later)"
 	@echo "make clean   remove .venv and everything else that was made"
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
@@ -113,6 +114,10 @@ lock: | python
 		--extra test --no-annotate --no-emit-index-url \
 		--custom-compile-command "make lock" $(LOCK_ARGS) pyproject.toml -o environment.txt
 
+# floatbase/viewer/web/dist is committed, so only who changes the JavaScript needs node
+web:
+	cd floatbase/viewer/web && npm ci --no-audit --no-fund && npm run lint && npm test && npm run build
+
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist floatbase/viewer/web/node_modules .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -7,6 +7,7 @@ import shlex
 import signal
 import sys
 import threading
+import webbrowser
 from collections.abc import Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING
@@ -131,7 +132,7 @@ def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
             )
             print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
             if not options.no_browser:
-                page.view.window.open()
+                webbrowser.open(page.url, new=2)
             start_when_connected(page, ended)
             ended.wait()
     finally:

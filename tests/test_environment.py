@@ -13,7 +13,7 @@ HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", 
 IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
-def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
+def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path: Path) -> None:
     pip = [
         sys.executable,
         "-m",
@@ -35,6 +35,10 @@ def test_the_wheel_brings_the_meshes_and_their_licences(tmp_path: Path) -> None:
     }
     assert meshes
     assert meshes | {"floatbase/__init__.py", "floatbase/_assets/LICENSES.md"} <= packed
+    web = ROOT / "floatbase" / "viewer" / "web"
+    built = {path.relative_to(ROOT).as_posix() for path in (web / "dist").iterdir()}
+    assert built <= packed
+    assert not [name for name in packed if "web/src/" in name or "node_modules" in name]
     assert {name.split("/")[0] for name in packed} == {
         "floatbase",
         wheel.name.rsplit("-", 3)[0] + ".dist-info",

@@ -1,9 +1,9 @@
 """The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and
 saves them.
 
-`Viewer` draws. `View` says from where it looks. `shapes` and `markers` make further items for a
-picture, in the `colours` of all pictures; `prefixed` puts several items below one path. `plots`
-makes figures of a rollout and of push recovery.
+`Viewer` draws; `PictureOptions` explains what. `View` says from where it looks. `shapes` and
+`markers` make further items for a picture, in the `colours` of all pictures; `prefixed` puts
+several items below one path. `plots` makes figures of a rollout and of push recovery.
 """
 
 from floatbase.errors import ViewerError
@@ -13,6 +13,7 @@ try:
     from floatbase.viewer.camera import PRESETS, View
     from floatbase.viewer.live import PUSH_DISPLAY_TIME, status_message
     from floatbase.viewer.scene import colours, markers, shapes
+    from floatbase.viewer.scene.options import PictureOptions
     from floatbase.viewer.scene.painter import prefixed
     from floatbase.viewer.scene.shapes import Item, Picture
     from floatbase.viewer.viewer import Viewer
@@ -26,6 +27,7 @@ __all__ = [
     "PUSH_DISPLAY_TIME",
     "Item",
     "Picture",
+    "PictureOptions",
     "View",
     "Viewer",
     "colours",

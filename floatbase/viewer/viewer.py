@@ -5,9 +5,9 @@ or moving.
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -37,8 +37,9 @@ from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shap
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.scene.diff import ROOT, DiffRenderer
 from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes, displacement
+from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter, legend_kinds, prefixed
-from floatbase.viewer.scene.shapes import Item, Picture
+from floatbase.viewer.scene.shapes import Picture
 from floatbase.viewer.transport.window import Window
 from floatbase.viewer.web import pages
 
@@ -77,8 +78,8 @@ class Viewer(Controls):
 
     In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
     its frames come as a slider's values do. Elsewhere, open `viewer.url` in a browser. The newest
-    display in a notebook is live; earlier ones keep their pictures. So give each interactive part
-    its own `Viewer`.
+    display in a notebook is live; earlier ones show the image with which they opened. So give each
+    interactive part its own `Viewer`.
     """
 
     def __init__(
@@ -157,18 +158,9 @@ class Viewer(Controls):
         forces: npt.ArrayLike | None = None,
         planned: npt.ArrayLike | None = None,
         *,
-        com: bool = True,
-        cones: bool = True,
-        arrows: bool = True,
-        support: bool = False,
-        wrench: npt.ArrayLike | None = None,
-        push: tuple[str, npt.ArrayLike] | None = None,
-        ghost: State | None = None,
-        frames: Sequence[str] = (),
-        labels: bool = False,
-        extra: Mapping[str, Item] | None = None,
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
+        **options: Unpack[PictureKeywords],
     ) -> Viewer:
         """Draw the robot and what the arguments ask for, and remove everything else. Returns this
         viewer.
@@ -179,31 +171,15 @@ class Viewer(Controls):
             of `contacts`, N, world.
         planned: the same as a controller plans them. A cone's colour says where its force lies, of
             `forces` if given, else of `planned`.
-        com: whether to draw the centre of mass and its projection on the ground.
-        cones: whether to draw the friction cones.
-        arrows: whether to draw the forces; where not, they still colour the cones.
-        support: whether to draw the convex hull of the contact points.
-        wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a
-            ring around its axis; its radius is that of a force which has this moment at a lever of
-            half the diagonal of the robot's bounding box.
-        push: name of a frame, and the force that acts at its origin, shape (3,), N, world.
-        ghost: another state of the robot, drawn translucent.
-        frames: names of frames whose axes to draw.
-        labels: whether to write the names of the contact points.
-        extra: path -> item, more items from `floatbase.viewer.shapes` or
-            `floatbase.viewer.markers`.
         title: a line in the corner.
         ghost_name: what the legend calls the ghost.
+        options: what else is drawn: com, cones, arrows, support, wrench, push, ghost, frames,
+            labels, extra, swing_feet; `PictureOptions` explains them.
         Raises `InputError` for a state of another robot, a wrong number of forces, forces without
         contacts, and NaN; `ViewerError` when the window is closed.
         """
-        _check_flags(com=com, cones=cones, arrows=arrows, support=support, labels=labels)
         _check_texts(title=title, ghost_name=ghost_name)
-        picture = self.painter.picture(
-            state, contacts, forces, planned, com=com, cones=cones, arrows=arrows, support=support,
-            wrench=wrench, push=push,
-            ghost=ghost, frames=frames, labels=labels, extra=extra,
-        )  # fmt: skip
+        picture = self.painter.picture(state, contacts, forces, planned, **options)
         self.draw(picture, title, ghost_name)
         if self._last is None:
             self._last = state
@@ -226,7 +202,8 @@ class Viewer(Controls):
         """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle,
         of a normal force on top.
 
-            view.show(state, contacts, planned=command.forces, extra=view.multiplier_labels(state, contacts, command.solution))
+            labels = view.multiplier_labels(state, contacts, command.solution)
+            view.show(state, contacts, planned=command.forces, extra=labels)
 
         A multiplier is what one newton more of room would lower the objective by; two significant
         digits are shown.
@@ -297,15 +274,12 @@ class Viewer(Controls):
         speed: float = 1.0,
         rate: float = 30.0,
         planned: bool = True,
-        com: bool = True,
-        cones: bool = True,
-        support: bool = False,
-        ghost: State | None = None,
         steps: Iterable[StepPlan] = (),
         follow: bool = True,
         paused: bool = False,
         title: str | None = None,
         ghost_name: str = GHOST_NAME,
+        **options: Unpack[PictureKeywords],
     ) -> Viewer:
         """Play a rollout in the page, again and again, with a time slider and a choice of speeds.
         Returns at once.
@@ -316,7 +290,8 @@ class Viewer(Controls):
         speed: 1 for real time, 0.25 for slow motion.
         rate: pictures drawn for each second of the record.
         planned: whether to draw the planned forces too.
-        com, cones, support, ghost, title, ghost_name: as for `show`.
+        title, ghost_name, options: as for `show`. The record says where pushes act and which feet
+            swing, in place of the options for these.
         steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay`
             makes them.
         follow: whether the camera goes with the robot, smoothly and at one height over the viewer's
@@ -327,9 +302,8 @@ class Viewer(Controls):
         self.painter.check_robot("record", recording.as_rollout(rollout).robot)
         if not len(rollout.time):
             raise InputError("the record has no rows, so there is nothing to play.")
-        _check_flags(
-            planned=planned, com=com, cones=cones, support=support, follow=follow, paused=paused
-        )
+        for name, flag in {"planned": planned, "follow": follow, "paused": paused}.items():
+            as_bool(name, flag)
         _check_texts(title=title, ghost_name=ghost_name)
         rows, planned_steps = (
             recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
@@ -338,19 +312,24 @@ class Viewer(Controls):
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
         contacts, columns = recording.point_force_contacts(rollout.contacts)
-        pictures = [
-            self.painter.picture(
-                state,
-                contacts,
-                rollout.measured[i, columns],
-                rollout.planned[i, columns] if planned and np.isfinite(rollout.planned[i, columns]).all() else None,
-                com=com, cones=cones, support=support, ghost=ghost,
-                push=recording.push_at(rollout, i),
-                swing_feet=recording.swing_feet_at(rollout, i),
-                extra=None if (step := gait_overlay.step_at(planned_steps, t)) is None else self.step_overlay(step, t, state),
+        pictures = []
+        for i, t, state in zip(rows, times, states, strict=True):
+            overlay: Picture = dict(options.get("extra") or {})
+            if (step := gait_overlay.step_at(planned_steps, t)) is not None:
+                overlay |= self.step_overlay(step, t, state)
+            plan = rollout.planned[i, columns]
+            chosen: PictureKeywords = {**options, "extra": overlay}
+            chosen["push"] = recording.push_at(rollout, i)
+            chosen["swing_feet"] = recording.swing_feet_at(rollout, i)
+            pictures.append(
+                self.painter.picture(
+                    state,
+                    contacts,
+                    rollout.measured[i, columns],
+                    plan if planned and np.isfinite(plan).all() else None,
+                    **chosen,
+                )
             )
-            for i, t, state in zip(rows, times, states, strict=True)
-        ]  # fmt: skip
         if follow and self.robot.is_floating:
             places = recording.smoothed(
                 times, np.array([state.joint_transforms[1][:3, 3] for state in states])
@@ -510,7 +489,8 @@ class Viewer(Controls):
 
     def widget(self) -> Widget:
         """A widget that shows the picture, for panels: live, until the viewer is displayed again;
-        then it keeps its picture.
+        then it shows the image of the picture with which it opened. Raises `ViewerError` without
+        anywidget.
 
         Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a
         still copy of the scene.
@@ -578,11 +558,6 @@ class Viewer(Controls):
             self.painter.text_colour,
             tuple((kind, *entry) for kind, entry in self._legend_entries.items()),
         )
-
-
-def _check_flags(**flags: bool) -> None:
-    for name, value in flags.items():
-        as_bool(name, value)
 
 
 def _check_texts(**texts: str | None) -> None:

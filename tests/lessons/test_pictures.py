@@ -22,6 +22,7 @@ from floatbase.lessons import ConstantTorques, live_run, push_panel, slider_pane
 from floatbase.lessons.publish import pictures
 from floatbase.lessons.slider_samples import MAX_COMBINATIONS, combinations, sample_values
 from floatbase.viewer.scene import protocol
+from floatbase.viewer.web import pages
 
 Pictures = pictures.Pictures
 STATIC = Path(pictures.__file__).with_name("site") / "static"
@@ -355,8 +356,8 @@ def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for one in views:
         one.close()
     made.write()
-    for name in ("pictures.js", "pictures.css"):
-        shutil.copy(STATIC / name, folder / "_static" / name)
+    for path in (pages.DIST / "pictures.js", STATIC / "pictures.css"):
+        shutil.copy(path, folder / "_static")
     (folder / "lessons").mkdir()
     head = (
         '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" '

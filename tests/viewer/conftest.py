@@ -14,7 +14,7 @@ from floatbase.robots import Robot, State, load
 from floatbase.viewer import Viewer
 from floatbase.viewer.transport.window import Window
 
-from .looks import CONTEXTS, SIZE, Screen
+from .looks import CONTEXTS, SIZE
 
 
 @pytest.fixture(scope="session")
@@ -88,9 +88,3 @@ def page(tab) -> Iterator[Any]:
         tab.remove_listener(event, hear)
     tab.goto("about:blank")
     assert errors == []
-
-
-@pytest.fixture
-def screen(page, window: Window) -> Screen:
-    """A page that shows, without being loaded anew, what any viewer has drawn."""
-    return Screen(page, window)

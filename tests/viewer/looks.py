@@ -10,10 +10,6 @@ import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
 
-from floatbase.viewer import Viewer
-from floatbase.viewer.scene import protocol
-from floatbase.viewer.transport.window import Window
-
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
 # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
@@ -25,7 +21,6 @@ WHERE = """(path) => {
   node.getWorldPosition(at);
   return [at.x, -at.z, at.y];
 }"""
-EYE = "viewer.camera.position.toArray()"
 DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
 
 
@@ -35,25 +30,6 @@ def settle(page, title: str | None = None) -> None:
         "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
     )
     page.wait_for_function(DRAWN + titled)
-
-
-class Screen:
-    """A page on a window of its own. The scenes of other viewers are copied into it."""
-
-    def __init__(self, page, window: Window):
-        self.page, self.window = page, window
-        window.put([protocol.page_command("set_title", text="")])
-        page.goto(window.web_url)
-        settle(page)
-
-    def show(self, viewer: Viewer) -> None:
-        """Show what a viewer has drawn, and nothing else."""
-        commands = [protocol.encode(command) for command in viewer.window.scene.commands().values()]
-        handled = self.page.evaluate("viewer.num_messages_received")
-        self.window.put([protocol.delete("/meshcat"), *commands])
-        self.page.wait_for_function(
-            f"viewer.num_messages_received > {handled} && !viewer.needs_render"
-        )
 
 
 def picture(page, name: str) -> np.ndarray:

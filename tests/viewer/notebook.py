@@ -83,9 +83,6 @@ class Client:
     def drawn(self, number: int) -> None:
         self.say(json.dumps({"type": "done", "number": number}))
 
-    def make_live(self) -> None:
-        self.say('{"type": "live"}')
-
     def hears_nothing(self) -> bool:
         try:
             self.messages.get(timeout=SILENCE)
@@ -116,7 +113,10 @@ window.show = async (id, state) => {
   outputs.append(el);
   socket.onmessage = ({data}) => {
     const {content, buffers} = JSON.parse(data);
-    fire("msg:custom", content, buffers.map(bytes));
+    if (content.trait) {
+      state[content.trait] = content.value;
+      fire(`change:${content.trait}`);
+    } else fire("msg:custom", content, buffers.map(bytes));
   };
   socket.onclose = () => {
     layout.comm_live = false;
@@ -177,7 +177,11 @@ class Notebook:
         widget.send = lambda content, buffers=None: self._send(
             widget.model_id, content, buffers or []
         )
-        state = {name: getattr(widget, name) for name in ("version", "name", "height")}
+        widget.observe(
+            lambda _: self._send(widget.model_id, {"trait": "is_live", "value": False}, []),
+            names="is_live",
+        )
+        state = {name: getattr(widget, name) for name in ("version", "name", "height", "is_live")}
         thumbnail = base64.b64encode(widget.thumbnail).decode()
         page.evaluate(
             "([id, state]) => show(id, state)", [widget.model_id, {**state, "thumbnail": thumbnail}]

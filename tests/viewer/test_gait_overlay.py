@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,8 +22,6 @@ from floatbase.viewer import Item, Viewer, plots
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots.run_plots import MIN_LOAD
 from floatbase.viewer.scene.colours import COM, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
-
-from .looks import SMALL, picture, settle
 
 ROUNDED = 1e-9  # m: the same place, computed in another order
 POINTS = 1e-4  # of a curve's size: vertices of lines are in single precision
@@ -300,102 +297,6 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     )  # the same lines
 
 
-TARGET = "viewer.controls.target.toArray()"
-# where the scale's bar begins, in our coordinates
-BAR = """() => {
-  const bar = viewer.scene_tree.find(["meshcat", "scale", "bar"]).object;
-  const at = bar.getWorldPosition(new MeshCat.THREE.Vector3());
-  return [at.x, -at.z, at.y];
-}"""
-# where the two lights are that reach no farther than 10 m, in our coordinates
-LIGHTS = """() => ["PointLightNegativeX", "PointLightPositiveX"].map((name) => {
-  const light = viewer.scene_tree.find(["Lights", name, "<object>"]).object;
-  const at = light.getWorldPosition(new MeshCat.THREE.Vector3());
-  return [at.x, -at.z, at.y];
-})"""
-SEEN = 0.01  # m: what the eye does not see
-
-
-def moved(state: State, x: float, y: float, z: float = 0.0) -> State:
-    q = state.q.copy()
-    q[:3] += x, y, z
-    return State(state.robot, q)
-
-
-@pytest.mark.front_end
-@pytest.mark.parametrize("slope", [0.0, 0.3])
-def test_a_live_picture_is_followed_smoothly_at_one_height_and_the_scale_comes_along(
-    page, go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, slope: float
-) -> None:
-    page.set_viewport_size(SMALL)
-    viewer = Viewer(go2, ground=[-np.sin(slope), 0.0, np.cos(slope)], follow=True)
-    rise = float(np.tan(slope))  # m, of the ground over one metre forwards
-    try:
-        viewer.show(standing, contacts, forces, title="begin")
-        page.goto(viewer.url)
-        settle(page, "begin")
-        before, bar, lights = page.evaluate(TARGET), page.evaluate(BAR), page.evaluate(LIGHTS)
-        viewer.show(moved(standing, 1.0, 0.5, rise + 0.1), contacts, forces, title="gone")
-        ways = page.evaluate("""() => new Promise((resolve) => {
-          const seen = [], look = () => {
-            seen.push(viewer.controls.target.x);
-            const gone = document.getElementById("title").textContent == "gone";
-            if (gone && !viewer.needs_render) resolve(seen);
-            else requestAnimationFrame(look);
-          };
-          look();
-        })""")
-        assert (np.diff(ways) >= 0.0).all() and len(
-            {round(x, 3) for x in ways}
-        ) > 4  # on its way, not at once
-        np.testing.assert_allclose(
-            np.subtract(page.evaluate(TARGET), before), [1.0, rise, -0.5], atol=SEEN
-        )
-        np.testing.assert_allclose(
-            np.subtract(page.evaluate(BAR), bar), [1.0, 0.5, rise], atol=SEEN
-        )
-        np.testing.assert_allclose(
-            np.subtract(page.evaluate(LIGHTS), lights), [[1.0, 0.5, rise]] * 2, atol=SEEN
-        )
-        after = page.evaluate(TARGET)
-        page.reload()  # a page that comes later looks at the robot where it is
-        settle(page, "gone")
-        np.testing.assert_allclose(page.evaluate(TARGET), after, atol=SEEN)
-        viewer.camera("left")
-        page.wait_for_function("!viewer.needs_render")
-        assert page.evaluate(TARGET)[1] == pytest.approx(before[1] + rise, abs=SEEN)
-        viewer.camera("left", follow=False)
-        viewer.show(moved(standing, 2.0, 0.5), contacts, forces, title="left behind")
-        settle(page, "left behind")
-        assert page.evaluate(TARGET)[0] == pytest.approx(1.0 + before[0], abs=SEEN)
-    finally:
-        viewer.close()
-
-
-@pytest.mark.front_end
-def test_a_saved_walk_is_followed_and_looks_as_it_was(
-    page, viewer: Viewer, walked: tuple[Rollout, Walk], tmp_path: Path
-) -> None:
-    run, walk = walked
-    viewer.play(run, support=True, steps=walk.history, paused=True, title="trot")
-    page.set_viewport_size({"width": 640, "height": 360})
-    page.goto(viewer.save(tmp_path / "trot.html").as_uri())
-    settle(page, "trot")
-    before = page.evaluate(TARGET)
-    for t in (0.55, 1.0, float(run.time[-1] - run.time[0])):
-        page.evaluate(f"viewer.animator.seek({t}); viewer.set_dirty()")
-        page.wait_for_function("!viewer.needs_render")
-        picture(page, f"trot_{t:.2f}")
-    gone = np.subtract(page.evaluate(TARGET), before)
-    # the mean over a stride is not where the base is at the end of one
-    np.testing.assert_allclose(
-        gone, [*(run.q[-1] - run.q[0])[:1], 0.0, -(run.q[-1] - run.q[0])[1]], atol=0.03
-    )
-    page.evaluate("viewer.animator.seek(0); viewer.set_dirty()")
-    page.wait_for_function("!viewer.needs_render")
-    np.testing.assert_allclose(page.evaluate(TARGET), before, atol=SEEN)
-
-
 def test_a_gait_diagram_has_the_stances_and_the_measured_contacts(
     walked: tuple[Rollout, Walk],
 ) -> None:
@@ -430,18 +331,4 @@ def test_normal_forces_are_those_of_each_foot_beside_the_gait(biped: tuple[Rollo
         np.testing.assert_allclose(planned, run.force(name, "planned")[:, 2])
         np.testing.assert_allclose(measured, run.force(name)[:, 2])
     assert axes[1].get_legend() is None and axes[0].get_legend() is not None
-    plt.close("all")
-
-
-def test_a_record_of_one_stance_has_a_gait_diagram_too(
-    go2: Robot, standing: State, contacts: Contacts
-) -> None:
-    controller = fb.WholeBodyController(go2, contacts, fb.standing_tasks(standing))
-    run = fb.rollout(Simulation(go2), controller, 0.05)
-    assert not run.stances
-    axis = plots.plot_gait(run)
-    for bars in axis.collections:
-        ((begin, end),) = [path.get_extents().intervalx for path in bars.get_paths()]
-        assert (begin, end) == (run.time[0], run.time[-1])
-    assert len(plots.plot_normal_forces(run)) == len(contacts)
     plt.close("all")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from floatbase import Contacts, Simulation, rollout
+from floatbase import Contacts
 from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
 
@@ -75,28 +75,6 @@ def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(fra
     page.wait_for_function("scrollY > 60")
 
 
-def test_a_finger_pans_the_page(browser, framed) -> None:
-    outer = framed[0].url
-    context = browser.new_context(viewport={"width": 390, "height": 800}, has_touch=True)
-    page = context.new_page()
-    page.goto(outer)
-    page.frames[-1].wait_for_function(DRAWN)
-    touch = context.new_cdp_session(page)
-    touch.send(
-        "Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": 200, "y": 600}]}
-    )
-    for i in range(1, 20):
-        touch.send(
-            "Input.dispatchTouchEvent",
-            {"type": "touchMove", "touchPoints": [{"x": 200, "y": 600 - 10 * i}]},
-        )
-        page.wait_for_timeout(16)
-    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    page.wait_for_function("scrollY > 60")
-    picture(page, "phone")
-    context.close()
-
-
 def test_views_parts_and_keys(framed) -> None:
     page, inner = framed
     home = inner.evaluate(CAMERA)
@@ -141,46 +119,3 @@ def test_views_parts_and_keys(framed) -> None:
         page.keyboard.press("h")
         np.testing.assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
     assert inner.evaluate("viewer.renderer.domElement.getAttribute('aria-label')") == "go2 standing"
-
-
-def test_a_recording_waits_for_who_asked_for_less_motion(
-    browser, go2: Robot, tmp_path: Path
-) -> None:
-    view = Viewer(go2)
-    controller = lambda q, v, t: type("Limp", (), {"tau": np.zeros(12)})()  # noqa: E731
-    view.play(rollout(Simulation(go2), controller, 0.1))
-    view.save(tmp_path / "record.html")
-    view.close()
-    for motion in ("reduce", "no-preference"):
-        context = browser.new_context(reduced_motion=motion)
-        page = context.new_page()
-        page.goto((tmp_path / "record.html").as_uri())
-        page.wait_for_function(DRAWN)
-        assert page.evaluate("viewer.animator.playing") == (motion != "reduce")
-        context.close()
-
-
-def test_a_page_whose_viewer_has_closed_says_what_it_was_told_to(
-    page, go2: Robot, standing: State
-) -> None:
-    view = Viewer(go2)
-    view.show(standing)
-    view.set_disconnect_message("Start it again with\npython -m floatbase view go2")
-    page.goto(view.url)
-    page.wait_for_function(DRAWN)
-    assert not page.locator("#notice").is_visible()
-    view.close()
-    page.wait_for_selector("#notice", state="visible")
-    assert page.inner_text("#notice") == "Start it again with\npython -m floatbase view go2"
-
-
-def test_labels_keep_their_size_in_a_small_window(framed) -> None:
-    page, inner = framed
-    tall = (
-        "viewer.scene_tree.find(['meshcat', 'scale', 'label', '<object>']).object.scale.y * "
-        "viewer.camera.zoom"
-    )
-    before = inner.evaluate(tall)
-    page.set_viewport_size({"width": 390, "height": 800})
-    inner.wait_for_function("viewer.camera.zoom < 0.8 && !viewer.needs_render")
-    assert inner.evaluate(tall) == pytest.approx(before)

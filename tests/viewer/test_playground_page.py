@@ -25,10 +25,6 @@ ENDS = """() => {
       input.dispatchEvent(new Event('input'));
     }
 }"""
-BACK = (
-    "() => document.querySelectorAll('#panel input[type=range]').forEach((one) => "
-    "one.dispatchEvent(new Event('dblclick')))"
-)
 
 
 @pytest.fixture

@@ -22,13 +22,9 @@ from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
 from floatbase.viewer.scene.colours import (
     ALARM,
-    BACKGROUNDS,
     CALM,
     IDLE,
-    MEASURED,
-    PLANNED,
     WARNING,
-    hex_code,
 )
 
 
@@ -88,16 +84,6 @@ def test_arrows_start_at_contacts(
             np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_arrows_are_neither_thin_nor_stout(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
-    for factor in (0.01, 0.1, 1.0, 10.0):
-        viewer.show(standing, contacts, forces=factor * forces)
-        for matrix in matrices(viewer, "/meshcat/measured/").values():
-            width, length = 2 * np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
-            assert 0.01 * length < width < 0.4 * length
-
-
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
 @pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
 def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
@@ -114,24 +100,6 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
             matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6
         )
         np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
-
-
-def test_the_unit_cone_and_arrow_are_of_unit_size(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
-    viewer.show(standing, contacts, forces=np.tile([0, 0, 40.0], 4))
-    scene = viewer.window.scene.commands()
-    for path, radius in (("cone/FL_foot/surface", 1.0), ("measured/FL_foot", None)):
-        lowered = scene[f"/meshcat/{path}", "set_object", ""]["object"]
-        position = lowered["geometries"][0]["data"]["attributes"]["position"]
-        points = (
-            np.frombuffer(position["array"].data, "<i2").reshape(-1, 3)
-            * lowered["object"]["matrix"][0]
-        )
-        assert points[:, 2].min() == pytest.approx(0.0, abs=1e-4)
-        assert points[:, 2].max() == pytest.approx(1.0, abs=1e-4)
-        if radius is not None:
-            assert np.linalg.norm(points[:, :2], axis=1).max() == pytest.approx(radius, abs=1e-3)
 
 
 def test_a_cone_says_where_its_force_is(
@@ -250,24 +218,6 @@ def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2
     viewer.close()
     with raises(InputError, "ground"):
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
-
-
-def test_the_feet_fill_the_picture_of_the_feet() -> None:
-    filled = {}
-    for robot in (robot for robot in map(load, catalogue()) if robot.feet):
-        viewer = Viewer(robot)
-        viewer.show(robot.standing()).camera("feet")
-        camera = viewer.window.scene.commands()["/", "set_camera", ""]
-        viewer.close()
-        eye, target = (
-            np.array([c[0], -c[2], c[1]]) for c in (camera["position"], camera["target"])
-        )
-        contacts = (Contacts.flat_feet if robot.feet[0].is_flat else Contacts.points)(robot)
-        ways = contacts.positions(robot.standing()) - eye
-        ahead = (target - eye) / np.linalg.norm(target - eye)
-        angles = np.degrees(np.arccos(ways @ ahead / np.linalg.norm(ways, axis=1)))
-        filled[robot.name] = angles.max() / (camera["fov"] / 2)
-    assert {name: part for name, part in filled.items() if not 0.25 < part < 1.0} == {}
 
 
 def test_polyhedra_light_the_facets_that_are_reached(
@@ -435,16 +385,6 @@ def test_the_legend_names_what_is_shown(
     assert legend(viewer) == []
 
 
-def test_the_legend_explains_items_of_ones_own_while_they_are_shown(
-    viewer: Viewer, standing: State
-) -> None:
-    viewer.add_legend_entry("wish", MEASURED, "force wished for")
-    viewer.show(standing, com=False, extra={"wish": shapes.arrow([0, 0, 1], [0, 0, 1], MEASURED)})
-    assert legend(viewer) == ["force wished for"]
-    viewer.show(standing, com=False)
-    assert legend(viewer) == []
-
-
 def test_forces_that_are_not_drawn_still_colour_their_cones(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
@@ -464,32 +404,6 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     ]
 
 
-def test_a_flat_foot_has_one_name_and_a_number_at_each_corner() -> None:
-    talos = load("talos")
-    view = Viewer(talos)
-    view.show(talos.standing(), Contacts.feet(talos), labels=True)
-    words = [
-        item.shape.name for path, item in view.renderer.picture.items() if path.startswith("label/")
-    ]
-    view.close()
-    assert sorted(words) == sorted(["left_sole_link", "right_sole_link", *2 * "0123"])
-
-
-@pytest.mark.parametrize("background", ["light", "dark"])
-def test_a_push_is_seen_through_the_robot_on_any_background(
-    go2: Robot, standing: State, background: str
-) -> None:
-    view = Viewer(go2, background=background)
-    view.show(standing, push=("base", [0.0, 30.0, 0.0]))
-    assert material(view, "/meshcat/push")["depthTest"] is False
-    assert view.window.scene.commands()["/", "set_legend", ""]["items"][1] == [
-        hex_code(BACKGROUNDS[background][3]),
-        "push",
-        "patch",
-    ]
-    view.close()
-
-
 def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(
     viewer: Viewer, go2: Robot, standing: State
 ) -> None:
@@ -506,29 +420,6 @@ def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(
     assert looked() == before
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "number"),
-    [
-        ("angle", 0.0, 0),
-        ("angle", 180.0, 180),
-        ("angle", np.nan, np.nan),
-        ("azimuth", np.nan, np.nan),
-        ("azimuth", "front", "front"),
-        ("elevation", None, "None"),
-        ("elevation", 91.0, 91),
-        ("distance", 0.0, 0),
-        ("around", (0.0, 0.0, 0.3), 0.3),
-        ("around", ((0.0, 0.0), 0.3), 2),
-        ("around", ((0.0, 0.0, np.inf), 0.3), np.inf),
-        ("around", ((0.0, 0.0, 0.3), 0.0), 0),
-    ],
-)
-def test_what_no_camera_can_do_is_refused_by_name(
-    name: str, value: Any, number: str | float
-) -> None:
-    refused(lambda: View(**{name: value}), InputError, name, "View", number)
-
-
 def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     robot = load("talos")
     view, contacts = Viewer(robot), Contacts.flat_feet(robot, mu=0.7)
@@ -541,14 +432,6 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across < 0.5 * nearest and across / along == pytest.approx(0.7, rel=1e-5)
     view.close()
-
-
-def test_the_colours_are_those_of_the_code(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
-    viewer.show(standing, contacts, forces=forces, planned=forces)
-    for kind, colour in (("measured", MEASURED), ("planned", PLANNED)):
-        assert f"#{material(viewer, f'/meshcat/{kind}/FL_foot')['color']:06X}" == hex_code(colour)
 
 
 def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(

@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import umsgpack
 from messages import raises, refused
 
 from floatbase.control import WholeBodyController
@@ -19,20 +18,16 @@ from floatbase.lessons import FIGURES, props
 from floatbase.objectives import CoMTask, standing_tasks
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer import View, Viewer, markers, prefixed, shapes
+from floatbase.viewer import Viewer, markers, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import (
-    BACKGROUNDS,
     CONE,
     GREYS,
-    LEGEND,
     MEASURED,
     PLANNED,
     hex_code,
 )
-
-from .looks import SMALL, Screen, picture, settle
 
 
 @pytest.mark.parametrize(
@@ -69,22 +64,6 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
     np.testing.assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
-
-
-def test_a_curled_arrow_has_heads_all_round_so_that_its_sense_is_seen_from_anywhere() -> None:
-    data = markers.curled_arrow([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]).shape.data["geometries"][0][
-        "data"
-    ]["attributes"]["position"]
-    points = np.frombuffer(data["array"].data, "<i2").reshape(-1, 3).astype(float)
-    points *= 1.0 / np.median(np.linalg.norm(points[:, :2], axis=1))
-    beside = (
-        np.abs(np.linalg.norm(points[:, :2], axis=1) - 1.0) > 0.1
-    )  # what is wider than the ring
-    angles = np.unique(np.round(np.arctan2(points[beside, 1], points[beside, 0]), 1)) % (
-        2.0 * np.pi
-    )
-    gaps = np.diff(np.sort(angles), append=np.sort(angles)[0] + 2.0 * np.pi)
-    assert np.sum(gaps > 1.0) == 3 and gaps.max() < np.radians(200.0)
 
 
 NAN = float("nan")
@@ -211,71 +190,6 @@ def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
             ), name
 
 
-def test_the_middle_grey_shows_on_every_background() -> None:
-    def luminance(colour: tuple[float, ...]) -> float:
-        c = np.array(colour)
-        return float(
-            np.array([0.2126, 0.7152, 0.0722])
-            @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-        )
-
-    papers = [colour for top, bottom, _, _ in BACKGROUNDS.values() for colour in (top, bottom)]
-    for paper in [*papers, (17 / 255,) * 3]:  # the last is a dark JupyterLab's
-        dark, light = sorted((luminance(paper), luminance(GREYS[1])))
-        assert (light + 0.05) / (dark + 0.05) > 2.5, paper
-
-
-def test_a_push_stands_out_from_its_outline_and_that_from_any_robot_as_light_as_the_push() -> None:
-    for paper, _, _, text in BACKGROUNDS.values():
-        outlined = markers.push([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 1.0, text, paper).shape.data
-        data = outlined["geometries"][0]["data"]["attributes"]["color"]["array"].data
-        first, *_, last = (
-            np.frombuffer(data, np.uint8).reshape(-1, 3) / 255
-        )  # painted in this order
-        for painted, colour in ((first, paper), (last, text)):
-            np.testing.assert_allclose(painted, colour, atol=1e-2)
-        for name, deficiency in DEFICIENCIES.items():
-            assert (
-                np.linalg.norm(
-                    _simulated(tuple(first), deficiency) - _simulated(tuple(last), deficiency)
-                )
-                > 0.8
-            ), name
-
-
-def test_a_pushs_outline_is_as_wide_at_its_ends_as_along_it() -> None:
-    for vector in ([0.02, 0.0, 0.0], [0.3, 0.0, 0.0], [1.5, 0.0, 0.0]):
-        item = markers.push([0.0, 0.0, 0.0], vector, 1.0)
-        attributes = item.shape.data["geometries"][0]["data"]["attributes"]
-        unit = np.frombuffer(attributes["position"]["array"].data, "<i2").reshape(-1, 3)
-        points = (
-            unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T
-        )  # m, seen from where it begins
-        colours = np.frombuffer(attributes["color"]["array"].data, np.uint8).reshape(-1, 3)
-        outline, arrow = points[colours[:, 0] == 255], points[colours[:, 0] < 255]
-        radius = np.linalg.norm(item.matrix[:3, 0])
-        back = arrow[:, 0].min() - outline[:, 0].min()
-        assert back == pytest.approx(markers.OUTLINE * radius, rel=0.1)
-        assert outline[:, 0].max() > arrow[:, 0].max() + 0.9 * back
-
-
-def test_every_background_has_readable_text() -> None:
-    for top, bottom, _, text in BACKGROUNDS.values():
-        assert min(abs(np.mean(top) - np.mean(text)), abs(np.mean(bottom) - np.mean(text))) > 0.5
-    assert len(LEGEND) == len({text for *_, text in LEGEND})
-
-
-@pytest.mark.front_end
-def test_figures(screen: Screen) -> None:
-    screen.page.set_viewport_size(SMALL)
-    for name, figure in FIGURES.items():
-        viewer = figure()
-        screen.show(viewer)
-        viewer.close()
-        image = picture(screen.page, name)
-        assert (np.abs(image - image[150, 2]).sum(axis=2) > 60).mean() > 0.03, name
-
-
 def test_the_compass_is_plotted_and_drawn_to_scale(
     viewer: Viewer, standing: State, contacts: Contacts
 ) -> None:
@@ -388,39 +302,6 @@ def test_figure_1_adds_up() -> None:
     right.close(), left.close()
 
 
-@pytest.mark.front_end
-def test_every_mark_and_prop_is_in_the_page(
-    page, viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
-) -> None:
-    extra = prefixed("wheel", {"": props.wheel([0.7, -0.5, 0.15], [0, 1, 0], 0.15, 0.6)})
-    extra |= prefixed(
-        "cylinder",
-        props.hydraulic_cylinder([0.8, 0.3, 0.05], [0.8, 0.3, 0.42], (0.25, 0.45), (0.9, 0.2)),
-    )
-    extra |= prefixed("wall", {"": props.wall([-0.6, 0, 0.3], [1, 0, 0], 0.6, 0.6)})
-    extra |= prefixed("table", {"": props.turntable([-0.7, -0.6, 0.2], 0.3, 0.4)})
-    extra |= prefixed("bolts", props.bolts([0.3, -0.6, 0.0], 0.1))
-    forces = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
-    q = standing.q.copy()
-    q[2] += 0.08
-    viewer.show(
-        standing, contacts, forces, planned=1.2 * forces, support=True,
-        wrench=[10, 0, go2.weight, 0, 20, 10],
-        push=("base", [0, 40.0, 0]), frames=["base"], labels=True, ghost=State(go2, q), extra=extra,
-        title="shapes",
-    )  # fmt: skip
-    viewer.camera(View(40.0, 25.0, 1.7))
-    page.goto(viewer.url)
-    settle(page)
-    drawn = page.evaluate(
-        "(() => { let n = 0; viewer.scene_tree.children.meshcat.object.traverse((o) => { n += "
-        "o.name == 'shape'; });"
-        " return n; })()"
-    )
-    assert drawn == len(viewer.renderer.picture)
-    picture(page, "shapes")
-
-
 def test_no_path_of_a_picture_lies_below_another(
     viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
 ) -> None:
@@ -432,19 +313,3 @@ def test_no_path_of_a_picture_lies_below_another(
     )  # fmt: skip
     paths = sorted(drawn)
     assert not [(a, b) for a in paths for b in paths if b.startswith(a + "/")]
-
-
-def test_a_drawing_redraws_what_has_another_shape(viewer: Viewer) -> None:
-    one, other = (
-        shapes.Item(shapes.arrow([0, 0, 0], [0, 0, 1.0], c).shape, np.eye(4))
-        for c in (MEASURED, PLANNED)
-    )
-    for picture_of, kinds in (
-        ({"a": one}, ["set_object", "set_transform"]),
-        ({"a": other}, ["set_object"]),
-        ({}, ["delete"]),
-    ):
-        newest = viewer.window.scene.newest
-        viewer.draw(picture_of)
-        sent = [umsgpack.unpackb(command) for command in viewer.window.scene.since(newest)[1]]
-        assert [command["type"] for command in sent if command["path"] == "/meshcat/a"] == kinds

@@ -14,53 +14,20 @@ from floatbase.viewer.scene.colours import (
     BACKGROUNDS,
     COM,
     DARK_SHADES,
-    GREYS,
-    LEGEND,
     MEASURED,
     hex_code,
 )
 
 from .looks import picture
 
-RGB = tuple[float, float, float]
-AS_TEXT = ("push", "multiplier", "zmp")  # drawn in the colour of text
-SEEN = 3.0  # contrast that WCAG 2.2 asks for between parts of a picture and what is around them
-READ = 4.5  # and for text
 DRAWN = "window.viewer && viewer.num_messages_received > 0"
 DARK = "document.body.classList.contains('dark')"
 COLOUR = """(path) => viewer.scene_tree.find([...path.split("/"), "<object>"])
   .object.material.color.getHexString()"""
-LATER = "new Promise((done) => setTimeout(done, 2 * RETRY))"
+LATER = "new Promise((done) => setTimeout(done, 800))"
 GREY = """() => Math.min(
   ...viewer.scene_tree.find(["meshcat", "label", "FL_foot", "<object>"])
   .object.material.map.image.data.filter((_, i) => i % 2 == 0))"""
-
-
-def contrast(one: RGB, other: RGB) -> float:
-    """The contrast of two colours by WCAG 2.2, from 1 to 21."""
-
-    def light(colour: RGB) -> float:
-        parts = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in colour]
-        return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
-
-    low, high = sorted((light(one), light(other)))
-    return (high + 0.05) / (low + 0.05)
-
-
-@pytest.mark.parametrize("background", BACKGROUNDS)
-def test_text_is_read_and_what_hides_in_the_dark_has_another_shade_there(background: str) -> None:
-    top, bottom, lines, text = BACKGROUNDS[background]
-    for paper in (top, bottom):
-        assert contrast(text, paper) > READ
-        assert contrast(text, paper) > 3.0 * contrast(lines, paper)  # the ground keeps behind
-    if background == "dark":
-        drawn = {colour for kind, colour, _ in LEGEND if kind not in AS_TEXT} | {
-            *GREYS,
-            *DARK_SHADES,
-        }
-        shades = [DARK_SHADES.get(colour, colour) for colour in drawn]
-        assert min(contrast(shade, paper) for shade in shades for paper in (top, bottom)) > SEEN
-        assert contrast(MEASURED, bottom) < SEEN  # so that the shades are there for something
 
 
 @pytest.fixture
@@ -103,25 +70,13 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path
         ".map((code) => '#' + code)"
     )
     assert picture(page, "dark")[300, 100].max() < 100
-    inner.evaluate("() => { part('lines').firstChild.marked = true; }")
+    inner.evaluate("() => { document.getElementById('lines').firstChild.marked = true; }")
     page.evaluate("document.body.className = 'busy'")  # as JupyterLab changes it all the time
     inner.evaluate(LATER)
-    assert inner.evaluate("part('lines').firstChild.marked"), "drawn anew, for nothing"
+    assert inner.evaluate("document.getElementById('lines').firstChild.marked"), (
+        "drawn anew, for nothing"
+    )
     page.evaluate("document.body.style.color = '#222'")
     inner.wait_for_function(f"!{DARK} && !viewer.needs_render")
     assert {part: inner.evaluate(*part) for part in seen} == seen
     assert picture(page, "light_again")[300, 100].min() > 180
-
-
-@pytest.mark.front_end
-def test_a_page_of_its_own_is_as_the_browser_is_and_as_wide_as_a_phone(
-    browser, saved: Path
-) -> None:
-    context = browser.new_context(
-        color_scheme="dark", viewport={"width": 390, "height": 800}, is_mobile=True, has_touch=True
-    )
-    page = context.new_page()
-    page.goto(saved.as_uri())
-    page.wait_for_function(DRAWN)
-    assert page.evaluate(DARK) and page.evaluate("innerWidth") == 390
-    context.close()

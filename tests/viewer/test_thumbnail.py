@@ -14,7 +14,6 @@ from PIL import Image
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
-from floatbase.simulation import Ground
 from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED
@@ -89,28 +88,6 @@ def test_the_image_goes_with_a_robot_that_is_followed(
     )  # a whole jump of the grid, down the slope
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
-    viewer.close()
-
-
-def test_on_high_ground_the_image_is_the_same(go2: Robot, standing: State) -> None:
-    low, high = Viewer(go2), Viewer(go2, ground=Ground(offset=2.5))
-    images = [image(low.show(standing)), image(high.show(go2.standing(offset=2.5)))]
-    assert differing(*images) < 0.02 * images[0][..., 0].size
-    low.close()
-    high.close()
-
-
-def test_the_image_goes_on_with_the_robot_after_pictures_of_ones_own(
-    go2: Robot, standing: State
-) -> None:
-    viewer = Viewer(go2, follow=True)
-    at_home = image(viewer.show(standing))
-    q = standing.q.copy()
-    q[0] += 2.5  # m, a whole jump of the grid
-    away = State(go2, q)
-    viewer.show(away)
-    viewer.play_pictures([0.0, 1.0], [viewer.painter.picture(state) for state in (standing, away)])
-    assert differing(at_home, image(viewer.show(away))) < 0.02 * at_home[..., 0].size
     viewer.close()
 
 

@@ -51,8 +51,8 @@ _REQUIREMENTS = (
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _PREPARE_JS = """() => {
     const {animator} = viewer;
-    const unused = [...["player", "panel", "fold", "board", "tools"].map(part), ...document.querySelectorAll("#legend.folded")];
-    for (const control of unused) control.style.visibility = "hidden";
+    const controls = "#player, #panel, #fold, #board, #tools, #legend.folded";
+    for (const one of document.querySelectorAll(controls)) one.style.visibility = "hidden";
     if (!animator.duration) return 0;
     animator.pause();
     return animator.duration / animator.mixer.timeScale;

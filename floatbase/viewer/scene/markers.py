@@ -17,7 +17,6 @@ from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
 from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
 from floatbase.viewer.scene.shapes import (
-    ARROW,
     Item,
     Picture,
     arrow,
@@ -28,6 +27,7 @@ from floatbase.viewer.scene.shapes import (
     vector_and_length,
 )
 from floatbase.viewer.scene.threejs import Shape
+from floatbase.viewer.scene.unit_shapes import ARROW
 
 _CONE_CONSTRAINTS = (
     "friction",

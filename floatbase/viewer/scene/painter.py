@@ -4,10 +4,10 @@ any page.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,6 @@ from floatbase._validation import (
     Array,
     as_array,
     as_instance,
-    as_strings,
     cached_property,
     numeric_copy,
     short_repr,
@@ -30,6 +29,7 @@ from floatbase.viewer.scene import markers, shapes, threejs
 from floatbase.viewer.scene.colours import GHOST, MEASURED, PLANNED, RGB
 from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
+from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
 from floatbase.viewer.scene.shapes import Item, Picture
 
 # radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not
@@ -87,27 +87,13 @@ class Painter:
         contacts: Contacts | None = None,
         forces: npt.ArrayLike | None = None,
         planned: npt.ArrayLike | None = None,
-        *,
-        com: bool = True,
-        cones: bool = True,
-        arrows: bool = True,
-        support: bool = False,
-        wrench: npt.ArrayLike | None = None,
-        push: tuple[str, npt.ArrayLike] | None = None,
-        ghost: State | None = None,
-        frames: Sequence[str] = (),
-        labels: bool = False,
-        extra: Mapping[str, Item] | None = None,
-        swing_feet: Collection[str] = (),
+        **options: Unpack[PictureKeywords],
     ) -> Picture:
         """The picture, path -> item, of everything that the arguments ask for.
 
-        swing_feet: names of contacts that do not touch the ground just now: they have no patch and
-            no cone, and do not
-        count for
-            the support region.
-        The other arguments are those of `Viewer.show`.
+        state, contacts, forces, planned: as for `Viewer.show`. options: see `PictureOptions`.
         """
+        chosen = PictureOptions(**options)
         self._check_state(state)
         if contacts is not None:
             as_instance("contacts", contacts, Contacts)
@@ -119,68 +105,51 @@ class Painter:
         )
         if contacts is not None and contacts.n_points:
             stands = [
-                contact.name not in swing_feet for contact in contacts for _ in contact.point_names
+                contact.name not in chosen.swing_feet
+                for contact in contacts
+                for _ in contact.point_names
             ]
-            picture |= self._contacts(contacts, positions, both, cones, stands, arrows)
-            if support:
+            picture |= self._contacts(
+                contacts, positions, both, chosen.cones, stands, chosen.arrows
+            )
+            if chosen.support:
                 picture |= prefixed(
                     "support", markers.support_region(positions[stands], 0.004 * self.size, ground)
                 )
-            if labels:
+            if chosen.labels:
                 picture |= self._labels(state, contacts, positions)
-        if com:
+        if chosen.com:
             picture |= prefixed(
                 "com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
             )
-        if wrench is not None:
-            picture |= self._wrench(state, wrench)
-        if push is not None:
-            if not isinstance(push, Sequence) or isinstance(push, str) or len(push) != 2:
-                raise InputError(
-                    f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not '
-                    f"{short_repr(push)}."
-                )
-            picture |= self._push(state, *push)
-        if ghost is not None:
-            self._check_state(ghost)
-            picture |= self._robot(ghost, "ghost", self._ghost_shapes)
-        for frame in as_strings("frames", frames):
-            pose = state.frame_pose(frame).homogeneous
+        if chosen.wrench is not None:
+            picture |= self._wrench(state, np.asarray(chosen.wrench, dtype=np.float64))
+        if chosen.push is not None:
+            frame, force = chosen.push
+            picture |= self._push(state, frame, np.asarray(force, dtype=np.float64))
+        if chosen.ghost is not None:
+            self._check_state(chosen.ghost)
+            picture |= self._robot(chosen.ghost, "ghost", self._ghost_shapes)
+        for name in chosen.frames:
+            pose = state.frame_pose(name).homogeneous
             picture |= prefixed(
-                f"frame/{path_part(frame)}", markers.frame_axes(pose, 0.25 * self.size, frame)
+                f"frame/{path_part(name)}", markers.frame_axes(pose, 0.25 * self.size, name)
             )
         if any(
             path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench")
             for path in picture
         ):
             picture |= self._scale_bar(ground)
-        if not isinstance(extra, Mapping | None) or not all(
-            isinstance(item, Item) for item in (extra or {}).values()
-        ):
-            raise InputError(
-                f"extra must be a picture, path -> item, as shapes and marks make them, not "
-                f"{short_repr(extra)}."
-            )
-        return picture | dict(extra or {})
+        return picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
         """A painter with other facets or another ground. It shares what this one has computed for
         the robot.
         """
         other = replace(self, **changes)
-        for name in (
-            "home",
-            "box",
-            "feet_box",
-            "size",
-            "scale",
-            "_meshes",
-            "_shapes",
-            "_ghosts",
-            "_scale_bars",
-        ):
-            if name in self.__dict__:
-                other.__dict__[name] = self.__dict__[name]
+        computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
+        computed |= {"_ghost_shapes", "_scale_bars"}
+        other.__dict__.update({name: self.__dict__[name] for name in computed & set(self.__dict__)})
         return other
 
     def ground_only(self) -> Picture:
@@ -393,15 +362,13 @@ class Painter:
                 )
         return picture
 
-    def _wrench(self, state: State, value: npt.ArrayLike) -> Picture:
-        six = as_array("wrench", value, (6,), "N and N·m")
+    def _wrench(self, state: State, six: Array) -> Picture:
         drawn = markers.wrench(
             state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size
         )
         return prefixed("wrench", drawn)
 
-    def _push(self, state: State, frame: str, value: npt.ArrayLike) -> Picture:
-        force = as_array("force of the push", value, (3,), "N")
+    def _push(self, state: State, frame: str, force: Array) -> Picture:
         if self._is_negligible(force):
             return {}
         at = state.frame_pose(frame).translation

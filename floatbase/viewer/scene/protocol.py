@@ -22,11 +22,11 @@ from floatbase.errors import ViewerError
 Key = tuple[str, str, str]
 Update = tuple[Key, bytes]
 
-# meshcat's own commands, then those of page.js
+# meshcat's own commands, then those of web/src/scene.js
 TYPES = (
     "set_object", "set_transform", "set_property", "delete", "set_animation", "delete_control",
     "set_control", "set_control_value", "set_camera", "set_follow", "set_title", "set_legend",
-    "set_theme", "set_frozen",
+    "set_theme",
     "set_text", "add_plot_point", "set_views", "set_disconnect_message", "set_ground",
 )  # fmt: skip
 
@@ -146,7 +146,7 @@ def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -
 
 
 def page_command(kind: str, **values: Any) -> Update:
-    """A command of page.js that belongs to no object, as set_title, set_legend and set_theme."""
+    """A command of the page's that belongs to no object, as set_title, set_legend and set_theme."""
     return encode({"type": kind, "path": "", **values})
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from floatbase._validation import Array, as_array, as_positive, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
-from floatbase.viewer.scene import geometry, threejs
+from floatbase.viewer.scene import geometry, threejs, unit_shapes
 from floatbase.viewer.scene.colours import (
     COM,
     CONE,
@@ -26,23 +26,13 @@ from floatbase.viewer.scene.colours import (
     PATCH,
     RGB,
     RGBA,
-    WARNING,
     with_alpha,
 )
 from floatbase.viewer.scene.threejs import Shape
 
-_RIM = 0.025  # thickness of a rim, over the radius of the mouth
-FACET_ALPHA = 0.75
 # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
 ARROW_SLENDERNESS = 0.085
 ARROW_LENGTH = 0.2  # m
-ARROW = (
-    (0.0, 0.0),
-    (1.0, 0.0),
-    (1.0, 0.78),
-    (2.1, 0.78),
-    (0.0, 1.0),
-)  # (radius, height), 1 long, its shaft of radius 1
 
 
 class Item(NamedTuple):
@@ -139,7 +129,7 @@ def arrow(
     width = arrow_width(length, size) * (1.8 if halo else 1.0)
     rotation = geometry.rotation_with_z_axis(vector / length)
     return Item(
-        _unit_arrow(colour, 0.6 if halo else 1.0),
+        unit_shapes.arrow(colour, 0.6 if halo else 1.0),
         transform(start, rotation, (width / 2, width / 2, length)),
     )
 
@@ -163,7 +153,7 @@ def friction_cone(
     as_positive("mu of a friction cone", mu)
     as_positive("height of a friction cone", height, "m")
     matrix = transform(position, _contact_axes(normal), (mu * height, mu * height, height))
-    return Item(_unit_cone(), matrix, cone_colour(status))
+    return Item(unit_shapes.cone(), matrix, cone_colour(status))
 
 
 def cone_colour(status: str) -> RGBA:
@@ -193,9 +183,9 @@ def friction_polyhedron(
         bool(polyhedron.inner_approximation),
         float(polyhedron.facet_rotation),
     )
-    picture = {"/sides": Item(_unit_polyhedron(*key), matrix, cone_colour(status))}
+    picture = {"/sides": Item(unit_shapes.polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
-        picture[f"/facet {facet}"] = Item(_facet(*key, int(facet)), matrix)
+        picture[f"/facet {facet}"] = Item(unit_shapes.facet(*key, int(facet)), matrix)
     return picture
 
 
@@ -210,7 +200,7 @@ def cone_rim(
     frame = _contact_axes(polyhedron.normal)
     if is_round:
         return Item(
-            _round_rim(),
+            unit_shapes.round_rim(),
             transform(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)),
         )
     key = (
@@ -219,14 +209,14 @@ def cone_rim(
         bool(polyhedron.inner_approximation),
         float(polyhedron.facet_rotation),
     )
-    return Item(_polygonal_rim(*key), transform(position, frame, height))
+    return Item(unit_shapes.polygonal_rim(*key), transform(position, frame, height))
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
     """A disc at a contact. position: (3,), m, world. normal: (3,), unit, world. radius: m."""
     as_positive("radius of a contact patch", radius, "m")
     return Item(
-        _unit_disc(PATCH),
+        unit_shapes.disc(PATCH),
         transform(position, _contact_axes(normal), (radius, radius, 0.12 * radius)),
     )
 
@@ -240,13 +230,14 @@ def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Pictu
     radius = 0.04 * size
     foot = np.array([x, y, ground])
     return {
-        "/ball": Item(_unit_sphere(COM, True), transform([x, y, z], scale=radius)),
+        "/ball": Item(unit_shapes.sphere(COM, True), transform([x, y, z], scale=radius)),
         "/line": Item(
-            _unit_cylinder(COM),
+            unit_shapes.cylinder(COM),
             transform(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4))),
         ),
         "/projection": Item(
-            _unit_disc(COM), transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius))
+            unit_shapes.disc(COM),
+            transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius)),
         ),
     }
 
@@ -267,7 +258,9 @@ def label(
     plate: whether a plate lies behind it.
     """
     return Item(
-        _label(text, as_positive("height of a label's letters", height, "m"), plate, colour),
+        unit_shapes.label(
+            text, as_positive("height of a label's letters", height, "m"), plate, colour
+        ),
         transform(position),
     )
 
@@ -291,15 +284,16 @@ def scale_bar(
     )  # beside it: from its end the bar is short
     picture = {
         "/bar": Item(
-            _unit_cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
+            unit_shapes.cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
         )
     }
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
         picture[end] = Item(
-            _unit_cylinder(colour), transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2))
+            unit_shapes.cylinder(colour),
+            transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)),
         )
-    words = _label(
+    words = unit_shapes.label(
         f"{force:g} N", 0.055 * size, True, colour, False
     )  # behind the robot where the bar is
     return picture | {"/label": Item(words, transform(text_at))}
@@ -316,7 +310,7 @@ def rod(
     colour: RGB.
     """
     as_positive("length of a rod", length, "m")
-    return Item(_unit_cylinder(colour), transform(start, rotation, (radius, radius, length)))
+    return Item(unit_shapes.cylinder(colour), transform(start, rotation, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
@@ -326,12 +320,12 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
         raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
-    return _polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
+    return unit_shapes.polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
 
 
 def invisible_point(position: npt.ArrayLike) -> Item:
     """A place without anything to see, for the camera to follow. position: (3,), m, world."""
-    return Item(_invisible_point(), transform(position))
+    return Item(unit_shapes.invisible_point(), transform(position))
 
 
 def ground_grid(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
@@ -363,104 +357,6 @@ def _contact_axes_of(x: float, y: float, z: float) -> Array:
     """`_contact_axes` of a normal. There are few normals, so each is computed once."""
     t1, t2 = tangents([x, y, z])
     return read_only(np.stack([t1, t2, np.cross(t1, t2)], axis=1))
-
-
-@lru_cache(maxsize=64)
-def _unit_arrow(colour: RGB, opacity: float) -> Shape:
-    """An arrow along z, 1 long, its shaft of radius 1."""
-    return threejs.mesh(*geometry.surface_of_revolution(ARROW), colour, opacity=opacity)
-
-
-@lru_cache(maxsize=64)
-def _unit_cylinder(colour: RGB) -> Shape:
-    """A rod along z, 1 long, of radius 1."""
-    return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14),
-        colour,
-    )
-
-
-@lru_cache(maxsize=64)
-def _unit_disc(colour: RGB) -> Shape:
-    """A disc around z, of radius 1 and thickness 1, its middle at 0."""
-    return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32),
-        colour,
-    )
-
-
-@lru_cache(maxsize=64)
-def _unit_sphere(colour: RGB, on_top: bool = False) -> Shape:
-    return threejs.mesh(*geometry.sphere(1.0), colour, on_top=on_top)
-
-
-@lru_cache(maxsize=1)
-def _unit_cone() -> Shape:
-    """A cone around z, its tip at 0, 1 high, its opening of radius 1."""
-    return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 1.0)], 48),
-        (1.0, 1.0, 1.0),
-        opacity=CONE_ALPHA["inside"],
-    )
-
-
-@lru_cache(maxsize=64)
-def _unit_polyhedron(
-    mu: float, facets: int, inner_approximation: bool, facet_rotation: float
-) -> Shape:
-    rays = FrictionPolyhedron(
-        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
-    ).rays
-    return threejs.mesh(
-        *geometry.pyramid(rays), (1.0, 1.0, 1.0), opacity=CONE_ALPHA["inside"], flat=True
-    )
-
-
-@lru_cache(maxsize=64)
-def _polygonal_rim(
-    mu: float, facets: int, inner_approximation: bool, facet_rotation: float
-) -> Shape:
-    rays = FrictionPolyhedron(
-        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
-    ).rays
-    edges = [
-        geometry.cylinder(a, b, _RIM * mu)
-        for a, b in zip(rays, np.roll(rays, -1, axis=0), strict=True)
-    ]
-    return threejs.mesh(*geometry.merged(edges), PATCH)
-
-
-@lru_cache(maxsize=1)
-def _round_rim() -> Shape:
-    vertices, faces = geometry.torus_arc(1.0, _RIM, 0.0, 2.0 * np.pi)
-    return threejs.mesh(vertices + np.array([0.0, 0.0, 1.0], dtype=np.float32), faces, PATCH)
-
-
-@lru_cache(maxsize=256)
-def _facet(
-    mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int
-) -> Shape:
-    """One side of the polyhedron: facet i lies between rays i - 1 and i."""
-    rays = FrictionPolyhedron(
-        np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
-    ).rays
-    corners = [np.zeros(3), rays[facet - 1], rays[facet]]
-    return threejs.mesh(*geometry.convex_polygon(corners), WARNING, opacity=FACET_ALPHA, flat=True)
-
-
-@lru_cache(maxsize=256)
-def _label(text: str, height: float, plate: bool, colour: RGB, on_top: bool = True) -> Shape:
-    return threejs.label(text, height, plate, colour, on_top)
-
-
-@lru_cache(maxsize=256)
-def _polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
-    return threejs.mesh(*geometry.convex_polygon(corners), colour, opacity=opacity, lit=False)
-
-
-@lru_cache(maxsize=1)
-def _invisible_point() -> Shape:
-    return threejs.lines(np.zeros((2, 3)), PATCH)
 
 
 @lru_cache(maxsize=8)

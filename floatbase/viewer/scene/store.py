@@ -9,15 +9,7 @@ from typing import Any
 import umsgpack
 
 from floatbase.errors import ViewerError
-from floatbase.viewer.scene.protocol import (
-    ANIMATION,
-    Key,
-    Update,
-    checked_control_value,
-    delete,
-    encode,
-    no_animation,
-)
+from floatbase.viewer.scene.protocol import Key, Update, checked_control_value, encode
 
 
 class Scene:
@@ -66,33 +58,6 @@ class Scene:
         return newest, [
             command for _, command in sorted(entry for entry in entries if entry[0] > number)
         ]
-
-    def copy(self) -> Scene:
-        """A copy that later changes do not affect. The two share their commands, so a copy is
-        small.
-        """
-        other = Scene()
-        with self._lock:
-            other.newest, other._entries = self.newest, dict(self._entries)
-        return other
-
-    def commands_from(self, displayed: Scene) -> list[bytes]:
-        """The commands after which a page that shows the scene `displayed` shows this one.
-
-        They draw every object anew, but set only the settings that differ: a view that the reader
-        has turned stays.
-        """
-        with displayed._lock:
-            old = dict(displayed._entries)
-        commands = [delete("/meshcat")[1]]
-        entries = self._sorted_entries()
-        if ANIMATION in old and ANIMATION not in {key for key, _ in entries}:
-            commands.append(no_animation()[1])
-        for key, command in entries:
-            is_setting = not key[0].startswith("/meshcat") and key != ANIMATION
-            if not (is_setting and key in old and old[key][1] == command):
-                commands.append(command)
-        return commands
 
     def command(self, key: Key) -> dict[str, Any] | None:
         """The command of a key, decoded; None where there is none."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -12,16 +11,13 @@ from typing import Any
 class CellEvents:
     """Whether a cell runs. Outside IPython none ever does.
 
-    before_cell: called before each cell. is_running: whether one runs now. ended_at: when the last
-        one ended, s of
-    `time.monotonic`.
+    is_running: whether one runs now. ended_at: when the last one ended, s of `time.monotonic`.
     """
 
-    def __init__(self, before_cell: Callable[[], None]):
+    def __init__(self) -> None:
         shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
         self.is_running = shell is not None  # what asks for this is part of a cell
         self.ended_at = 0.0
-        self._before_cell = before_cell
         self._events = None if shell is None else shell.events
         self._hooks = {"pre_run_cell": self._begin, "post_run_cell": self._end}
         if self._events is not None:
@@ -38,7 +34,6 @@ class CellEvents:
 
     def _begin(self, _: object) -> None:
         self.is_running = True
-        self._before_cell()
 
     def _end(self, _: object) -> None:
         self.is_running, self.ended_at = False, time.monotonic()

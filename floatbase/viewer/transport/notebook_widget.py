@@ -38,8 +38,9 @@ class NotebookWidget(anywidget.AnyWidget):
     """One display of a window's scene.
 
     name: what the picture shows, for screen readers. height: pixels. thumbnail: a PNG of the scene
-        as it is now, for the time
-    until the page has drawn, and for places where no page can; empty for none.
+        as it is when the display opens, for the time until the page has drawn, for places where no
+        page can, and for the time after a newer display has opened; empty for none.
+    is_live: whether this is the newest display. An earlier one shows the thumbnail.
     """
 
     _esm = pages.asset("widget.js")
@@ -47,14 +48,18 @@ class NotebookWidget(anywidget.AnyWidget):
     name = traitlets.Unicode().tag(sync=True)
     height = traitlets.Int().tag(sync=True)
     thumbnail = traitlets.Bytes().tag(sync=True)
+    is_live = traitlets.Bool(True).tag(sync=True)
 
-    def __init__(
-        self, server: Server, display: int, name: str, height: int, thumbnail: bytes = b""
-    ):
+    def __init__(self, server: Server, name: str, height: int, thumbnail: bytes = b""):
         super().__init__(version=_page_code()[0], name=name, height=height, thumbnail=thumbnail)
-        self._output_pages = _OutputPages(self, server, display)
+        self._output_pages = _OutputPages(self, server)
         self.on_msg(self._output_pages.receive)
         receive_during_cells(self)
+
+    def retire(self) -> None:
+        """Show the thumbnail from now on, because a newer display has opened."""
+        self.is_live = False
+        self._output_pages.drop_all()
 
 
 class _OutputPages:
@@ -62,9 +67,8 @@ class _OutputPages:
     server's.
     """
 
-    def __init__(self, widget: NotebookWidget, server: Server, number: int):
-        self._widget, self._number = weakref.ref(widget), number
-        self._server = weakref.ref(server)
+    def __init__(self, widget: NotebookWidget, server: Server):
+        self._widget, self._server = weakref.ref(widget), weakref.ref(server)
         self._pages: dict[str, _WidgetChannel] = {}
         server.on_stop[:] = [
             stop_callback for stop_callback in server.on_stop if stop_callback() is not None
@@ -113,13 +117,18 @@ class _OutputPages:
         for name in list(self._pages)[: 1 - _MAX_PAGES]:
             self.drop(name)
         self._pages[channel.name] = channel
-        channel.page = Connection(server, channel, self._number)
+        channel.page = Connection(server, channel)
         channel.page.next_frame()
 
     def drop(self, name: str) -> None:
         """The page has gone."""
         if name in self._pages:
             self._pages.pop(name).page.close()
+
+    def drop_all(self) -> None:
+        """Send no more frames. Any thread may call this."""
+        if (server := self._server()) is not None:
+            server.call(self._drop_all)
 
     def send(self, content: dict[str, Any], *buffers: bytes) -> None:
         """Send a message to the pages."""
@@ -129,9 +138,12 @@ class _OutputPages:
 
     def _stop(self) -> None:
         """The window closes: the pages keep their pictures."""
+        self._drop_all()
+        self._send_closed()
+
+    def _drop_all(self) -> None:
         for name in list(self._pages):
             self.drop(name)
-        self._send_closed()
 
     def _send_closed(self) -> None:
         self.send({"closed": True})
@@ -175,9 +187,6 @@ class _WidgetChannel(Channel):
 
     def send_frame(self, number: int, data: bytes) -> None:
         self.send({"frame": number}, data)
-
-    def send_text(self, message: str) -> None:
-        self.send({"text": message})
 
     def close_page(self, reason: str) -> None:
         self._display.drop(self.name)

@@ -10,7 +10,6 @@ import socket
 import threading
 import weakref
 from collections.abc import Callable
-from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any
 
@@ -18,19 +17,13 @@ import tornado.httpserver
 import tornado.web
 import tornado.websocket
 
-from floatbase.errors import ViewerError
 from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.connection import Channel, Connection
 from floatbase.viewer.transport.notebook_events import CellEvents
-from floatbase.viewer.transport.output_history import OutputHistory
 from floatbase.viewer.web import pages
 
 FRAME_INTERVAL = 1.0 / 60.0  # s, the least time between two frames
-MAX_MESSAGE_SIZE = (
-    32 << 20
-    # bytes of a message from a page: a picture of the largest screens, which is the longest that
-    # pages send
-)
+MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest reports a control
 
 
 class Server:
@@ -43,8 +36,7 @@ class Server:
     def __init__(self, scene: Scene):
         self.scene = scene
         self.port: int | None = None
-        self.outputs = OutputHistory(scene)
-        self.cells = CellEvents(self.outputs.begin_cell)
+        self.cells = CellEvents()
         self.clients: list[Connection] = []
         self.on_control: Callable[[str, Any], None] | None = None
         # called when the window closes, in the server's thread, as far as their owners still exist
@@ -79,16 +71,6 @@ class Server:
             # after the call: an interrupt between the two causes a second wake-up, not a missing
             # one
             self._requested = number
-
-    def freeze_outputs(self) -> None:
-        """Make the pages of earlier displays keep their pictures."""
-        self.call(self._freeze_outputs)
-
-    def capture(self) -> Future[str]:
-        """Request a picture from the last page, as a data URL."""
-        answer: Future[str] = Future()
-        self.call(self._capture, answer)
-        return answer
 
     @property
     def is_running(self) -> bool:
@@ -155,27 +137,9 @@ class Server:
         wait = min([client.next_frame() for client in list(self.clients)], default=math.inf)
         if wait < math.inf:
             self.flush(wait)
-        seen = (client.sent for client in self.clients if client.displayed is self.scene)
-        self.scene.sent_to_all = min(seen, default=self.scene.newest)
-
-    def _freeze_outputs(self) -> None:
-        for client in list(self.clients):
-            client.freeze()
-
-    def _capture(self, answer: Future[str]) -> None:
-        live = [client for client in self.clients if client.scene is self.scene]
-        if live:
-            live[-1].request_picture(answer)
-        elif self.clients:
-            answer.set_exception(
-                ViewerError(
-                    "every open page keeps an earlier picture; press 'make live' in one of them."
-                )
-            )
-        else:
-            answer.set_exception(
-                ViewerError("the browser closed before the picture was taken; open it again.")
-            )
+        self.scene.sent_to_all = min(
+            (client.sent for client in self.clients), default=self.scene.newest
+        )
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -218,20 +182,14 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
         self.page.receive(message)
 
     def send_frame(self, number: int, data: bytes) -> None:
-        self._write(data, binary=True)
-
-    def send_text(self, message: str) -> None:
-        self._write(message, binary=False)
+        # when the page has gone, `on_close` cleans up
+        with suppress(tornado.websocket.WebSocketClosedError):
+            self.write_message(data, binary=True).add_done_callback(
+                lambda done: done.cancelled() or done.exception()
+            )
 
     def close_page(self, reason: str) -> None:
         self.close(1001, reason)
-
-    def _write(self, message: bytes | str, binary: bool) -> None:
-        """Give a message to the connection. When the page has gone, `on_close` cleans up."""
-        with suppress(tornado.websocket.WebSocketClosedError):
-            self.write_message(message, binary=binary).add_done_callback(
-                lambda done: done.cancelled() or done.exception()
-            )
 
 
 def _application(server: Server) -> tornado.web.Application:

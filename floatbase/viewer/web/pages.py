@@ -1,8 +1,9 @@
-"""The four pages: the live page, the notebook's page, the file, and the inner page.
+"""The page in its four modes, put together from the built files in `dist`.
 
 The live page and that in a notebook follow a window. The file contains a scene and needs no server.
-The inner page shows the scenes that a page around it gives it, one after the other. All load
-meshcat's viewer and give it the same messages (see `protocol.frame`); page.js holds the rest.
+The page in a frame shows the scenes that a page around it gives it, one after the other. All load
+meshcat's viewer and draw the same frames (see `protocol.frame`). `make web` builds `dist` from
+`src`, where page.js says more about the modes.
 """
 
 from __future__ import annotations
@@ -11,56 +12,27 @@ import base64
 import gzip
 import html
 import json
+import re
 from collections.abc import Iterable
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 
-from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import BACKGROUNDS, DARK_SHADES, hex_code
 
-_BODY = """
-<div><div id="meshcat-pane"></div></div>
-<div id="tools"><button type="button" aria-label="first view" title="back to the first view (key: h)">⌂</button>
-<details><summary title="other views, and what is shown">view</summary><div></div></details></div>
-<div id="board" role="group" aria-label="terms of the equation of motion"></div>
-<button id="fold" type="button" aria-label="panel" aria-expanded="true" title="fold the panel"></button><div id="panel"></div>
-<div id="title"></div>
-<div id="legend"><div id="lines"></div><button aria-controls="lines" aria-expanded="false"><span></span>legend</button></div>
-<div id="notice">The viewer is closed, or its kernel was restarted: run its cell again. A page with the same address \
-comes back by itself.</div>
-<div id="kept" title="This viewer is displayed again further down and live there.">kept picture ·
-<button>make live</button></div>
-<div id="player"><button title="play or pause">▶</button><input type="range" min="0" step="0.001" title="time">
-<output></output><select title="speed"><option value="1">1×</option><option value="0.5">½×</option>
-<option value="0.25">¼×</option><option value="0.1">⅒×</option></select></div>
-"""
+DIST = Path(__file__).with_name("dist")
 
 
 @cache
 def viewer_code() -> bytes:
-    """meshcat's viewer, one JavaScript file of the installed package. Raises `ViewerError` without
-    meshcat.
-    """
-    spec = find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise ViewerError(
-            "meshcat is not installed; the viewer needs it. Install it with: pip install meshcat"
-        )
-    return (
-        Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
-    ).read_bytes()
+    """meshcat's viewer, one JavaScript file; vendor/README.md says where it comes from."""
+    return Path(__file__).with_name("vendor").joinpath("meshcat.min.js").read_bytes()
 
 
 @cache
 def live_page() -> str:
     """The page that a window serves."""
-    # the window may close while the page loads
-    start = "window.MeshCat ? startWhenSeen(follow) : comeBack();"
-    return _page(
-        f'<script src="main.min.js"></script><script>{_scripts()}{start}</script>', "floatbase"
-    )
+    return _page("live", '<script src="main.min.js"></script>')
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
@@ -68,66 +40,52 @@ def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
 
     commands: of the scene, as `Scene.file_commands` gives them.
     """
-    text = embedded_viewer_code() + embedded_data("scene", protocol.frame(commands))
-    return _page(f"{text}<script>{_scripts()}open();</script>", title)
+    scene = _embedded_data("scene", protocol.frame(commands))
+    return _page("file", _embedded_viewer_code() + scene, title)
 
 
 @cache
 def embedded_page(code: str) -> str:
-    """A page for a frame inside another page, which gives it scenes (see page.js). code: address of
-    meshcat's viewer.
+    """A page for a frame inside another page, which gives it scenes. code: address of meshcat's
+    viewer.
     """
-    return _page(
-        f'<script src="{html.escape(code)}"></script><script>{_scripts()}waitForScenes();</script>',
-        "floatbase",
-    )
+    return _page("frame", f'<script src="{html.escape(code)}"></script>')
 
 
 @cache
 def notebook_page() -> str:
-    """A page for a frame in a notebook, which gives it the viewer's code and a port to the kernel
-    (see page.js).
-    """
-    return _page(f"<script>{_scripts()}waitForPort();</script>", "floatbase")
-
-
-@cache
-def embedded_viewer_code() -> str:
-    """meshcat's viewer as a script element with the id "viewer-code"; see `embedded_data`."""
-    return embedded_data("viewer-code", viewer_code())
-
-
-def embedded_data(name: str, data: bytes) -> str:
-    """Data as a script element with the id `name`: compressed, in base64. `unpack(name)` in page.js
-    reads it.
-    """
-    packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
-    return f'<script type="text/plain" id="{name}">{packed}</script>'
+    """A page for a frame in a notebook, which gives it meshcat and a port to the kernel."""
+    return _page("notebook")
 
 
 @cache
 def asset(name: str) -> str:
-    """The text of one of the scripts and style sheets beside this file."""
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+    """The text of a built file."""
+    return (DIST / name).read_text(encoding="utf-8")
 
 
-def _scripts() -> str:
-    return "".join(map(asset, ("page.js", "panel.js", "interaction.js", "theme.js"))) + _colours()
+@cache
+def _embedded_viewer_code() -> str:
+    return _embedded_data("viewer-code", viewer_code())
 
 
-def _colours() -> str:
-    """The backgrounds, and the shades of the dark one, for theme.js."""
-    backgrounds = {
-        name: [hex_code(colour) for colour in parts] for name, parts in BACKGROUNDS.items()
+def _embedded_data(name: str, data: bytes) -> str:
+    """Data as a script element with the id `name`: gzip in base64, as loader.js unpacks it."""
+    packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    return f'<script type="text/plain" id="{name}">{packed}</script>'
+
+
+def _page(mode: str, data: str = "", title: str = "floatbase") -> str:
+    """The page in one of its modes. data: script elements that come before its own."""
+    config = {
+        "mode": mode,
+        "backgrounds": {name: [*map(hex_code, colours)] for name, colours in BACKGROUNDS.items()},
+        "shades": {hex_code(colour): hex_code(shade) for colour, shade in DARK_SHADES.items()},
     }
-    night = {hex_code(colour): hex_code(shade) for colour, shade in DARK_SHADES.items()}
-    return f"const BACKGROUNDS = {json.dumps(backgrounds)}, DARK_SHADES = {json.dumps(night)};"
-
-
-def _page(scripts: str, title: str) -> str:
-    return (
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" '
-        'href="data:,">'
-        f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head><body>{_BODY}{scripts}</body></html>"
-    )
+    parts = {
+        "title": html.escape(title),
+        "style": asset("page.css"),
+        "data": data,
+        "script": f"{asset('page.js')}floatbase.open({json.dumps(config)});",
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))

@@ -9,6 +9,7 @@ from typing import Any
 import floatbase
 from floatbase.lessons.publish.site.docstrings import process_docstring, process_signature
 from floatbase.lessons.publish.site.mathml import visit_displaymath, visit_math
+from floatbase.viewer.web import pages
 
 project = "floatbase"
 author = "The floatbase authors"
@@ -38,7 +39,7 @@ html_theme = "sphinx_book_theme"
 html_favicon = "static/icon.svg"
 html_title = "floatbase"
 html_math_renderer = "mathml"
-html_static_path = ["static"]
+html_static_path = ["static", str(pages.DIST / "pictures.js")]
 html_css_files = ["site.css", "pictures.css"]
 html_js_files = [("pictures.js", {"defer": "defer"})]
 html_show_sphinx = False

@@ -78,7 +78,7 @@ def _digest_of_package() -> bytes:
     files = (
         path
         for path in sorted(package.rglob("*.*"))
-        if "publish" not in path.relative_to(package).parts
+        if not {"publish", "node_modules"} & set(path.relative_to(package).parts)
         and path.suffix in (".py", ".json", ".js", ".html")
     )
     return b"".join(path.read_bytes() for path in files)

@@ -1,0 +1,88 @@
+"""What a picture shows beside the robot, its contacts and their forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+import numpy.typing as npt
+
+from floatbase._validation import as_array, as_bool, as_instance, as_strings, short_repr
+from floatbase.errors import InputError
+from floatbase.robots import State
+from floatbase.viewer.scene.shapes import Item
+
+
+class PictureKeywords(TypedDict, total=False):
+    """The fields of `PictureOptions` as arguments by name."""
+
+    com: bool
+    cones: bool
+    arrows: bool
+    support: bool
+    wrench: npt.ArrayLike | None
+    push: tuple[str, npt.ArrayLike] | None
+    ghost: State | None
+    frames: Sequence[str]
+    labels: bool
+    extra: Mapping[str, Item] | None
+    swing_feet: frozenset[str]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PictureOptions:
+    """What a picture shows beside the robot, its contacts and their forces.
+
+    com: whether to draw the centre of mass and its projection on the ground.
+    cones: whether to draw the friction cones.
+    arrows: whether to draw the forces; where not, they still colour the cones.
+    support: whether to draw the convex hull of the contact points.
+    wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a
+        ring around its axis; its radius is that of a force which has this moment at a lever of half
+        the diagonal of the robot's bounding box.
+    push: name of a frame, and the force that acts at its origin, shape (3,), N, world.
+    ghost: another state of the robot, drawn translucent.
+    frames: names of frames whose axes to draw.
+    labels: whether to write the names of the contact points.
+    extra: path -> item, more items from `floatbase.viewer.shapes` or `floatbase.viewer.markers`.
+    swing_feet: names of contacts that do not touch the ground just now: they have no patch and no
+        cone, and do not count for the support region.
+    Raises `InputError` for a value of another kind, and for NaN.
+    """
+
+    com: bool = True
+    cones: bool = True
+    arrows: bool = True
+    support: bool = False
+    wrench: npt.ArrayLike | None = None
+    push: tuple[str, npt.ArrayLike] | None = None
+    ghost: State | None = None
+    frames: Sequence[str] = ()
+    labels: bool = False
+    extra: Mapping[str, Item] | None = None
+    swing_feet: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        for name in ("com", "cones", "arrows", "support", "labels"):
+            as_bool(name, getattr(self, name))
+        if self.wrench is not None:
+            as_array("wrench", self.wrench, (6,), "N and N·m")
+        if self.push is not None:
+            if not isinstance(self.push, tuple | list) or len(self.push) != 2:
+                raise InputError(
+                    f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not '
+                    f"{short_repr(self.push)}."
+                )
+            as_array("force of the push", self.push[1], (3,), "N")
+        if self.ghost is not None:
+            as_instance("ghost", self.ghost, State)
+        as_strings("frames", self.frames)
+        as_instance("swing_feet", self.swing_feet, frozenset)
+        if not isinstance(self.extra, Mapping | None) or not all(
+            isinstance(item, Item) for item in (self.extra or {}).values()
+        ):
+            raise InputError(
+                f"extra must be a picture, path -> item, as shapes and markers make them, not "
+                f"{short_repr(self.extra)}."
+            )

@@ -1,0 +1,117 @@
+// The camera: it follows a node over the ground and fits the picture into what is left of the
+// window. meshcat's own camera node cannot move the point that the mouse turns around.
+
+import {element} from "./dom.js";
+import {beforeRender, findNode, pathNames, three} from "./meshcat.js";
+
+const LAG = 0.3; // s by which it is behind what it follows, so that it does not shake with a step
+const SLOWEST = 1000; // ms between pictures that count: with few of them it must not fall behind
+const WIDE = 1.2; // width over height of a picture that fits a robot; a narrower one is smaller
+const MIN_ZOOM = 0.2; // in the smallest window
+const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
+const REST = 1e-3; // m: closer than this it has arrived
+const COMPANIONS = [
+  ["meshcat", "scale"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"],
+]; // nodes that go along with it
+
+// m: height of the ground under or over a point {x, z}, y up. planes: normal and offset, n·p = d.
+export function groundHeight(planes, {x, z}) {
+  return Math.max(
+    ...planes.map(({normal, offset}) => (offset - normal[0] * x - normal[2] * z) / normal[1]),
+  );
+}
+
+// The fraction of what remains that the camera goes in `elapsed` ms.
+export function followFraction(elapsed) {
+  return 1 - Math.exp(-Math.min(elapsed, SLOWEST) / 1000 / LAG);
+}
+
+// The zoom of a picture of width × height pixels of which a panel takes some.
+export function zoomFor({width, height, panelWidth, panelHeight}) {
+  const fits = Math.min(
+    1, (width - panelWidth) / height / WIDE, (height - panelHeight) / height,
+  );
+  return Math.max(MIN_ZOOM, fits);
+}
+
+export const labelScale = (zoom) => Math.min(1 / zoom, MAX_LABEL_SCALE);
+
+// panel: its width() and height() are pixels that it takes from the picture.
+export function createCamera(viewer, panel) {
+  const {Vector3} = three();
+  // how far the camera has gone with what it follows; where the scale and the lights began
+  const gone = new Vector3(), begin = new Vector3(), from = new Vector3();
+  let path = [], planes = [{normal: [0, 1, 0], offset: 0}], clock = 0;
+  let isSmooth = false, isFirst = true;
+  // pixels by which the middle of the picture is left of the window's, and above it: beside the
+  // panel, and over the player, which would hide the feet
+  const aside = () => panel.width() / 2;
+  const above = () => {
+    const board = panel.height() && element("board").offsetHeight; // terms, over the picture
+    return (element("player").offsetHeight + panel.height() - board) / 2;
+  };
+
+  // Go with what is followed, at one height over the ground. Returns whether it is on its way.
+  function follow() {
+    const now = performance.now();
+    const fraction = isSmooth && !isFirst ? followFraction(now - clock) : 1;
+    clock = now;
+    // searched each time, because another picture has another object there, or none
+    const found = findNode(viewer, path);
+    if (!found) return false;
+    const at = found.object.getWorldPosition(new Vector3());
+    const rise = groundHeight(planes, at) - groundHeight(planes, from);
+    const way = at.clone().sub(from).setY(rise).sub(gone);
+    const step = way.clone().multiplyScalar(way.length() < REST ? 1 : fraction);
+    gone.add(step);
+    viewer.camera.position.add(step);
+    viewer.controls.target.add(step);
+    for (const names of COMPANIONS) { // in our coordinates, z up
+      const {x, y, z} = begin.clone().add(gone);
+      findNode(viewer, names)?.object.position.set(x, -z, y);
+    }
+    isFirst = false;
+    return way.sub(step).length() > 0;
+  }
+  // Labels keep their size where the window is small.
+  function scaleLabels(object) {
+    object.traverse((one) => {
+      if (!one.isSprite) return;
+      one.userData.own ??= one.scale.clone();
+      one.scale.copy(one.userData.own).multiplyScalar(labelScale(viewer.camera.zoom));
+    });
+  }
+  beforeRender(viewer, () => {
+    const isMoving = path.length > 0 && follow();
+    const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+    const zoom = zoomFor(
+      {width: w, height: h, panelWidth: panel.width(), panelHeight: panel.height()},
+    );
+    if (zoom !== viewer.camera.zoom) {
+      viewer.camera.zoom = zoom;
+      viewer.camera.updateProjectionMatrix();
+      scaleLabels(viewer.scene);
+    }
+    if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
+    else viewer.camera.clearViewOffset();
+    return isMoving;
+  });
+  return {
+    aside,
+    scaleLabels,
+    look({fov, position, target}) {
+      viewer.camera.fov = fov;
+      viewer.camera.position.fromArray(position);
+      viewer.controls.target.fromArray(target);
+      gone.set(0, 0, 0);
+      isFirst = true;
+    },
+    setGround(command) { planes = command.planes; },
+    setFollow(command) {
+      path = pathNames(command.node);
+      from.fromArray(command.from);
+      begin.fromArray(command.begin);
+      isSmooth = command.smooth;
+    },
+  };
+}

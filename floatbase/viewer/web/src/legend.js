@@ -1,0 +1,75 @@
+// The legend, at the lower left. Where it would cover what the camera looks at, it is folded into a
+// button: pointing at it or reaching it by the keyboard opens it, a click keeps it open, Escape
+// closes it.
+
+import {element, make} from "./dom.js";
+
+// Whether an open legend would be in the way. All in pixels: lines: the box of the open legend;
+// player: that of the player, null without one; titleBottom: lower edge of the title; aside: by how
+// much the middle of the picture is left of the window's; width, height: of the window.
+export function isCrowded({lines, player, titleBottom, aside, width, height}) {
+  const middle = {x: width / 2 - aside, y: height / 2};
+  const away = Math.hypot(
+    Math.max(middle.x - lines.right, 0), Math.max(lines.top - middle.y, 0),
+  );
+  return away < middle.y // the camera fits what it looks at into a ball as high as the picture
+    || lines.top < titleBottom
+    || (player !== null && lines.right > player.left);
+}
+
+// The items in the colours of a theme, and each of these colours once. items: [colour, text,
+// symbol], …; shade: the colour that a colour has in the theme.
+export function shadedItems(items, shade) {
+  const shaded = items.map(([colour, ...rest]) => [shade(colour), ...rest]);
+  return {shaded, colours: [...new Set(shaded.map(([colour]) => colour))]};
+}
+
+// camera: its aside() is as above.
+export function createLegend(camera, shade) {
+  const legend = element("legend"), lines = element("lines");
+  const button = legend.querySelector("button");
+  const box = (id) => element(id).getBoundingClientRect();
+  let isKept = false, shown = [];
+  const open = (now) => {
+    legend.classList.toggle("open", now);
+    button.setAttribute("aria-expanded", now);
+  };
+  const keep = (now) => { open(isKept = now); };
+  function fold() {
+    legend.classList.remove("folded"); // to measure it as it is when open
+    const player = box("player").width > 0 ? box("player") : null;
+    const crowded = isCrowded({
+      lines: box("lines"), player, titleBottom: box("title").bottom,
+      aside: camera.aside(), width: innerWidth, height: innerHeight,
+    });
+    legend.classList.toggle("folded", crowded && lines.childElementCount > 0);
+    const covers = player !== null && button.getBoundingClientRect().right > player.left;
+    legend.classList.toggle("raised", covers);
+  }
+  legend.onpointerenter = ({pointerType}) => { if (pointerType === "mouse") open(true); };
+  legend.onpointerleave = () => open(isKept);
+  legend.onkeydown = ({key}) => { if (key === "Escape") keep(false); };
+  button.onfocus = () => open(true);
+  button.onblur = () => open(isKept);
+  button.onclick = () => keep(!isKept);
+  const sizes = new ResizeObserver(fold);
+  for (const id of ["meshcat-pane", "player", "panel"]) sizes.observe(element(id));
+  function show(items) {
+    shown = items;
+    const {shaded, colours} = shadedItems(items, shade);
+    lines.replaceChildren(...shaded.map(
+      ([colour, text, symbol]) => make("div", {}, spot(colour, symbol), text),
+    ));
+    button.firstChild.replaceChildren(...colours.map((colour) => spot(colour)));
+    fold();
+  }
+  return {show, redraw: () => show(shown)};
+}
+
+// A patch of a colour, or one of the style sheet's symbols in it: a disc, a ring, a diamond, a
+// line, a cone, a tile, a curl.
+function spot(colour, symbol = "patch") {
+  const made = make("i", {className: symbol});
+  made.style.color = colour;
+  return made;
+}

@@ -1,0 +1,63 @@
+// meshcat's viewer, and all that we change in it. MeshCat is the one global name: its script is
+// loaded before a viewer is made, in the pages in different ways.
+
+/* global MeshCat */
+
+export const three = () => MeshCat.THREE;
+
+export const pathNames = (path) => path.split("/").filter((name) => name);
+
+// Run meshcat's script, where the page does not load it by itself.
+export function runMeshcat(code) {
+  const script = document.createElement("script");
+  script.textContent = code;
+  document.body.append(script);
+  detachGifWorker();
+}
+
+// Why: the script contains a worker of gif.js. Where it is not run as a worker, it takes the page's
+// own `onmessage` and answers every message to the page with another one to itself.
+export function detachGifWorker() {
+  window.onmessage = null;
+}
+
+// meshcat's viewer in an element. Throws where the browser has no WebGL.
+export function createViewer(pane) {
+  const viewer = new MeshCat.Viewer(pane);
+  // meshcat lists all objects there; the page has a panel and a menu of its own
+  viewer.gui.domElement.style.display = "none";
+  return viewer;
+}
+
+// Call hook() before each picture is drawn; where it returns true, another picture follows.
+// Why: meshcat announces no picture, and a camera that follows must move before it is used.
+export function beforeRender(viewer, hook) {
+  const render = viewer.render.bind(viewer);
+  viewer.render = () => {
+    const goesOn = hook();
+    render();
+    if (goesOn) viewer.set_dirty();
+  };
+}
+
+// Have commands done by our own handlers, type -> function(command, meshcat's function), and the
+// others by meshcat. after(command, made) is called after each; made: the object that it has made.
+// Why: meshcat ignores types that it does not know, and a theme repaints what a command makes.
+export function interceptCommands(viewer, handlers, after) {
+  const meshcat = viewer.handle_command.bind(viewer);
+  viewer.handle_command = (command) => {
+    (handlers[command.type] ?? meshcat)(command, meshcat);
+    after(command, command.type === "set_object" ? drawnObject(viewer, command.path) : undefined);
+    viewer.set_dirty();
+  };
+}
+
+// The three.js object of a path; meshcat keeps it in a node below the one that has the transform.
+function drawnObject(viewer, path) {
+  return viewer.scene_tree.find([...pathNames(path), "<object>"]).object;
+}
+
+// The node of a path, or undefined. Why: meshcat's own `find` makes what it does not find.
+export function findNode(viewer, names) {
+  return names.reduce((at, name) => at?.children[name], viewer.scene_tree);
+}

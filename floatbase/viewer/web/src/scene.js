@@ -1,0 +1,76 @@
+// The scene of a page: meshcat's viewer with our commands. It draws the frames that it is given,
+// wherever they come from.
+
+import {createCamera} from "./camera.js";
+import {element} from "./dom.js";
+import {createInteraction} from "./interaction.js";
+import {createLegend} from "./legend.js";
+import {splitFrame} from "./loader.js";
+import {createViewer, interceptCommands} from "./meshcat.js";
+import {createPanel} from "./panel.js";
+import {createPlayer} from "./player.js";
+import {createTheme} from "./theme.js";
+
+// config: {backgrounds, shades}, see theme.js. Throws where the browser has no WebGL.
+export function createScene(config) {
+  const viewer = createViewer(element("meshcat-pane"));
+  let send = () => {};
+  const player = createPlayer(viewer);
+  const panel = createPanel({
+    report: (message) => send(message), redraw: () => viewer.set_dirty(),
+  });
+  const camera = createCamera(viewer, panel);
+  const theme = createTheme(viewer, config);
+  const legend = createLegend(camera, theme.colour);
+  theme.onChange(legend.redraw);
+  const interaction = createInteraction(viewer, camera);
+  new ResizeObserver(([{target}]) => {
+    element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
+  }).observe(element("title"));
+  const handlers = {
+    set_camera: camera.look,
+    set_follow: camera.setFollow,
+    set_ground: camera.setGround,
+    set_views: interaction.setViews,
+    set_title({text}) {
+      element("title").textContent = text;
+      interaction.describe(text);
+    },
+    set_legend: ({items}) => legend.show(items),
+    set_theme: theme.set,
+    set_disconnect_message({text}) { element("notice").textContent = text; },
+    set_animation(command, meshcat) {
+      meshcat(command);
+      player.load(command);
+    },
+    set_control: panel.addControl,
+    set_control_value: panel.setValue,
+    set_text: panel.setText,
+    add_plot_point: panel.addPoint,
+  };
+  interceptCommands(viewer, handlers, (command, made) => {
+    if (made) camera.scaleLabels(made);
+    theme.afterCommand(command, made);
+  });
+  viewer.gui_controllers = panel.controls; // where whoever drives the page from outside finds them
+  return {
+    viewer,
+    // Draw a frame. A command that fails is reported; the others are still done.
+    apply(frame) {
+      for (const command of splitFrame(frame)) {
+        try {
+          viewer.handle_command_bytearray(command);
+        } catch (error) {
+          console.error("floatbase: a drawing command failed", error);
+        }
+      }
+      viewer.num_messages_received++;
+    },
+    handle: (command) => viewer.handle_command(command),
+    fit: () => viewer.set_3d_pane_size(),
+    // a PNG as a data URL
+    capture: () => viewer.capture_image(),
+    // Where what the reader does is sent: call(message), an object.
+    onMessage(call) { send = call; },
+  };
+}

@@ -1,0 +1,31 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import {followFraction, groundHeight, labelScale, zoomFor} from "../src/camera.js";
+
+test("the ground is the highest of its planes", () => {
+  const planes = [{normal: [0, 1, 0], offset: 0}, {normal: [-0.6, 0.8, 0], offset: 0}];
+  assert.equal(groundHeight(planes, {x: -1, z: 3}), 0);
+  assert.ok(Math.abs(groundHeight(planes, {x: 2, z: 0}) - 1.5) < 1e-12);
+});
+
+test("the camera follows alike at any rate of pictures", () => {
+  const remaining = (elapsed) => 1 - followFraction(elapsed);
+  assert.ok(Math.abs(remaining(200) - remaining(50) ** 4) < 1e-12);
+  assert.equal(followFraction(0), 0);
+  assert.equal(followFraction(60000), followFraction(1000)); // a browser that drew nothing
+});
+
+test("a picture is smaller in a narrow window and beside a panel, never larger", () => {
+  const zoom = (width, height, panelWidth = 0, panelHeight = 0) =>
+    zoomFor({width, height, panelWidth, panelHeight});
+  assert.equal(zoom(1600, 600), 1);
+  assert.equal(zoom(600, 600), 1 / 1.2);
+  assert.ok(zoom(900, 600, 340) < zoom(900, 600));
+  assert.equal(zoom(2000, 800, 0, 400), 0.5); // a panel below
+  assert.equal(zoom(10, 2000), 0.2);
+});
+
+test("labels keep their size on the screen until the picture is very small", () => {
+  assert.equal(labelScale(0.8) * 0.8, 1);
+  assert.equal(labelScale(0.2), 1.5);
+});

@@ -1,0 +1,35 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import {isCrowded, shadedItems} from "../src/legend.js";
+
+// a legend 220 pixels wide and 150 high at the lower left
+const crowded = (width, height, more = {}) => isCrowded({
+  lines: {right: 220, top: height - 150}, player: null, titleBottom: 30, aside: 0, width, height,
+  ...more,
+});
+
+test("a legend is open where it is beside what the camera looks at", () => {
+  assert.ok(!crowded(1000, 480));
+  assert.ok(!crowded(1300, 600));
+});
+
+test("a legend is folded where it would cover it, or the title", () => {
+  assert.ok(crowded(420, 360));
+  assert.ok(crowded(590, 480));
+  assert.ok(crowded(1300, 160));
+  assert.ok(crowded(1000, 480, {titleBottom: 340}));
+});
+
+test("a panel and a player take room from a legend", () => {
+  assert.ok(crowded(1000, 480, {aside: 170}));
+  assert.ok(crowded(1300, 600, {player: {left: 200}}));
+  assert.ok(!crowded(1300, 600, {player: {left: 400}}));
+});
+
+test("items are shown in the theme's shades, and each colour once", () => {
+  const items = [["#a", "force", "line"], ["#b", "cone"], ["#a", "another"]];
+  assert.deepEqual(shadedItems(items, (colour) => `dark ${colour}`), {
+    shaded: [["dark #a", "force", "line"], ["dark #b", "cone"], ["dark #a", "another"]],
+    colours: ["dark #a", "dark #b"],
+  });
+});

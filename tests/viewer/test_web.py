@@ -1,0 +1,20 @@
+"""The built JavaScript is that of its sources."""
+
+from __future__ import annotations
+
+import hashlib
+
+from floatbase.viewer.web import pages
+
+WEB = pages.DIST.parent
+
+
+def test_the_built_pages_are_up_to_date() -> None:
+    """As build.mjs computes it."""
+    digest = hashlib.sha256()
+    sources = sorted(path.name for path in (WEB / "src").iterdir())
+    for name in ("build.mjs", "package-lock.json", *(f"src/{name}" for name in sources)):
+        data = (WEB / name).read_bytes()
+        digest.update(f"{name} {len(data)}\n".encode() + data)
+    is_current = (pages.DIST / "sources.sha256").read_text().strip() == digest.hexdigest()
+    assert is_current, "dist/ is older than src/: run `make web` and commit what it builds"
