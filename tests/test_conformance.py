@@ -183,7 +183,8 @@ LEFT_OUT = {
         "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
         "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
         "raibert_foothold",
-        "target_shapes", "targets_at",
+        *(f"{kind}Task.{method}" for method in ("shapes_for", "targets_at")
+            for kind in ("AngularMomentum", "CoM", "Force", "Frame", "Orientation", "Posture", "Torque")),
         "QP.objective", "ModelMismatch.assumed_qp", "ModelMismatch.check_names",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
         "Limits.normal_forces",
