@@ -124,7 +124,7 @@ def right() -> dict[str, Any]:
         "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": UP,
         "npt.ArrayLike": UP, "Target": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
-        "Sequence[Task]": controller().tasks, "Sequence[Contact]": tuple(contacts),
+        "Sequence[Task]": controller().tasks, "Sequence[MotionConstraint]": tuple(contacts),
         "Sequence[str]": ["a", "b"],
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
         "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO,

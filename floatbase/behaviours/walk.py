@@ -472,7 +472,7 @@ class Walk(FixedAttributes):
         """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball.
         position: (3,) m, of its frame.
         """
-        contact = self._all_contacts[foot]
+        contact = self._all_contacts.friction_contact(foot)
         to_ground = (
             getattr(contact, "radius", 0.0) * contact.normal
         )  # a ball touches there however it is turned
@@ -582,7 +582,7 @@ class Walk(FixedAttributes):
             _RAMP_LOAD_FACTOR
             * self.robot.weight
             / len(self._all_contacts)
-            / len(self._all_contacts[foot].point_names)
+            / len(self._single_contacts[foot].point_names)
         )
         minimum = float(self._limits.normal_forces(self._single_contacts[foot], t)[0].max())
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))

@@ -247,7 +247,7 @@ class Limits(Value):
         given = self.max_normal_force
         names = given if isinstance(given, Mapping) else contacts.names
         return np.array(
-            [contact.name in names for contact in contacts for _ in contact.point_names],
+            [c.name in names for c in contacts.friction_contacts for _ in c.point_names],
             dtype=np.bool_,
         )
 
@@ -280,7 +280,7 @@ def _bounds_at(
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
     found = []
-    for each in contacts:
+    for each in contacts.friction_contacts:
         value = given.get(each.name, otherwise)
         if callable(value):
             value = as_positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)

@@ -9,7 +9,14 @@ from floatbase.dynamics.constraint_rank import (
     resolved_constraint,
 )
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
-from floatbase.dynamics.contact import UP, Contact, FlatFootContact, PointContact, grasp_matrix
+from floatbase.dynamics.contact import (
+    UP,
+    FlatFootContact,
+    FrictionContact,
+    MotionConstraint,
+    PointContact,
+    grasp_matrix,
+)
 from floatbase.dynamics.contacts import Contacts, constraint_and_jacobian
 from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
 from floatbase.dynamics.fictitious import (
@@ -36,9 +43,9 @@ from floatbase.dynamics.subspace import (
 
 # fmt: off
 __all__ = [
-    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contact", "Contacts",
+    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts",
     "EquationsOfMotion", "FeasibleSpace",
-    "FlatFootContact", "LinearConstraint", "PointContact", "RollingWheel",
+    "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint", "PointContact", "RollingWheel",
     "accelerations_from_torques", "bias_forces",
     "centripetal_acceleration", "constraint_and_jacobian", "contact_space", "coriolis_matrix",
     "delassus_matrix", "dimensions",

@@ -97,7 +97,9 @@ class Settings(Value):
             if term.perturbation_option and term.name in off
         ]
         if "forces" in off:
-            parts.append(f"disabled_contacts={list(Contacts.feet(robot)[self.leg].point_names)}")
+            parts.append(
+                f"disabled_contacts={list(Contacts.feet(robot).only(self.leg).point_names)}"
+            )
         if "cones" in off:
             parts.append(f"adhesion_force={robot.weight:.0f}")
         return f"Perturbation({', '.join(parts)})"

@@ -18,7 +18,7 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.physics import Push, Simulation
@@ -138,7 +138,7 @@ class Rollout(Value):
             else self.foot_positions - self.rolling_displacement()
         )
         max_distance, first = np.zeros(positions.shape[1]), 0
-        for contact in self.contacts:
+        for contact in self.contacts.friction_contacts:
             points = slice(first, first := first + len(contact.point_names))
             for begin, end in self._stance_intervals(contact.name):
                 distance = np.linalg.norm(
@@ -164,7 +164,7 @@ class Rollout(Value):
         """
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
-            for contact in self.contacts
+            for contact in self.contacts.friction_contacts
             for _ in contact.point_names
         ]
         rates = np.zeros((len(self), len(arms), 3))
@@ -355,16 +355,17 @@ class Recorder:
         lowest = sim._lowest_points(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
+            point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
             forces, positions = (
                 np.full((n, contact.k), np.nan),
-                np.full((n, len(contact.point_names), 3), np.nan),
+                np.full((n, len(point_names), 3), np.nan),
             )
             if contact.name in feet.names:
                 part = feet.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
-                if contact.point_names == feet[contact.name].point_names:
+                if point_names == feet.only(contact.name).point_names:
                     forces, positions = measured[:, points].reshape(n, contact.k), lowest[:, points]
-                elif len(contact.point_names) == 1:
+                elif len(point_names) == 1:
                     forces = measured[:, points].sum(axis=1)
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)

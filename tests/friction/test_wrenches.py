@@ -465,7 +465,7 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
         0.5,
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
-    refused(chimney.torques, InputError, "max_normal_force")
+    refused(chimney.moment_vertices, InputError, "max_normal_force")
     refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])

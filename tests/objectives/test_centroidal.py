@@ -59,7 +59,7 @@ def mujocos_momentum_rate(
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(
         mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
     )
-    owners = [contact.name for contact in contacts for _ in contact.point_names]
+    owners = [contact.name for contact in contacts.friction_contacts for _ in contact.point_names]
     data.qfrc_applied[:] = 0.0
     for frame, point, force in zip(
         owners, contacts.positions(state), forces.reshape(-1, 3), strict=True

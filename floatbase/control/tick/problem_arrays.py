@@ -18,7 +18,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array
-from floatbase.dynamics import Contact, FlatFootContact, PointContact
+from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import Task
 from floatbase.objectives._task import TargetTask
@@ -186,14 +186,17 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 
 
 def _pack_contact(
-    robot: Robot, contact: Contact, options: PolyhedronOptions
+    robot: Robot, contact: MotionConstraint, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
-    n = len(contact.point_names)
+    n = 0
+    cones: Array = np.zeros((0, 5))
+    if isinstance(contact, FrictionContact):
+        n, cones = len(contact.point_names), _cones(contact, options)
     row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k)
-    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), _cones(contact, options)
+    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), cones
 
 
 @lru_cache(maxsize=256)
@@ -216,10 +219,8 @@ def _pack_builtin_contact(
     )
 
 
-def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
+def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
     """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
-    if not contact.point_names:
-        return np.zeros((0, 5))
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
     rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
