@@ -21,8 +21,9 @@ from floatbase.dynamics import (
     view_from_rotating_frame,
 )
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
+from floatbase.lessons.lessonC import table_top
 from floatbase.objectives import AngularMomentumTask, torques_from_forces
-from floatbase.qp import active_set, table_top
+from floatbase.qp import active_set
 from floatbase.simulation import Perturbation, PushRecovery, Table
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -146,6 +146,7 @@ class Limits(Value):
     Raises `InputError` for values that do not fit.
     """
 
+    _example = "controller.limits"
     torque_limits: Array
     facets: int = 4
     inner_approximation: bool = True

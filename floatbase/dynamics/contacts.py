@@ -46,6 +46,7 @@ class Contacts(Value):
     Raises `InputError` for a name that stands twice.
     """
 
+    _example = "fb.Contacts.points(robot)"
     items: Sequence[MotionConstraint]
 
     def __post_init__(self) -> None:

@@ -30,6 +30,7 @@ class EquationsOfMotion(Value):
     A, b: (m, nv) and (m,), the rows of (5), in m/s² (rad/s² where they are angular).
     """
 
+    _example = "fb.equations_of_motion(state, contacts)"
     state: State
     contacts: Contacts
     M: Array

@@ -27,7 +27,6 @@ from floatbase.objectives.motion_tasks import (
 from floatbase.objectives.pullback import (
     argmin_coordinates,
     cost_on_space,
-    cost_on_torques,
     minimum_norm_coordinates,
     minimum_norm_pullback,
     partial_minimum,
@@ -40,7 +39,7 @@ __all__ = [
     "Task", "TorqueTask", "TorquesFromForces",
     "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
     "com_wrench_map",
-    "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "minimum_norm_coordinates",
+    "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",
     "minimum_norm_pullback",
     "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks",
     "tangential_bias",

@@ -2,7 +2,7 @@
 course text).
 """
 
-from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
+from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_constraints
 from floatbase.qp.labels import ConstraintLabel
 from floatbase.qp.linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
@@ -15,5 +15,4 @@ __all__ = [
     "ConstraintLabel", "Iteration",
     "Residuals", "Solution", "active_set", "check_solver", "conflicting_constraints",
     "linear_program", "solve", "solvers",
-    "table_top",
 ]  # fmt: skip

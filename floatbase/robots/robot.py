@@ -105,6 +105,7 @@ class Robot(Value):
     (1) is singular.
     """
 
+    _example = 'fb.load("go2")'
     name: str
     model: pin.Model
     urdf: str

@@ -41,6 +41,7 @@ class State(Value):
     sin) of joints without limits) that are not of unit length.
     """
 
+    _example = "robot.standing()"
     robot: Robot
     q: Array
     v: Array

@@ -127,6 +127,7 @@ class Simulation(FixedAttributes):
     the first.
     """
 
+    _example = "fb.Simulation(robot)"
     _hints: ClassVar[dict[str, str]] = {
         **dict.fromkeys(
             ("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _RECREATE_HINT

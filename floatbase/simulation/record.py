@@ -60,6 +60,7 @@ class Rollout(Value):
         τ_desired is that of the joint damping, planned forces are NaN.
     """
 
+    _example = "fb.rollout(sim, controller, duration=1.0)"
     robot: Robot
     contacts: Contacts
     time: Array

@@ -443,7 +443,6 @@ EOM = fb.equations_of_motion(STATE, FEET)
         (lambda: objectives.desired_wrench(STATE, [0.0, 0.0]), "com_acceleration", 2, 3),
         (lambda: objectives.torques_from_forces(EOM).distance(np.zeros(9)), "forces", 9, 12),
         (lambda: objectives.torques_from_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
-        (lambda: objectives.cost_on_torques(Quadratic.zero(12), EOM), 18, 12),
         (
             lambda: objectives.partial_minimum(Quadratic.zero(12), fb.feasible_space(EOM), "lambda"),
             "lambda", "qdd", "tau", "forces",
