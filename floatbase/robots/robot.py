@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from threading import local
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 # quaternions printed with seven digits pass; normalising what is further off could hide a fault
 UNIT_NORM_TOLERANCE = 1e-6
-_DATA_POOL_SIZE = 4  # as many results as threads are likely to ask for at once
 _LIMIT_TOLERANCE = 1e-6  # rad or m: angles printed with seven digits pass
 # least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves
 # 1e-15
@@ -251,11 +250,9 @@ class Robot(Value):
         return self.mass * self.gravity
 
     @cached_property
-    def _data_pool(self) -> deque[pin.Data]:
-        """Memory of states that are gone, for Pinocchio's results of the next one: making it takes
-        longer than filling it.
-        """
-        return deque(maxlen=_DATA_POOL_SIZE)
+    def _workspace(self) -> Workspace:
+        """Memory for Pinocchio's results at a state."""
+        return Workspace(self.model)
 
     @cached_property
     def base(self) -> str:
@@ -358,6 +355,20 @@ class Robot(Value):
             f"Robot({self.name!r}, {base} base, d={self.d} joints, {len(self.feet)} feet, "
             f"{self.mass:.1f} kg)"
         )
+
+
+class Workspace(local):
+    """Memory for Pinocchio's results, one for each thread: making it takes longer than filling it.
+
+    data: the results.
+    state: whose they are, a weak reference.
+    has_jacobians: whether the Jacobians of the joints are among them.
+    """
+
+    def __init__(self, model: pin.Model):
+        self.data = model.createData()
+        self.state: Callable[[], State | None] = lambda: None
+        self.has_jacobians = False
 
 
 def has_floating_base(model: pin.Model) -> bool:
