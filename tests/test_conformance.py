@@ -179,8 +179,7 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
         "Simulation.advance", "PerturbedSimulation.advance",
-        "Conversion", "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
-        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
+        "Conversion", "conflicting_constraints", "constraint_and_jacobian",
         "raibert_foothold",
         *(f"{kind}Task.{method}" for method in ("shapes_for", "targets_at")
             for kind in ("AngularMomentum", "CoM", "Force", "Frame", "Orientation", "Posture", "Torque")),

@@ -31,7 +31,8 @@ from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import ConstraintLabel
-from floatbase.robots import Robot, as_torque_limits
+from floatbase.robots import Robot
+from floatbase.robots._checks import as_torque_limits
 
 BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
 SIZES = {

@@ -18,7 +18,8 @@ from floatbase._validation import (
     read_only,
     unit_vector,
 )
-from floatbase.robots import State, as_corners
+from floatbase.robots import State
+from floatbase.robots._checks import as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete

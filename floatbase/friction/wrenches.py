@@ -30,9 +30,9 @@ from floatbase._validation import (
 )
 from floatbase.dynamics import Contacts, FrictionContact, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction._polytopes import cone_face_matrix, polytope_vertices
 from floatbase.friction.cones import FrictionPolyhedron
-from floatbase.friction.polytopes import cone_face_matrix, polytope_vertices
-from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
+from floatbase.qp._linear_programs import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
 # N, by which `contains` lets contact forces pass their facets: what a linear program leaves

@@ -14,7 +14,8 @@ from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.objectives._task import Shapes, Target, TargetTask, Task
-from floatbase.robots import Robot, State, check_unit_norms
+from floatbase.robots import Robot, State
+from floatbase.robots._checks import check_unit_norms
 
 _ZERO3 = (0.0, 0.0, 0.0)
 _POINT: Shapes = {"position": (3,), "velocity": (3,), "acceleration": (3,)}

@@ -20,7 +20,8 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
-from floatbase.robots.robot import Robot, check_unit_norms
+from floatbase.robots._checks import check_unit_norms
+from floatbase.robots.robot import Robot
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import InputError
-from floatbase.robots.robot import has_floating_base
+from floatbase.robots._checks import has_floating_base
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # types of joints that need a <limit>

@@ -20,20 +20,17 @@ from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.lessons.lessonC import table_top
 from floatbase.qp import (
-    INFEASIBLE,
-    OPTIMAL,
     QP,
-    UNBOUNDED,
     ConstraintLabel,
     Residuals,
     Solution,
     active_set,
     check_solver,
     conflicting_constraints,
-    linear_program,
     solve,
     solvers,
 )
+from floatbase.qp._linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
 
 seeds = st.integers(0, 100_000)
 
@@ -368,7 +365,12 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
             )
             for most in (0, -1, 1.5, "3")
         ],
-        (lambda: active_set(table_top(), max_iterations=True), InputError, "max_iterations", "True"),
+        (
+            lambda: active_set(table_top(), max_iterations=True),
+            InputError,
+            "max_iterations",
+            "True",
+        ),
     ],
 )
 def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:
