@@ -30,13 +30,20 @@ def convex_hull(points: Array) -> Array:
 
     Points on one line give the two ends of the segment, equal points give one.
     """
-    from scipy.spatial import ConvexHull, QhullError  # slow to load
-
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:  # fewer than three points, or points on one line
-        ends = points[np.lexsort(points.T[::-1])][[0, -1]]
-        return np.asarray(ends if np.any(ends[0] != ends[1]) else ends[:1])
+    # Andrew, Another efficient algorithm, 1979. scipy's takes 0.1 ms more, and `Stand` asks at each
+    # control step.
+    ordered = sorted(set(map(tuple, points.tolist())))
+    corners: list[tuple[float, ...]] = []
+    for line in (ordered, ordered[::-1]):
+        half: list[tuple[float, ...]] = []
+        for x, y in line:
+            while len(half) > 1 and (half[-1][0] - half[-2][0]) * (y - half[-2][1]) <= (
+                half[-1][1] - half[-2][1]
+            ) * (x - half[-2][0]):
+                half.pop()
+            half.append((x, y))
+        corners += half[:-1]
+    return np.array(corners or ordered)
 
 
 def distance_to_polygon(points: Array, polygon: Array) -> Array:
@@ -55,7 +62,9 @@ def distance_to_polygon(points: Array, polygon: Array) -> Array:
         edges[:, 0] * from_corners[..., 1] - edges[:, 1] * from_corners[..., 0]
     ) / lengths  # of the points above the edges' lines
     nearest = heights.min(axis=-1)
+    inside = (nearest >= 0.0) & (len(polygon) > 2)
+    if np.all(inside):
+        return np.asarray(nearest)
     fractions = np.clip(np.sum(from_corners * edges, axis=-1) / lengths**2, 0.0, 1.0)
     to_edges = np.linalg.norm(from_corners - fractions[..., None] * edges, axis=-1).min(axis=-1)
-    inside = (nearest >= 0.0) & (len(polygon) > 2)
     return np.asarray(np.where(inside, nearest, -to_edges))
