@@ -6,9 +6,8 @@ import functools
 import inspect
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
-from difflib import get_close_matches
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeAlias, TypeVar, overload
+from typing import Any, Self, TypeAlias, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -88,41 +87,6 @@ class Value:
             object.__setattr__(
                 self, name, MappingProxyType(value) if type(value) is dict else value
             )
-
-
-class FixedAttributes:
-    """Base of objects that keep what they were made with: once they are `_initialised`, no public
-    attribute changes.
-
-    A class derived from one of them may set attributes of its own; properties that can be set stay
-    so.
-    """
-
-    _hints: ClassVar[dict[str, str]] = {}  # by public name: what to do instead of assigning to it
-
-    def __setattr__(self, name: str, value: object) -> None:
-        has_hint = name in self._hints
-        settable = (
-            name.startswith("_")
-            or getattr(getattr(type(self), name, None), "fset", None) is not None
-        )
-        if (
-            settable
-            or "_initialised" not in vars(self)
-            or not (has_hint or FixedAttributes in type(self).__bases__)
-        ):
-            object.__setattr__(self, name, value)
-            return
-        cls = type(self).__name__
-        if has_hint:
-            raise InputError(
-                f"{name} of a {cls} cannot be set once it is made: {self._hints[name]}."
-            )
-        close = get_close_matches(name, self._hints, n=1)
-        raise InputError(
-            f"a {cls} has no {name!r} to "
-            f"set{f'; {close[0]}? {self._hints[close[0]]}' if close else ''}."
-        )
 
 
 def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:

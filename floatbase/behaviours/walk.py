@@ -9,14 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import copysign, hypot, inf, sqrt
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import (
     Array,
-    FixedAttributes,
     as_array,
     as_callable,
     as_instance,
@@ -31,7 +30,7 @@ from floatbase.behaviours.reference import Motion, Reference, SwingState, rotate
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError
+from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
 from floatbase.robots import Robot, State
 
@@ -58,7 +57,6 @@ _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
 _RAMP_LOAD_FACTOR = (
     2.0  # times its even share of the weight: the normal force from which a ramp comes down
 )
-_SOFT_CONTACT_WEIGHT = 1e4  # weight of contacts that must give way, beside 10 of the tasks
 _MAX_SPEED = 10.0  # m/s and rad/s: more is a slip of units
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
@@ -85,7 +83,7 @@ class StepPlan:
     swings: dict[str, Swing]
 
 
-class Walk(FixedAttributes):
+class Walk:
     """Walks by a gait at a velocity: a controller like any other, for `fb.rollout`,
     `LiveSimulation`, `fb.sweep` and `fb.push_recovery`.
 
@@ -120,19 +118,6 @@ class Walk(FixedAttributes):
     they are at each tick. Raises `InputError` for arguments that do not fit.
     """
 
-    _hints: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(
-            ("robot", "clearance", "reach", "ramp", "foothold", "gains", "omega"),
-            "make another one",
-        ),
-        **dict.fromkeys(
-            ("time", "stance", "contacts", "footholds", "swings", "plan", "history"),
-            "it tells what it is doing",
-        ),
-    }
-
-    history: deque[StepPlan]
-
     def __init__(
         self,
         robot: Robot,
@@ -148,15 +133,15 @@ class Walk(FixedAttributes):
         gains: Gains | None = None,
         **options: Any,
     ):
-        self.robot, self._all_contacts = (
+        self._robot, self._all_contacts = (
             as_instance("robot", robot, Robot),
             as_instance("contacts", contacts, Contacts),
         )
         self._flat_feet = flat_foot_names(contacts)
         self._reference: Reference | None = None
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
-        self.clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
-        self.reach = as_positive(
+        self._clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
+        self._reach = as_positive(
             "reach",
             (_DEFAULT_REACH_FLAT if self._flat_feet else _DEFAULT_REACH)
             if reach is None
@@ -164,13 +149,13 @@ class Walk(FixedAttributes):
             "m",
             maximum=1.0,
         )
-        self.ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
-        self.foothold = (
+        self._ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
+        self._foothold = (
             raibert_foothold
             if foothold is None
             else as_callable("foothold", foothold, "foothold(foot, touchdown, walk)")
         )
-        self.gains = (
+        self._gains = (
             Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains)
         )
         check_options(type(self).__name__, options)
@@ -187,9 +172,48 @@ class Walk(FixedAttributes):
             name: position - [*centre, 0.0] for name, position in positions.items()
         }
         ground = float(contacts.positions(self._standing_state)[:, 2].mean())
-        self.omega = sqrt(robot.gravity / (self._standing_state.com[2] - ground))
+        self._omega = sqrt(robot.gravity / (self._standing_state.com[2] - ground))
         self._clear()
-        self._initialised = True
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def clearance(self) -> float:
+        """m, how high feet are lifted."""
+        return self._clearance
+
+    @property
+    def reach(self) -> float:
+        """m, how far a foot may land from where it would stand below the body."""
+        return self._reach
+
+    @property
+    def ramp(self) -> float:
+        """s, in which a foot is unloaded or loaded."""
+        return self._ramp
+
+    @property
+    def foothold(self) -> Foothold:
+        """Where a foot should land."""
+        return self._foothold
+
+    @property
+    def gains(self) -> Gains:
+        """Gains of the tasks."""
+        return self._gains
+
+    @property
+    def omega(self) -> float:
+        """1/s, of the pendulum."""
+        return self._omega
+
+    @property
+    def history(self) -> deque[StepPlan]:
+        """Plans of the last changes of stance."""
+        return self._history
 
     @property
     def gait(self) -> Gait:
@@ -235,8 +259,8 @@ class Walk(FixedAttributes):
     @property
     def contacts(self) -> Contacts:
         """The contacts of the present stance."""
-        key = (self.stance, False)
-        return self._controllers[key].contacts if key in self._controllers else self._all_contacts
+        controller = self._controllers.get(self.stance)
+        return self._all_contacts if controller is None else controller.contacts
 
     @property
     def footholds(self) -> dict[str, Array]:
@@ -290,10 +314,7 @@ class Walk(FixedAttributes):
         if stance != ref.stance or t >= ref.replan_time:
             self._replan(state, stance)
         self._adjust_footholds(state)
-        try:
-            return self._stance_controller()(q, v, t)
-        except InfeasibleError:  # torques and friction do not hold the feet
-            return self._stance_controller(contact_weight=_SOFT_CONTACT_WEIGHT)(q, v, t)
+        return self._stance_controller()(q, v, t)
 
     @property
     def _ref(self) -> Reference:
@@ -314,9 +335,9 @@ class Walk(FixedAttributes):
         )
 
     def _clear(self) -> None:
-        self._controllers: dict[tuple[tuple[str, ...], bool], WholeBodyController] = {}
+        self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         self._reference = None
-        vars(self)["history"] = deque(maxlen=_HISTORY_LENGTH)
+        self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _path_at(self, t: float) -> tuple[Array, float, Array]:
         """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once
@@ -514,22 +535,19 @@ class Walk(FixedAttributes):
         position[1] = side * max(side * position[1], _MIN_SIDE_FRACTION * abs(nominal[1]))
         return body + rotated_by_yaw(position, yaw)
 
-    def _stance_controller(self, **options: Any) -> WholeBodyController:
-        """The controller of the present stance, made when it is first needed. options: more of
-        them.
-        """
+    def _stance_controller(self) -> WholeBodyController:
+        """The controller of the present stance, made when it is first needed."""
         stance = self._ref.stance
-        key = (stance, bool(options))
-        if key not in self._controllers:
-            arguments = {
+        if stance not in self._controllers:
+            arguments: dict[str, Any] = {
                 "max_normal_force": self._normal_force_bounds(stance),
+                "on_infeasible": "soften",  # torques and friction may not hold the feet
                 **self._options,
-                **options,
             }
-            self._controllers[key] = WholeBodyController(
+            self._controllers[stance] = WholeBodyController(
                 self.robot, self._all_contacts.only(*stance), self._tasks(stance), **arguments
             )
-        return self._controllers[key]
+        return self._controllers[stance]
 
     def _tasks(self, stance: Sequence[str]) -> list[Task]:
         """The tasks of a stance; their targets follow the reference."""
@@ -542,7 +560,7 @@ class Walk(FixedAttributes):
             ),
             PostureTask(self._standing_state.q, kp=posture, weight=posture_weight),
         ]
-        for foot in set(self._all_contacts.names) - set(stance):
+        for foot in [name for name in self._all_contacts.names if name not in stance]:
             tasks.append(
                 FrameTask(foot, partial(self._foot_target, foot), kp=swing, weight=swing_weight)
             )
@@ -592,7 +610,7 @@ class Walk(FixedAttributes):
         return {
             key: value
             for key, value in vars(self).items()
-            if key not in ("_controllers", "_reference", "history")
+            if key not in ("_controllers", "_reference", "_history")
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -121,10 +121,8 @@ class AnalyticController(Value):
                 f"{self.robot.name}."
             )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
-        R, R_desired = (
-            state.frame_pose("base").rotation,
-            self._desired_state.frame_pose("base").rotation,
-        )
+        R = state.frame_pose("base").rotation
+        R_desired = self._desired_state.frame_pose("base").rotation
         angular_acceleration = (
             -self._kp * pin.log3(R @ R_desired.T) - self._kd * state.frame_velocity("base")[3:]
         )

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
 from floatbase._validation import (
     MAX_MAGNITUDE,
     Array,
-    FixedAttributes,
     as_array,
     as_instance,
     as_number,
+    cached_property,
     numeric_copy,
     read_only,
 )
@@ -23,34 +23,20 @@ from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
 from floatbase.control.model_mismatch import NO_MISMATCH, ModelMismatch
 from floatbase.control.problem import Problem, dry_run
-from floatbase.control.soft import contact_weight_of, with_soft_contacts
+from floatbase.control.soft import SOFT_CONTACT_WEIGHT, contact_weight_of, with_soft_contacts
 from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, unknown_name
+from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver, solve
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
-
-_MAKE_NEW = "make another, fb.WholeBodyController(robot, contacts, tasks, {}=…)"
-_OPTIONS = (
-    "facets",
-    "inner_approximation",
-    "facet_rotation",
-    "min_normal_force",
-    "max_normal_force",
-    "torque_limits",
-    "inequalities",
-    "contact_weight",
-    "mismatch",
-    "solver",
-    "backend",
-)
+OnInfeasible: TypeAlias = Literal["raise", "soften"]
 
 
-class WholeBodyController(FixedAttributes):
+class WholeBodyController:
     """(26)(27) at every tick: the torques that serve the tasks best while (7), friction, contacts
     and motors allow them.
 
@@ -72,6 +58,8 @@ class WholeBodyController(FixedAttributes):
         contact_weight ‖A q̈ - b‖² into the objective instead: contacts give way where torques and
         friction do not suffice to hold them, and only user-defined rows and bounds of normal forces
         can make a tick infeasible.
+    on_infeasible: "raise" raises `InfeasibleError`. "soften" answers a tick without a solution once
+        more with contact_weight=1e4, and sets `Command.softened`.
     mismatch: what is taken for (7), the truth by default, see `floatbase.control.ModelMismatch`;
         any other takes the reference backend.
     solver: one of `floatbase.qp.solvers()`.
@@ -81,31 +69,22 @@ class WholeBodyController(FixedAttributes):
 
     The attribute `backend` says which backend runs, `backend_reason` why. `problem` is what is
     solved. The first compiled controller ever compiles for about a minute, unless the set-up did
-    (`python -m floatbase compile`). Later ones load what was compiled, from the package's folder,
-    the user's cache or NUMBA_CACHE_DIR, whichever can be written to; they answer alike to the bit,
-    and the process that compiled may differ by rounding. Where nothing can be kept,
+    (`python -m floatbase compile`). Later ones load that code from disk and answer alike to the
+    bit; the process that compiled may differ by rounding. Where the code cannot be kept on disk,
     `backend_reason` says why. A state that the compiled tick cannot answer to the last digits, or
     that has no answer, is handed to the reference backend, and its `Command.backend` says so.
 
     Functions of t and user-defined objects are tried once when a controller is made with them, at t
-    = 0, where the robot
-    stands: a trajectory that begins later must give something at 0 too.
+    = 0, where the robot stands: a trajectory that begins later must give something at 0 too.
+
+    Attributes cannot be set. `controller.replace(contacts=…)`, also with tasks or limits, makes a
+    new controller.
 
     Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows
     in conflict.
     """
 
-    _hints: ClassVar[dict[str, str]] = {
-        **{
-            name: f"controller.replace({name}=…) is a new one that has it"
-            for name in ("contacts", "tasks", "limits")
-        },
-        **{name: _MAKE_NEW.format(name) for name in _OPTIONS},
-        **dict.fromkeys(
-            ("robot", "problem", "compiled", "backend_reason", "requested_backend"),
-            _MAKE_NEW.format("…"),
-        ),
-    }
+    _softened = False  # whether this controller answers what another one finds infeasible
 
     def __init__(
         self,
@@ -121,18 +100,16 @@ class WholeBodyController(FixedAttributes):
         torque_limits: npt.ArrayLike | None = None,
         inequalities: Sequence[LinearInequality] = (),
         contact_weight: float | None = None,
+        on_infeasible: OnInfeasible = "raise",
         mismatch: ModelMismatch = NO_MISMATCH,
         solver: str = "daqp",
         backend: Backend = "auto",
     ):
         as_instance("robot", robot, Robot)
-        limits = (
-            robot.torque_limits
-            if torque_limits is None
-            else as_torque_limits(robot.d, torque_limits)
-        )
-        checked_limits = Limits(
-            limits,
+        if torque_limits is None:
+            torque_limits = robot.torque_limits
+        limits = Limits(
+            as_torque_limits(robot.d, torque_limits),
             facets,
             inner_approximation,
             min_normal_force,
@@ -140,37 +117,36 @@ class WholeBodyController(FixedAttributes):
             inequalities,
             facet_rotation,
         )
-        problem = Problem(robot, contacts, tasks, checked_limits, mismatch)
+        problem = Problem(robot, contacts, tasks, limits, mismatch)
         if contact_weight is not None:
-            problem = Problem(
-                robot,
-                *with_soft_contacts(contacts, problem.tasks, contact_weight),
-                checked_limits,
-                mismatch,
-            )
+            problem = _softened(problem, contact_weight)
         mismatch.check_names(contacts)
-        checked_limits.check_names(contacts.names, _foot_frames(robot))
-        with dry_run():
-            problem.qp(
-                robot.standing()
-                # names that do not exist and shapes that do not fit are told now, and not in the
-                # loop
-            )
-        self._prepare(problem, solver, backend)
+        limits.check_names(contacts.names, _foot_frames(robot))
+        with dry_run():  # unknown names and shapes that do not fit raise here, not in the loop
+            problem.qp(robot.standing())
+        check_solver(solver)
+        _check_choice("backend", backend, Backend)
+        _check_choice("on_infeasible", on_infeasible, OnInfeasible)
+        self._prepare(problem, solver, backend, on_infeasible)
 
     def _prepare(
-        self, problem: Problem, solver: str, backend: Backend, warm_up: bool = True
+        self,
+        problem: Problem,
+        solver: str,
+        backend: Backend,
+        on_infeasible: OnInfeasible,
+        warm_up: bool = True,
     ) -> None:
         """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run
         it once, outside the loop.
         """
-        self.problem, self.solver, self.requested_backend = problem, solver, backend
-        check_solver(solver)
-        if not isinstance(backend, str) or backend not in get_args(Backend):
-            raise unknown_name("backend", backend, get_args(Backend))
-        reason = (
-            "it was requested" if backend == "reference" else _unsupported_reason(problem, solver)
-        )
+        self._problem, self._settings = problem, (solver, backend, on_infeasible)
+        if backend == "reference":
+            reason = "it was requested"
+        elif not problem.mismatch.is_exact:
+            reason = "its model mismatch is not zero"
+        else:
+            reason = unsupported_reason(problem, solver)
         compiled = None if reason else CompiledTick(problem)
         if compiled is not None and warm_up:
             reason = compiled.warm_up()
@@ -179,43 +155,72 @@ class WholeBodyController(FixedAttributes):
                 f'backend="compiled" is not possible: {reason}. backend="auto" takes the fastest '
                 f"that is."
             )
-        self.compiled = None if reason else compiled
-        self.backend: Literal["compiled", "reference"] = "reference" if reason else "compiled"
-        self.backend_reason = reason or "nothing stands in its way" + cache_warning()
-        self._initialised = True
+        self._compiled = None if reason else compiled
+        self._backend_reason = reason or "nothing stands in its way" + cache_warning()
 
-    def __getstate__(self) -> tuple[Problem, str, Backend]:
+    def _with_problem(self, problem: Problem) -> WholeBodyController:
+        """A controller of another problem with the same settings."""
+        other = object.__new__(type(self))
+        other._prepare(problem, *self._settings, warm_up=self._compiled is None)
+        return other
+
+    def __getstate__(self) -> tuple[Problem, tuple[str, Backend, OnInfeasible]]:
         """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory
         and is made anew.
         """
-        return self.problem, self.solver, self.requested_backend
+        return self._problem, self._settings
 
-    def __setstate__(self, state: tuple[Problem, str, Backend]) -> None:
-        self._prepare(*state)
+    def __setstate__(self, state: tuple[Problem, tuple[str, Backend, OnInfeasible]]) -> None:
+        self._prepare(state[0], *state[1])
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is solved."""
+        return self._problem
+
+    @property
+    def solver(self) -> str:
+        """The solver of the reference backend."""
+        return self._settings[0]
+
+    @property
+    def compiled(self) -> CompiledTick | None:
+        """The compiled tick, None on the reference backend."""
+        return self._compiled
+
+    @property
+    def backend(self) -> Literal["compiled", "reference"]:
+        """The backend that runs."""
+        return "reference" if self._compiled is None else "compiled"
+
+    @property
+    def backend_reason(self) -> str:
+        """Why that backend runs."""
+        return self._backend_reason
 
     @property
     def robot(self) -> Robot:
         """The robot to control."""
-        return self.problem.robot
+        return self._problem.robot
 
     @property
     def contacts(self) -> Contacts:
         """Its contacts."""
-        return self.problem.contacts
+        return self._problem.contacts
 
     @property
     def tasks(self) -> Sequence[Task]:
         """All tasks, with the regularisation that was added."""
-        return self.problem.tasks
+        return self._problem.tasks
 
     @property
     def limits(self) -> Limits:
         """Friction, normal forces and torque limits."""
-        return self.problem.limits
+        return self._problem.limits
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP of one tick, to look at."""
-        return self.problem.qp(state, t)
+        return self._problem.qp(state, t)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time
@@ -225,12 +230,29 @@ class WholeBodyController(FixedAttributes):
             t = as_number("t", t, "s")
         if v is None:  # State takes it for rest; here it is a slip
             as_array("v", v, (self.robot.nv,))
-        command = None if self.compiled is None else self._compiled_command(self.compiled, q, v, t)
+        try:
+            return self._answer(q, v, t)
+        except InfeasibleError:
+            if self._settings[2] == "raise" or contact_weight_of(self.tasks) is not None:
+                raise
+            return self._soft_controller._answer(q, v, t)
+
+    @cached_property
+    def _soft_controller(self) -> WholeBodyController:
+        """The same controller with soft contacts."""
+        other = self._with_problem(_softened(self._problem, SOFT_CONTACT_WEIGHT))
+        other._softened = True
+        return other
+
+    def _answer(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command:
+        command = (
+            None if self._compiled is None else self._compiled_command(self._compiled, q, v, t)
+        )
         if command is not None:
             return command
         solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
-        return Command(tau, qdd, forces, self.contacts, "reference", solution)
+        return Command(tau, qdd, forces, self.contacts, "reference", solution, self._softened)
 
     def _compiled_command(
         self, tick: CompiledTick, q: npt.ArrayLike, v: npt.ArrayLike, t: float
@@ -254,6 +276,7 @@ class WholeBodyController(FixedAttributes):
             self.contacts,
             "compiled",
             solution,
+            self._softened,
         )
 
     def _solution_of(
@@ -262,7 +285,7 @@ class WholeBodyController(FixedAttributes):
         """The reference problem at q, v and t, with what `CompiledTick.__call__` returned for them
         as its solution.
         """
-        tick = self.compiled
+        tick = self._compiled
         assert tick is not None  # it answered
         x, mu = result[: tick.forces.stop], tick.multipliers(result, n_active, inputs)
         return Solution(tick.qp(q, v, t, inputs), x, mu, "compiled", n_active)
@@ -279,17 +302,14 @@ class WholeBodyController(FixedAttributes):
 
         Other limits: `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
         """
-        weight = contact_weight_of(self.tasks)
-        if weight is not None:
-            contacts, tasks = with_soft_contacts(
-                self.contacts if contacts is None else contacts,
-                self.tasks if tasks is None else tasks,
-                weight,
-            )
-        new: dict[str, Any] = {"contacts": contacts, "tasks": tasks, "limits": limits}
         problem = replace(
-            self.problem, **{name: value for name, value in new.items() if value is not None}
+            self._problem,
+            contacts=self.contacts if contacts is None else contacts,
+            tasks=self.tasks if tasks is None else tasks,
+            limits=self.limits if limits is None else limits,
         )
+        if (weight := contact_weight_of(self.tasks)) is not None:
+            problem = _softened(problem, weight)
         if limits is not None:
             limits.check_names(
                 problem.contacts.names,
@@ -297,14 +317,12 @@ class WholeBodyController(FixedAttributes):
                 _foot_frames(self.robot),
                 before=self.limits,
             )
-        other = object.__new__(type(self))
-        other._prepare(problem, self.solver, self.requested_backend, warm_up=self.compiled is None)
-        if other.compiled is None:
+        other = self._with_problem(problem)
+        if other._compiled is None:
             problem.check()
-        elif (
-            tasks is not None or limits is not None or other.compiled.user_terms.any
-        ):  # what its tables have not found to fit
-            problem.check(other.compiled.unchecked_tasks)
+        elif tasks is not None or limits is not None or other._compiled.user_terms.any:
+            # what its tables have not found to fit
+            problem.check(other._compiled.unchecked_tasks)
         return other
 
     def __repr__(self) -> str:
@@ -314,13 +332,16 @@ class WholeBodyController(FixedAttributes):
         )
 
 
-def _unsupported_reason(problem: Problem, solver: str) -> str:
-    """Why a problem cannot run compiled, or ""."""
-    return (
-        unsupported_reason(problem, solver)
-        if problem.mismatch.is_exact
-        else "its model mismatch is not zero"
-    )
+def _check_choice(name: str, value: object, choices: object) -> None:
+    """Raise `UnknownNameError` for a value that is none of a `Literal`'s."""
+    if not isinstance(value, str) or value not in get_args(choices):
+        raise unknown_name(name, value, get_args(choices))
+
+
+def _softened(problem: Problem, weight: float) -> Problem:
+    """The problem with soft contacts."""
+    contacts, tasks = with_soft_contacts(problem.contacts, problem.tasks, weight)
+    return replace(problem, contacts=contacts, tasks=tasks)
 
 
 def _foot_frames(robot: Robot) -> list[str]:

@@ -34,12 +34,8 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits
 
-BLOCKS = ("qdd", "tau", "forces")  # of x = (q̈, τ, λ)
-SIZES = {
-    "qdd": "nv",
-    "tau": "d",
-    "forces": "k",
-}  # of each block: its name among the equations of motion
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of the blocks of x, attributes of (7)
+BLOCKS = tuple(SIZES)
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -195,7 +191,7 @@ class Limits(Value):
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
-        """Options of the friction polyhedra: what `FrictionPolyhedron` takes after normal and mu."""
+        """Options of the friction polyhedra: arguments of `FrictionPolyhedron` after mu."""
         return self.facets, self.inner_approximation, self.facet_rotation
 
     @cached_property
@@ -236,13 +232,13 @@ class Limits(Value):
         """
         if not self.time_varying:
             return _constant_normal_forces(contacts, self)
-        return _bounds_at(
-            "min_normal_force", self.min_normal_force, contacts, t, 0.0
-        ), self._max_normal_forces(contacts, t)
+        return self._normal_forces_at(contacts, t)
 
-    def _max_normal_forces(self, contacts: Contacts, t: float) -> Array:
+    def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
         assert self.max_normal_force is not None  # as it was made
-        return _bounds_at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
+        least = _bounds_at("min_normal_force", self.min_normal_force, contacts, t, 0.0)
+        largest = _bounds_at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
+        return least, largest
 
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
         """Which points have a largest normal force, shape (P,)."""
@@ -259,11 +255,10 @@ def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
     if not isinstance(given, Mapping):
         one = numeric_copy(given)
         if one is None or one.ndim:
-            by_name = (
-                "or a mapping from the name of a contact to one or to a function, as "
-                '{"FL_foot": lambda t: …}'
+            raise InputError(
+                f"{name} must be one number (N), or a mapping from the name of a contact to one or "
+                f'to a function, as {{"FL_foot": lambda t: …}}, not {short_repr(given)}.'
             )
-            raise InputError(f"{name} must be one number (N), {by_name}, not {short_repr(given)}.")
         return as_positive(name, given, "N", allow_zero=True)
     return MappingProxyType(
         {
@@ -294,8 +289,8 @@ def _bounds_at(
 # immutable)
 @lru_cache(maxsize=64)
 def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
-    least = _bounds_at("min_normal_force", limits.min_normal_force, contacts, 0.0, 0.0)
-    return read_only(least), read_only(limits._max_normal_forces(contacts, 0.0))
+    least, largest = limits._normal_forces_at(contacts, 0.0)
+    return read_only(least), read_only(largest)
 
 
 @lru_cache(maxsize=64)

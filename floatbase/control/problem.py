@@ -30,9 +30,8 @@ from floatbase.robots._checks import as_torque_limits
 
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
-INCONSISTENCY_TOLERANCE = (
-    1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
-)
+# m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+INCONSISTENCY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,13 +218,10 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
     for task in tasks:
         lacks = [part for part in _TASK_ATTRIBUTES if not hasattr(task, part)]
         if 0 < len(lacks) < len(_TASK_ATTRIBUTES):
-            has = (
-                "a task has block, name, weight and residual(eom, t), as "
-                "floatbase.objectives.Task says"
-            )
             raise InputError(
-                f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; "
-                f"{has}."
+                f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; a "
+                f"task has block, name, weight and residual(eom, t), as floatbase.objectives.Task "
+                f"says."
             )
         if lacks or isinstance(task, type) or not callable(task.residual):
             raise InputError(

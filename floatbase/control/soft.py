@@ -1,4 +1,4 @@
-"""Contacts that give way: (5) as a cost instead of rows, for states in which no forces hold them."""
+"""Soft contacts: (5) as a cost instead of rows, for states in which no forces hold them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from floatbase.dynamics import (
 )
 from floatbase.objectives import Task
 from floatbase.robots import State
+
+SOFT_CONTACT_WEIGHT = 1e4  # of contacts that must give way, beside 10 of the tasks
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,6 +56,13 @@ class State(Value):
         )
         check_unit_norms(robot.model, "q", self.q, ", or use robot.standing()")
 
+    @classmethod
+    def _unchecked(cls, robot: Robot, q: Array, v: Array) -> State:
+        """A state of arrays that have been checked, and that nobody else writes to."""
+        state = object.__new__(cls)
+        vars(state).update(robot=robot, q=frozen(q.view()), v=frozen(v.view()))
+        return state
+
     @property
     def _data(self) -> pin.Data:
         """Pinocchio's results at (q, v): kinematics, then what is asked for, which changes none of

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import mujoco
 import numpy as np
@@ -15,7 +15,6 @@ import pinocchio as pin
 
 from floatbase._validation import (
     Array,
-    FixedAttributes,
     Value,
     as_array,
     as_bool,
@@ -45,8 +44,6 @@ _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms i
 _CLOCK_TOLERANCE = (
     1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
 )
-_RECREATE_HINT = "make another, fb.Simulation(robot, ground=…, timestep=…)"
-_RESET_HINT = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
@@ -111,7 +108,7 @@ def active_pushes(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[P
     )
 
 
-class Simulation(FixedAttributes):
+class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat
@@ -121,27 +118,21 @@ class Simulation(FixedAttributes):
 
     robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one;
     timestep in s. `model` and `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`.
-    Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with does not
-    change any more; what `model` and `data` hold may. A copy has `model` and `data` of its own.
+    Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with cannot
+    be set; what `model` and `data` hold may change. A copy has `model` and `data` of its own.
     While `link_collisions` touch the ground they are another pair, which has what was changed in
     the first.
     """
 
     _example = "fb.Simulation(robot)"
-    _hints: ClassVar[dict[str, str]] = {
-        **dict.fromkeys(
-            ("robot", "ground", "timestep", "feet", "model", "data", "point_names"), _RECREATE_HINT
-        ),
-        **dict.fromkeys(("state", "q", "v", "joint_state", "time"), _RESET_HINT),
-    }
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
-        self.robot = as_instance("robot", robot, Robot)
-        self.ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
-        self.timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
-        self.feet = Contacts.feet(robot)
-        self.model = build_model(robot, self.ground, self.timestep)
-        self.data = mujoco.MjData(self.model)
+        self._robot = as_instance("robot", robot, Robot)
+        self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
+        self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
+        self._feet = Contacts.feet(robot)
+        self._model = build_model(robot, self.ground, self.timestep)
+        self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
@@ -169,7 +160,6 @@ class Simulation(FixedAttributes):
         self._base_body = self.model.body(body_name(robot.base)).id if robot.is_floating else 0
         self._refresh_views()
         self.reset()
-        self._initialised = True
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)  # two robots with the same data would move each other
@@ -195,6 +185,36 @@ class Simulation(FixedAttributes):
         self._refresh_views()
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def ground(self) -> Ground:
+        """The ground that it stands on."""
+        return self._ground
+
+    @property
+    def timestep(self) -> float:
+        """Length of a step [s]."""
+        return self._timestep
+
+    @property
+    def feet(self) -> Contacts:
+        """The robot's feet."""
+        return self._feet
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model; while `link_collisions` are on, another one."""
+        return self._model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of `model`."""
+        return self._data
+
+    @property
     def point_names(self) -> tuple[str, ...]:
         """Names of the points of the robot that can touch the ground: feet, or corners of flat
         feet.
@@ -208,7 +228,10 @@ class Simulation(FixedAttributes):
 
     @property
     def q(self) -> Array:
-        """Configuration in the package's convention, shape (nq,)."""
+        """Configuration in the package's convention, shape (nq,).
+
+        `sim.reset(sim.state.replace(q=…))` puts the robot into another one, at time 0.
+        """
         return self._conversion.q(self._qpos)
 
     @property
@@ -285,7 +308,7 @@ class Simulation(FixedAttributes):
         self, model: mujoco.MjModel, data: mujoco.MjData, foot_geoms: npt.NDArray[np.int_]
     ) -> None:
         """Go on with another model and its data, in which the feet's balls have these numbers."""
-        vars(self).update(model=model, data=data, _foot_geoms=foot_geoms)
+        self._model, self._data, self._foot_geoms = model, data, foot_geoms
         self._refresh_views()
 
     def reset(self, state: State | None = None) -> None:

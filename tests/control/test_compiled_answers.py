@@ -470,9 +470,7 @@ def test_a_replaced_controller_is_like_a_new_one() -> None:
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
 
 
-def test_a_target_that_turns_into_a_reflection_is_left_to_the_reference_backend_which_refuses_it() -> (
-    None
-):
+def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend() -> None:
     robot = judges.load("go2")
     state = robot.standing()
     mirrored = fb.OrientationTask(

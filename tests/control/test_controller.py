@@ -4,6 +4,7 @@ closed forms.
 
 from __future__ import annotations
 
+import copy
 from itertools import pairwise
 
 import judges
@@ -227,9 +228,7 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
         assert reached(rotation + quarter, rotation) == pytest.approx(0.3, abs=ASIDE)
 
 
-def test_facets_outside_the_cone_only_take_away_when_doubled_and_always_allow_more_than_facets_inside() -> (
-    None
-):
+def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled() -> None:
     """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges,
     neither holds the other.
     """
@@ -440,9 +439,7 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_an_acceleration_that_only_noise_calls_for() -> (
-    None
-):
+def test_solo8_sways_near_its_singular_stance_without_accelerations_due_to_noise() -> None:
     robot = judges.load("solo8")
     state = robot.standing()
 
@@ -494,3 +491,23 @@ def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(backend: str
         command.force("left_sole_lnk")
     assert repr(command).startswith("Command(|tau|=") and "\n" not in repr(command)
     assert backend in repr(command)
+
+
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_an_infeasible_tick_is_answered_with_soft_contacts_on_request(backend: str) -> None:
+    robot = judges.load("talos")
+    contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
+    weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
+    weak["backend"] = backend
+    moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
+    soft = fb.WholeBodyController(robot, contacts, tasks, contact_weight=1e4, **weak)
+    expected = soft(moving.q, moving.v)
+    assert not expected.softened
+    made = fb.WholeBodyController(robot, contacts, tasks, on_infeasible="soften", **weak)
+    for each in (made, copy.deepcopy(made), made.replace(tasks=tasks)):
+        command = each(moving.q, moving.v)
+        assert command.softened and np.array_equal(command.tau, expected.tau)
+    with pytest.raises(InfeasibleError):
+        fb.WholeBodyController(robot, contacts, tasks, **weak)(moving.q, moving.v)
+    with raises(UnknownNameError, "on_infeasible", "soft", "soften"):
+        fb.WholeBodyController(robot, contacts, tasks, on_infeasible="soft")

@@ -272,9 +272,7 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
     assert np.allclose(solution["tau"], command.tau)
 
 
-def test_threads_may_share_a_controller_with_tasks_of_their_own_and_a_task_may_ask_another_controller() -> (
-    None
-):
+def test_threads_may_share_a_controller_whose_task_asks_another_controller() -> None:
     robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
     inner = judges.controller_of("go2", backend="compiled")
 

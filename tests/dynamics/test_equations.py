@@ -4,10 +4,13 @@ algorithm.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import raises
 
 import floatbase as fb
 from floatbase import objectives
@@ -112,3 +115,14 @@ def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) 
     rest = judges.aba(eom, np.zeros(eom.d), np.zeros(eom.k))
     columns = [eom.A @ (judges.aba(eom, np.zeros(eom.d), unit) - rest) for unit in np.eye(eom.k)]
     assert judges.relative(delassus_matrix(eom), np.column_stack(columns)) < 1e-9
+
+
+def test_matrices_are_computed_on_first_use_and_can_be_replaced() -> None:
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    assert "M" not in vars(eom) and "h" not in vars(eom)
+    heavy = replace(replace(eom, M=2.0 * eom.M), h=2.0 * eom.h)
+    assert np.array_equal(heavy.M, 2.0 * eom.M) and np.array_equal(heavy.h, 2.0 * eom.h)
+    assert heavy.J is eom.J and heavy.b is eom.b
+    with raises(TypeError, "mass"):
+        replace(eom, mass=2.0)

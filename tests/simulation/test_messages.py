@@ -143,22 +143,11 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
     refused(*case)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "named"),
-    [
-        ("timestep", 0.002, "Simulation"),
-        ("ground", 0.5, "Simulation"),
-        ("q", GO2.standing().q, "sim.reset"),
-        ("timestap", 0.002, "timestep"),
-        ("anything", 1, "Simulation"),
-    ],
-)
-def test_what_a_simulation_was_made_with_is_not_set_afterwards(
-    name: str, value: object, named: str
-) -> None:
+@pytest.mark.parametrize("name", ["timestep", "ground", "robot", "model", "data", "q", "time"])
+def test_what_a_simulation_was_made_with_cannot_be_set(name: str) -> None:
     for sim in (SIM, copy.deepcopy(SIM), pickle.loads(pickle.dumps(SIM))):
-        with raises(InputError, name, named):
-            setattr(sim, name, value)
+        with raises(AttributeError, name):
+            setattr(sim, name, getattr(sim, name))
 
 
 def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:

@@ -52,9 +52,9 @@ def cache_warning() -> str:
     """What to add to a message where compiled code cannot be kept on disk, or ""."""
     from floatbase.control.tick import jit
 
-    remedy = "set NUMBA_CACHE_DIR to a folder that has room and can be written to"
+    remedy = "set NUMBA_CACHE_DIR to an empty folder that has room and can be written to"
     return (
-        f"; what is compiled cannot be kept ({jit.cache_error}): {remedy}"
+        f"; compiled code cannot be kept on disk ({jit.cache_error}): {remedy}"
         if jit.cache_error
         else ""
     )
@@ -123,10 +123,8 @@ class CompiledTick:
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
         *tables, targets, self._time_varying_tasks = pack_problem(problem)
-        self.user_terms, time_varying = (
-            UserTerms(problem, self.dynamics),
-            {each.task_index for each in self._time_varying_tasks},
-        )
+        self.user_terms = UserTerms(problem)
+        time_varying = {each.task_index for each in self._time_varying_tasks}
         self.unchecked_tasks = [
             task
             for i, task in enumerate(problem.tasks)
@@ -135,16 +133,10 @@ class CompiledTick:
         self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._workspace_sizes, self._tables, self._tick, self._n_stages = (
-            tick.workspace_sizes,
-            tables,
-            tick.tick,
-            tick.N_STAGES,
-        )
-        self._varies, self._n_user_rows = (
-            bool(self._time_varying_tasks) or self.user_terms.varies,
-            -1,
-        )
+        self._workspace_sizes, self._tables, self._tick = tick.workspace_sizes, tables, tick.tick
+        self._n_stages = tick.N_STAGES
+        self._varies = bool(self._time_varying_tasks) or self.user_terms.varies
+        self._n_user_rows = -1
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
@@ -153,10 +145,8 @@ class CompiledTick:
         """
         if n_user_rows > self._n_user_rows:
             n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
-            self.workspace, self._n_user_rows = (
-                (np.empty(n_floats), np.empty(n_ints, np.int64)),
-                n_user_rows,
-            )
+            self.workspace = (np.empty(n_floats), np.empty(n_ints, np.int64))
+            self._n_user_rows = n_user_rows
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
@@ -177,27 +167,30 @@ class CompiledTick:
 
         Returns why that is not possible, or "".
         """
-        standing = self._problem.robot.standing()
-        q, v = np.array(standing.q), np.array(standing.v)
+        from floatbase.control.tick import jit, tick
+
         with announce_if_slow(
             f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."
         ):
             try:
-                with self.dynamics.lock:
-                    self.dynamics.update(q, v)
-                    self._tick(
-                        q,
-                        v,
-                        self.default_inputs.packed,
-                        *self.arguments,
-                        self.empty_result(),
-                        self._n_stages,
-                    )
-            except Exception as error:
-                # whatever numba raises, the reference backend does without; no code of the user's
-                # runs
-                return f"numba could not compile the tick ({type(error).__name__}: {error})"
+                self._tick_standing()
+            except Exception as cache_failure:  # damaged files may raise anything
+                try:
+                    self._tick = tick.tick = jit.without_cache(self._tick)
+                    self._tick_standing()
+                except Exception as error:
+                    # whatever numba raises, the reference backend does without; no code of the
+                    # user's runs
+                    return f"numba could not compile the tick ({type(error).__name__}: {error})"
+                jit.cache_error = f"{type(cache_failure).__name__}: {cache_failure}"
         return ""
+
+    def _tick_standing(self) -> None:
+        standing = self._problem.robot.standing()
+        q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs.packed
+        with self.dynamics.lock:
+            self.dynamics.update(q, v)
+            self._tick(q, v, inputs, *self.arguments, self.empty_result(), self._n_stages)
 
     def empty_result(self) -> Array:
         """An array for the numbers of one tick."""
@@ -269,11 +262,8 @@ class CompiledTick:
 
     def _targets_at(self, t: float) -> Array:
         """All targets at time t. Raises `InputError` for a bad one."""
-        targets, robot, k = (
-            self.default_inputs.packed[: self.n_targets].copy(),
-            self._problem.robot,
-            self._problem.contacts.k,
-        )
+        targets, robot = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot
+        k = self._problem.contacts.k
         for _, task, first in self._time_varying_tasks:
             for value in task.targets_at(robot, k, t):
                 targets[first : first + value.size] = value.ravel()

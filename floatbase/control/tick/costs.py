@@ -74,12 +74,8 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
     rows: (3, nv) receives the Jacobian.
     """
     clear(rows)
-    kind, joint, first, targets = (
-        tasks.table[i, 0],
-        tasks.table[i, 1],
-        tasks.table[i, 2],
-        tasks.targets,
-    )
+    kind, joint, first = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2]
+    targets = tasks.targets
     target = targets.reshape(1, targets.size)
     after, valid = first + (9 if kind == ORIENTATION else 3), True
     if kind == COM:
@@ -94,24 +90,18 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
             body_jacobian(bodies, joint, False, p, rows, 0)
             e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
             columns = targets[first:after].reshape(3, 3)
-            e, valid = rotation_error(
-                R,
-                (
-                    column_part(columns, 0, 0),
-                    column_part(columns, 0, 1),
-                    column_part(columns, 0, 2),
-                ),
+            x, y, z = (
+                column_part(columns, 0, 0),
+                column_part(columns, 0, 1),
+                column_part(columns, 0, 2),
             )
+            e, valid = rotation_error(R, (x, y, z))
         else:
             body_jacobian(bodies, joint, True, p, rows, 0)
             e_dot, drift = point_velocity(bodies, joint, p)
             e = minus(p, row_part(target, 0, first))
-    return (
-        e,
-        minus(e_dot, row_part(target, 0, after)),
-        minus(drift, row_part(target, 0, after + 3)),
-        valid,
-    )
+    e_dot = minus(e_dot, row_part(target, 0, after))
+    return e, e_dot, minus(drift, row_part(target, 0, after + 3)), valid
 
 
 @jit
@@ -145,25 +135,16 @@ def task_costs(
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
     clear(R)
-    used, rows, e_joint, e_dot_joint = (
-        0,
-        take_matrix(workspace, 3, nv),
-        take_vector(workspace, d),
-        take_vector(workspace, d),
-    )
+    used, rows = 0, take_matrix(workspace, 3, nv)
+    e_joint, e_dot_joint = take_vector(workspace, d), take_vector(workspace, d)
     # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight ×
     # desired
     weights, weighted = take_vector(workspace, nv + k + d), take_vector(workspace, nv + k + d)
     clear(weights)
     clear(weighted)
     for i in range(tasks.table.shape[0]):
-        kind, at, w, kp, kd = (
-            tasks.table[i, 0],
-            tasks.table[i, 2],
-            tasks.gains[i, 0],
-            tasks.gains[i, 1],
-            tasks.gains[i, 2],
-        )
+        kind, at = tasks.table[i, 0], tasks.table[i, 2]
+        w, kp, kd = tasks.gains[i, 0], tasks.gains[i, 1], tasks.gains[i, 2]
         if kind <= FRAME:
             e, e_dot, bias, valid = motion_task(i, tasks, bodies, rows)
             if not valid:
@@ -200,10 +181,8 @@ def count_user_rows(inputs, at, n_user, nv, k, d):
     rows = 0
     for _ in range(n_user):
         block, m = int(inputs[at]), int(inputs[at + 1])
-        at, rows = (
-            at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d))),
-            rows + m,
-        )
+        at = at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d)))
+        rows += m
     return rows, at
 
 
@@ -265,9 +244,8 @@ def hessian(cost: Cost, H, grad):
     R, diagonal, linear = cost
     nb = diagonal.size
     clear(H)
-    for i in range(
-        0, R.shape[0], 4
-    ):  # four rows at a time: each sum is loaded and stored once for all of them
+    # four rows at a time: each sum is loaded and stored once for all of them
+    for i in range(0, R.shape[0], 4):
         for r in range(nb + 1):
             a, b, c, d = R[i, r], R[i + 1, r], R[i + 2, r], R[i + 3, r]
             for s in range(r + 1):
@@ -279,7 +257,7 @@ def hessian(cost: Cost, H, grad):
 
 @jit
 def gradient(cost: Cost, beta, grad):
-    """The slope (nb,) at β, residual by residual, which keeps the digits that the Hessian has lost."""
+    """The slope (nb,) at β, residual by residual, with the digits that the Hessian has lost."""
     R, diagonal, linear = cost
     nb = beta.size
     for c in range(nb):

@@ -19,21 +19,17 @@ from floatbase.control.tick.jit import jit
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
-INACCURATE, INFEASIBLE = (
-    -2,
-    -3,
-)  # why there is no answer: it lacks digits, or there seems to be none
+# why there is no answer: it lacks digits, or there seems to be none
+INACCURATE, INFEASIBLE = -2, -3
 # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
 PIVOT_TOLERANCE = 1e-13
-DEPENDENCE_TOLERANCE = (
-    1e-12  # part of a row, squared, outside the active rows: with less it depends on them
-)
+# part of a row, squared, outside the active rows: with less it depends on them
+DEPENDENCE_TOLERANCE = 1e-12
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 STEP_TOLERANCE = 1e-6  # part of β: what a step this small leaves is rounding
 MAX_FINAL_STEP = 1e-4  # part of β that the last step may still move
-SIGN_TOLERANCE = (
-    1e-9  # part of the largest multiplier by which one may be negative through rounding
-)
+# part of the largest multiplier by which one may be negative through rounding
+SIGN_TOLERANCE = 1e-9
 
 
 class ActiveSet(NamedTuple):
@@ -273,9 +269,8 @@ def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
             delta_beta[i] += along * W[j, i]
     for i in range(nb):
         beta[i] += delta_beta[i]
-    for a in range(
-        q - 1, -1, -1
-    ):  # the multipliers balance the slope that is left after the way to the bounds
+    # the multipliers balance the slope that is left after the way to the bounds
+    for a in range(q - 1, -1, -1):
         step[a] -= y[a]
         for j in range(a + 1, q):
             step[a] -= U[a, j] * step[j]
@@ -311,23 +306,14 @@ def dual_search(
     a multiplier has the wrong sign or a row is violated, the search goes on.
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
-    H, grad, L = (
-        take_matrix(workspace, nb + 1, nb + 1),
-        take_vector(workspace, nb),
-        take_matrix(workspace, nb, nb),
-    )
-    W, U, rows = (
-        take_matrix(workspace, nb, nb),
-        take_matrix(workspace, nb, nb),
-        take_matrix(workspace, nb, nb),
-    )
+    H, grad = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb)
+    L = take_matrix(workspace, nb, nb)
+    W, U = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
+    rows = take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
-    forces, tau, qdd = (
-        take_vector(workspace, k),
-        take_vector(workspace, d),
-        take_vector(workspace, nv),
-    )
+    forces, tau = take_vector(workspace, k), take_vector(workspace, d)
+    qdd = take_vector(workspace, nv)
     active = ActiveSet(indices, mu, bounds, rows, W, U)
     hessian(cost, H, grad)
     if not cholesky(H, L):

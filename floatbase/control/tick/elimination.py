@@ -109,11 +109,8 @@ def independent_rows(A, b, v, rows, right):
     U = np.ascontiguousarray(U[:, :r])
     rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
-    return (
-        -1
-        if np.max(np.abs(gap)) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion))
-        else r
-    )
+    tolerance = INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion))
+    return -1 if np.max(np.abs(gap)) > tolerance else r
 
 
 @jit
@@ -131,11 +128,8 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     straight; base rows for the base, and for λ where the contacts already hold it.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
-    lengths, motion_weights, base_weights = (
-        take_vector(workspace, m + base),
-        take_vector(workspace, n),
-        take_vector(workspace, n),
-    )
+    lengths, motion_weights = take_vector(workspace, m + base), take_vector(workspace, n)
+    base_weights = take_vector(workspace, n)
     for c in range(n):
         motion_weights[c], base_weights[c] = (
             (0.05, 1.0) if c < base else (1.0, 0.1 if c < nv else 0.01)

@@ -196,22 +196,16 @@ def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, o
 def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
-    nb, d, cone_face_matrix, force_rows = (
-        V.shape[1] - 1,
-        T.shape[0],
-        cones.shape[0],
-        force_rows_of(limits),
-    )
+    nb, d, n_cone_rows = V.shape[1] - 1, T.shape[0], cones.shape[0]
+    force_rows = force_rows_of(limits)
     if number >= force_rows + 2 * d:
         return user_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
     clear(out)
     if number < force_rows:
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
-        if (
-            number >= cone_face_matrix
-        ):  # the largest normal force: the row of the least one, turned round
-            row, sign = (number - cone_face_matrix) * n_rows + limits.facets, -1.0
-            bound = limits.inputs[limits.bounds + limits.points + number - cone_face_matrix]
+        if number >= n_cone_rows:  # largest normal force: the least one's row, turned round
+            row, sign = (number - n_cone_rows) * n_rows + limits.facets, -1.0
+            bound = limits.inputs[limits.bounds + limits.points + number - n_cone_rows]
         elif number % n_rows == limits.facets:
             bound = -limits.inputs[limits.bounds + number // n_rows]
         first = nv + int(cones[row, 4])

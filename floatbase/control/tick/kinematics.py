@@ -41,15 +41,13 @@ class Bodies(NamedTuple):
 class ContactTable(NamedTuple):
     """C contacts with P points."""
 
-    table: (
-        Any  # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
-    )
+    # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
+    table: Any
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
     inputs: Any  # what `user_terms.UserTerms` packed
-    user_start: (
-        Any  # where the user-defined contacts' A, b and J start in it, one contact after the other
-    )
+    # where the user-defined contacts' A, b and J start in it, one contact after the other
+    user_start: Any
     points_only: Any  # whether all are point contacts, whose A and J are the same
 
 
@@ -69,22 +67,16 @@ def forward_velocities(bodies: Bodies, v):
         for c in range(first, first + count):
             joint_linear = plus(joint_linear, times(v[c], column_part(J, 0, c)))
             joint_angular = plus(joint_angular, times(v[c], column_part(J, 3, c)))
-        linear, angular = (
-            plus(row_part(velocity, parent, 0), joint_linear),
-            plus(row_part(velocity, parent, 3), joint_angular),
-        )
+        linear = plus(row_part(velocity, parent, 0), joint_linear)
+        angular = plus(row_part(velocity, parent, 3), joint_angular)
         a = plus(
             row_part(drift, parent, 0),
             plus(cross(angular, joint_linear), cross(linear, joint_angular)),
         )
         alpha = plus(row_part(drift, parent, 3), cross(angular, joint_angular))
         for r in range(3):
-            velocity[i, r], velocity[i, 3 + r], drift[i, r], drift[i, 3 + r] = (
-                linear[r],
-                angular[r],
-                a[r],
-                alpha[r],
-            )
+            velocity[i, r], velocity[i, 3 + r] = linear[r], angular[r]
+            drift[i, r], drift[i, 3 + r] = a[r], alpha[r]
 
 
 @jit
@@ -134,16 +126,10 @@ def centre_of_mass(bodies: Bodies):
         )
         velocity, drift = point_velocity(bodies, i, p)
         com, mass = plus(com, times(link_mass, p)), mass + link_mass
-        com_velocity, com_drift = (
-            plus(com_velocity, times(link_mass, velocity)),
-            plus(com_drift, times(link_mass, drift)),
-        )
-    return (
-        times(1.0 / mass, com),
-        times(1.0 / mass, com_velocity),
-        times(1.0 / mass, com_drift),
-        mass,
-    )
+        com_velocity = plus(com_velocity, times(link_mass, velocity))
+        com_drift = plus(com_drift, times(link_mass, drift))
+    scale = 1.0 / mass
+    return times(scale, com), times(scale, com_velocity), times(scale, com_drift), mass
 
 
 @jit
@@ -166,12 +152,8 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
     clear(A)
     clear(J)
     for i in range(contacts.table.shape[0]):
-        joint, kind, first, count = (
-            contacts.table[i, 0],
-            contacts.table[i, 1],
-            contacts.table[i, 2],
-            contacts.table[i, 3],
-        )
+        joint, kind, first = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2]
+        count = contacts.table[i, 3]
         m, k = contacts.table[i, 4], contacts.table[i, 5]
         if kind == USER_DEFINED:
             start = copy_rows(inputs, start, m, nv, A, row)

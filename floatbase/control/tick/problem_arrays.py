@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
+from typing import Any, ClassVar, NamedTuple, TypeAlias, cast
 from weakref import WeakSet
 
 import numpy as np
@@ -18,14 +18,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array
+from floatbase.control.limits import BLOCKS
+from floatbase.control.problem import Problem
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import Task
 from floatbase.objectives._task import TargetTask
 from floatbase.robots import Robot
-
-if TYPE_CHECKING:
-    from floatbase.control.problem import Problem
 
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
 _TASK_KINDS = {
@@ -34,8 +33,7 @@ _TASK_KINDS = {
 }  # fmt: skip
 POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
-QDD, TAU, FORCES = range(3)
-BLOCKS = {"qdd": QDD, "tau": TAU, "forces": FORCES}
+QDD, TAU, FORCES = range(len(BLOCKS))
 _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 Indices: TypeAlias = npt.NDArray[np.int64]
 PolyhedronOptions: TypeAlias = tuple[
@@ -66,10 +64,8 @@ class Dynamics:
             (model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
             for i in range(n)
         ]
-        self.tree, self.links = (
-            np.array(tree, np.int64),
-            np.array([(link.mass, *link.lever) for link in model.inertias]),
-        )
+        self.tree = np.array(tree, np.int64)
+        self.links = np.array([(link.mass, *link.lever) for link in model.inertias])
 
     def update(self, q: Array, v: Array) -> None:
         """Fill the views for a configuration q (nq,) and a velocity v (nv,)."""
@@ -78,7 +74,7 @@ class Dynamics:
 
     @property
     def layout_supported(self) -> bool:
-        """Whether this version of Pinocchio lays its results out in memory as the views take them."""
+        """Whether this Pinocchio has the memory layout that the views assume."""
         with self.lock:
             self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
             poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
@@ -124,11 +120,8 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses, targets, time_varying = _pack_tasks(problem)
-    dynamics, limits, problem_contacts = (
-        dynamics_of(problem.robot),
-        problem.limits,
-        problem.contacts,
-    )
+    dynamics, limits = dynamics_of(problem.robot), problem.limits
+    problem_contacts = problem.contacts
     sizes = (
         len(dynamics.tree),
         len(contacts),
@@ -138,10 +131,8 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         len(tasks),
         problem.robot.d,
     )
-    user_contacts, points_only = (
-        contacts[contacts[:, 1] == USER_DEFINED],
-        np.all(contacts[:, 1] == POINT),
-    )
+    user_contacts = contacts[contacts[:, 1] == USER_DEFINED]
+    points_only = np.all(contacts[:, 1] == POINT)
     n_user_contact_numbers = sum(
         m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:]
     )
@@ -188,7 +179,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 def _pack_contact(
     robot: Robot, contact: MotionConstraint, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """Row of one contact in the table, its frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
+    """One contact: row of the table, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = 0
@@ -220,7 +211,7 @@ def _pack_builtin_contact(
 
 
 def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
-    """Facets and -normal of each point of a contact with their lengths, and a zero, (p (F + 1), 5)."""
+    """Facets and -normal of each point with their lengths, and a zero, (p (F + 1), 5)."""
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
     rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])

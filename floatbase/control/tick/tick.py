@@ -1,20 +1,8 @@
 """The tick, compiled: (26)(27) over plain arrays, which `compiled.py` fills and passes on.
 
-The same problem as `build_qp` makes, solved in another way that costs a fraction:
-
-    kinematics    velocities and drifts of all joints; A, b, J of the contacts                (1)(4)(5)
-    elimination   q̈, λ and τ as functions of β: Gauss-Jordan on the equalities
-                  (13)(16)(17)
-    costs         the tasks as one quadratic cost in β
-                  (18)(26)
-    inequalities  rows that β violates
-                                                                                               (27)(28)
-    dual_search   the optimum without inequalities, then one violated row after the other      App.
-                  C
-
-A tick without an answer says why: INVALID (a value is not finite, a quaternion is none, an
-orientation is too far off), INACCURATE (its last digits are lost), INFEASIBLE. Then the reference
-backend decides.
+README.md explains its stages. A tick without an answer says why: INVALID (a value is not finite, a
+quaternion is none, an orientation is too far off), INACCURATE (its last digits are lost),
+INFEASIBLE. Then the reference backend decides.
 """
 
 from __future__ import annotations
@@ -56,54 +44,26 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
         a workspace.
     inputs: as for `tick`.
     """
-    n, n_contacts, n_points, n_rows, n_tasks, d, k = (
-        sizes[0],
-        sizes[1],
-        sizes[2],
-        sizes[4],
-        sizes[5],
-        sizes[6],
-        sizes[7],
-    )
+    n, n_contacts, n_points, n_rows, n_tasks = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5]
+    d, k = sizes[6], sizes[7]
     int_tables[0], float_tables[0] = 1, 1
-    tree, links, contact_table = (
-        take_matrix(int_tables, n, 5),
-        take_matrix(float_tables, n, 4),
-        take_matrix(int_tables, n_contacts, 6),
-    )
-    frames, points = (
-        take_matrix(float_tables, n_contacts, 16),
-        take_matrix(float_tables, n_points, 3),
-    )
+    tree, links = take_matrix(int_tables, n, 5), take_matrix(float_tables, n, 4)
+    contact_table = take_matrix(int_tables, n_contacts, 6)
+    frames = take_matrix(float_tables, n_contacts, 16)
+    points = take_matrix(float_tables, n_points, 3)
     bounds, user_start = sizes[8], sizes[8] + 2 * n_points
     contacts = ContactTable(contact_table, frames, points, inputs, user_start, sizes[12] == 1)
     task_table, gains = take_matrix(int_tables, n_tasks, 3), take_matrix(float_tables, n_tasks, 3)
     user_tasks = user_start + sizes[9]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, sizes[10], nv, k, d)
-    tasks = TaskTable(
-        task_table,
-        gains,
-        take_matrix(float_tables, n_tasks, 12),
-        inputs,
-        user_tasks,
-        sizes[10],
-        n_user_rows,
-    )
-    cones, torque_limits = (
-        take_matrix(float_tables, n_points * n_rows, 5),
-        take_vector(float_tables, d),
-    )
+    task_frames = take_matrix(float_tables, n_tasks, 12)
+    tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, sizes[10], n_user_rows)
+    cones = take_matrix(float_tables, n_points * n_rows, 5)
+    torque_limits = take_vector(float_tables, d)
     limits = Inequalities(
-        cones,
-        n_rows - 1,
-        n_points,
-        torque_limits,
-        inputs,
-        bounds,
-        user_inequalities,
-        sizes[11],
+        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11],
         sizes[13] == 1,
-    )
+    )  # fmt: skip
     return tree, links, contacts, tasks, limits
 
 
@@ -162,22 +122,9 @@ def make_tick(digest):
     """The function `tick`, to be compiled; digest: of this folder."""
 
     def tick(
-        q,
-        v,
-        inputs,
-        M,
-        h,
-        J,
-        Ag,
-        oMi,
-        sizes,
-        int_tables,
-        float_tables,
-        float_workspace,
-        int_workspace,
-        result,
-        stages,
-    ):
+        q, v, inputs, M, h, J, Ag, oMi, sizes, int_tables, float_tables, float_workspace,
+        int_workspace, result, stages,
+    ):  # fmt: skip
         """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are
         active, or why there is no answer.
 
@@ -198,15 +145,9 @@ def make_tick(digest):
         if not inputs_valid(q, v, inputs, tree):
             return INVALID
         float_workspace[0], int_workspace[0] = 1, 1
-        bodies = Bodies(
-            tree,
-            links,
-            oMi,
-            J,
-            Ag,
-            take_matrix(float_workspace, tree.shape[0], 6),
-            take_matrix(float_workspace, tree.shape[0], 6),
-        )
+        velocity = take_matrix(float_workspace, tree.shape[0], 6)
+        drift = take_matrix(float_workspace, tree.shape[0], 6)
+        bodies = Bodies(tree, links, oMi, J, Ag, velocity, drift)
         forward_velocities(bodies, v)
         J_points, b = take_matrix(float_workspace, k, nv), take_vector(float_workspace, m)
         A = J_points if contacts.points_only else take_matrix(float_workspace, m, nv)
@@ -214,10 +155,8 @@ def make_tick(digest):
         if stages == 1:
             return STOPPED
         M_rows = M.T  # symmetric, and Pinocchio stores it by columns
-        B, pivots = (
-            take_matrix(float_workspace, m + base, n + 1),
-            take_vector(int_workspace, m + base),
-        )
+        B = take_matrix(float_workspace, m + base, n + 1)
+        pivots = take_vector(int_workspace, m + base)
         motion_pivot, smallest_pivot = eliminate(
             A, b, M_rows, h, J_points, base, float_workspace, B, pivots
         )
@@ -253,11 +192,8 @@ def make_tick(digest):
             return INVALID
         if stages == 3:
             return STOPPED
-        beta, active, mu = (
-            take_vector(float_workspace, nb),
-            take_vector(int_workspace, nb),
-            result[n + d : n + d + nb],
-        )
+        beta, active = take_vector(float_workspace, nb), take_vector(int_workspace, nb)
+        mu = result[n + d : n + d + nb]
         n_active = dual_search(
             Cost(R[:used], diagonal, linear), limits, space, nv, float_workspace, active, mu, beta
         )

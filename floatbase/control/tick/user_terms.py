@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from floatbase._validation import Array, read_only
 from floatbase.affine import Affine
+from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem, residual_of
-from floatbase.control.tick.lazy_equations import TickEquations, TickState
-from floatbase.control.tick.problem_arrays import BLOCKS, CONTACT_KINDS, Dynamics, task_kind
+from floatbase.control.tick.problem_arrays import CONTACT_KINDS, task_kind
 from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -47,10 +47,10 @@ class UserTerms:
         for at every tick.
     """
 
-    def __init__(self, problem: Problem, dynamics: Dynamics):
-        self._problem, self._dynamics, self._limits = problem, dynamics, problem.limits
+    def __init__(self, problem: Problem):
+        self._problem, self._limits = problem, problem.limits
         self._tasks = [
-            (i, task, BLOCKS[task.block])
+            (i, task, BLOCKS.index(task.block))
             for i, task in enumerate(problem.tasks)
             if task_kind(task) is None
         ]
@@ -95,7 +95,8 @@ class UserTerms:
         ]
         if not self.any:
             return TickInputs(np.concatenate(packed), normal_forces=bounds)
-        eom = TickEquations(TickState(self._dynamics, q, v), problem.contacts, t)
+        state = State._unchecked(problem.robot, q, v)  # the compiled tick checks q and v
+        eom = EquationsOfMotion(state, problem.contacts, t)
         contacts, residuals, n_user_rows, inequalities = [], {}, 0, []
         for contact in self._contacts:
             A, b, J = constraint_and_jacobian(contact, eom.state, t)
@@ -113,7 +114,7 @@ class UserTerms:
             if each.row_names:
                 each.labels(len(h))  # raises where there is another number of them
             inequalities.append((G, h))
-            packed += (BLOCKS[each.block], len(h)), G.ravel(), h
+            packed += (BLOCKS.index(each.block), len(h)), G.ravel(), h
         return TickInputs(
             np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
         )
@@ -131,7 +132,7 @@ class UserTerms:
             for contact in contacts
         ]
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
-        return EquationsOfMotion(state, contacts, state.M, state.h, state.robot.S, J, A, b)
+        return EquationsOfMotion(state, contacts, t, A=A, b=b, J=J)
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -14,7 +14,7 @@ import floatbase as fb
 from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
 from floatbase.control import Command, ModelMismatch
-from floatbase.errors import InfeasibleError, unknown_name
+from floatbase.errors import unknown_name
 from floatbase.lessons.lesson06 import state_with_feet_at
 from floatbase.lessons.lessonA import elliptic_rotation
 from floatbase.lessons.lessonX.black_box import BlackBox
@@ -31,7 +31,6 @@ PERIOD, SECONDS = 2e-3, 3.0  # s: of a tick, and of a record
 DRIFT_TIME = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
 LOOPS = 10  # of the twist: more than a record has
 LARGEST_SEED, TRIES = 10**9, 4
-SOFT_CONTACT_WEIGHT = 1e4  # weight of contacts that must give way, as of `Walk`
 
 Fault: TypeAlias = Literal["friction", "normal", "mass", "drift", "slow motors", "swapped motors"]
 FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors", "swapped motors")
@@ -92,18 +91,13 @@ class TwistController:
             fb.OrientationTask("base", path, kp=KP_BASE),
             fb.PostureTask(state.q),
         ]
-        options: dict[str, Any] = {"facets": FACETS, "mismatch": mismatch}
         self.contacts, self.planned = contacts, list[Array]()
-        self._firm = fb.WholeBodyController(state.robot, contacts, tasks, **options)
-        self._soft = fb.WholeBodyController(
-            state.robot, contacts, tasks, contact_weight=SOFT_CONTACT_WEIGHT, **options
+        self._controller = fb.WholeBodyController(
+            state.robot, contacts, tasks, facets=FACETS, mismatch=mismatch, on_infeasible="soften"
         )
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:
-        try:
-            command = self._firm(q, v, t)
-        except InfeasibleError:
-            command = self._soft(q, v, t)
+        command = self._controller(q, v, t)
         self.planned.append(command.qdd)
         return command
 
