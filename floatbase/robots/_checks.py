@@ -19,7 +19,7 @@ _AREA_TOLERANCE = (
 
 def has_floating_base(model: pin.Model) -> bool:
     """Whether a model's base is free to move."""
-    return model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
+    return model.njoints > 1 and bool(model.joints[1].shortname() == "JointModelFreeFlyer")
 
 
 def joint_limits(model: pin.Model) -> tuple[Array, Array, Array, Array]:
