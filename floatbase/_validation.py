@@ -20,30 +20,7 @@ _FLOAT64 = np.dtype(np.float64)
 # in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
 MAX_MAGNITUDE = 1e30
 _ZERO_NORM = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
-_NO_ARTICLE = (
-    "Contacts",
-    "EquationsOfMotion",
-    "Limits",
-    "HydraulicActuators",
-)  # names that take no article
 _MAX_REPR = 60  # characters of a value that a message repeats
-
-# how to get one, by class: for the messages of `as_instance`
-_EXAMPLES = {
-    "Robot": 'fb.load("go2")',
-    "State": "robot.standing()",
-    "Contacts": "fb.Contacts.points(robot)",
-    "EquationsOfMotion": "fb.equations_of_motion(state, contacts)",
-    "FeasibleSpace": "fb.feasible_space(eom)",
-    "Affine": "fb.Affine(A, b)",
-    "Quadratic": "fb.Quadratic(H, g)",
-    "QP": "controller.qp(state)",
-    "Limits": "controller.limits",
-    "Simulation": "fb.Simulation(robot)",
-    "Rollout": "fb.rollout(sim, controller, duration=1.0)",
-    "Hydraulics": "Hydraulics(loop_bandwidth=20.0)",
-    "FrictionPolyhedron": "FrictionPolyhedron(normal, mu)",
-}
 
 
 class cached_property(functools.cached_property[T]):
@@ -113,14 +90,15 @@ class Value:
 
 
 def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:
-    """`value`, after checking that it is a `kind`. example: how to get one, where the table above
-    has none.
+    """`value`, after checking that it is a `cls`.
+
+    example: how to get one, for the message; by default the class's own, `_example`.
     """
     if isinstance(value, cls):
         return value
-    example = example or _EXAMPLES.get(cls.__name__, "")
+    example = example or getattr(cls, "_example", "")
     raise InputError(
-        f"{name} must be {_with_article(cls)}{f', as {example}' if example else ''}, not "
+        f"{name} must be of type {cls.__name__}{f', as {example}' if example else ''}, not "
         f"{short_repr(value)}."
     )
 
@@ -342,7 +320,7 @@ def short_repr(value: object) -> str:
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, np.ndarray) and value.ndim:
-        return f"{_with_article(type(value))} of {value.dtype} of shape {value.shape}"
+        return f"an array of {value.dtype} of shape {value.shape}"
     if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
         return f"a whole number beyond {MAX_MAGNITUDE:g}"
     if value is None or isinstance(
@@ -350,13 +328,7 @@ def short_repr(value: object) -> str:
     ):
         text = " ".join(repr(value).split())
         return text if len(text) <= _MAX_REPR else f"{text[:_MAX_REPR]}…"
-    return _with_article(type(value))
-
-
-def _with_article(kind: type) -> str:
-    """A class with its article."""
-    name = {"ndarray": "array"}.get(kind.__name__, kind.__name__)
-    return name if name in _NO_ARTICLE else f"{'an' if name[0].lower() in 'aeio' else 'a'} {name}"
+    return f"a value of type {type(value).__name__}"
 
 
 def unit_vector(name: str, value: Any) -> Array:

@@ -44,6 +44,7 @@ class Affine(Value):
     Raises `InputError` when the shapes do not fit or an entry is not finite.
     """
 
+    _example = "fb.Affine(A, b)"
     A: Array
     b: Array
     blocks: Mapping[str, slice]
@@ -189,6 +190,7 @@ class Quadratic(Value):
         do not fit.
     """
 
+    _example = "fb.Quadratic(H, g)"
     H: Array
     g: Array
     c: float = 0.0

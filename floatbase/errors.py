@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from importlib import import_module
+from types import ModuleType
 
 
 class FloatbaseError(Exception):
@@ -56,12 +58,32 @@ class SolverError(FloatbaseError):
     """
 
 
+class MissingDependencyError(FloatbaseError, ImportError):
+    """An optional dependency is not installed; the message names the extra that brings it."""
+
+
 class SimulationError(FloatbaseError):
     """The physics cannot be built or stepped as requested."""
 
 
 class ViewerError(FloatbaseError):
     """The picture cannot be made: port taken, no browser connected, …"""
+
+
+def require(module: str, extra: str) -> ModuleType:
+    """Import an optional dependency, as in `cp = require("cvxpy", extra="course")`.
+
+    Raises `MissingDependencyError` where it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module.partition(".")[0]:
+            raise  # it is there, and lacks something itself
+        raise MissingDependencyError(
+            f"{module} is not installed. Install it with the extra {extra!r}: "
+            f"pip install 'floatbase[{extra}]'."
+        ) from None
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:

@@ -308,7 +308,9 @@ def aba(eom: EquationsOfMotion, tau: Array, forces: Array) -> Array:
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, state.q)
     wrenches = [pin.Force.Zero() for _ in range(model.njoints)]
-    owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
+    owners = [
+        contact.name for contact in eom.contacts.friction_contacts for _ in contact.point_names
+    ]
     for frame, point, force in zip(
         owners, eom.contacts.positions(state), np.reshape(forces, (-1, 3)), strict=True
     ):

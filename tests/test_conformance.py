@@ -31,7 +31,7 @@ from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import ConstantTorques, qp_plots
-from floatbase.qp import table_top
+from floatbase.lessons.lessonC import table_top
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
@@ -128,7 +128,7 @@ def right() -> dict[str, Any]:
         "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": UP,
         "npt.ArrayLike": UP, "Target": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
-        "Sequence[Task]": controller().tasks, "Sequence[Contact]": tuple(contacts),
+        "Sequence[Task]": controller().tasks, "Sequence[MotionConstraint]": tuple(contacts),
         "Sequence[str]": ["a", "b"],
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
         "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO,
@@ -160,8 +160,7 @@ def right() -> dict[str, Any]:
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3,
         "alpha": 0.1, "rate": 30.0,
-        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
-        "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP,
+        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0, "view_from_rotating_frame.omega": UP,
         "LinearInequality.coefficients":
         (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",
@@ -187,11 +186,11 @@ LEFT_OUT = {
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
         "Simulation.advance", "Simulation.contact_forces_of", "Simulation.torques_of",
-        "Push.active_fraction",
-        "check_unit_norms", "as_corners", "as_torque_limits", "cone_face_matrix",
-        "polytope_vertices", "conflicting_constraints", "linear_program", "constraint_and_jacobian",
+        "Push.active_fraction", "conflicting_constraints", "constraint_and_jacobian",
         "raibert_foothold",
-        "target_shapes", "targets_at",
+        *(f"{kind}Task.{method}" for method in ("shapes_for", "targets_at")
+            for kind in ("AngularMomentum", "CoM", "Force", "Frame", "Orientation", "Posture",
+                "Torque")),
         "QP.objective",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
         "Limits.normal_forces",

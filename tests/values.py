@@ -21,8 +21,9 @@ from floatbase.dynamics import (
     view_from_rotating_frame,
 )
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
-from floatbase.objectives import torques_from_forces
-from floatbase.qp import active_set, table_top
+from floatbase.lessons.lessonC import table_top
+from floatbase.objectives import AngularMomentumTask, torques_from_forces
+from floatbase.qp import active_set
 from floatbase.simulation import PushRecovery
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -62,7 +63,7 @@ def values() -> dict[str, Any]:
         "CoMTask": fb.CoMTask(state.com), "FrameTask": fb.FrameTask("FL_foot", UP),
         "OrientationTask": fb.OrientationTask(),
         "PostureTask": fb.PostureTask(state.q), "ForceTask": fb.ForceTask(np.ones(12)),
-        "TorqueTask": fb.TorqueTask(np.ones(12)),
+        "TorqueTask": fb.TorqueTask(np.ones(12)), "AngularMomentumTask": AngularMomentumTask(),
         "TorquesFromForces": torques_from_forces(eom), "Limits": control.limits,
         "Problem": control.problem,
         "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),

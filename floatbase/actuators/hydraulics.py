@@ -43,6 +43,7 @@ class Hydraulics:
     `InputError` for values that make no cylinder.
     """
 
+    _example = "Hydraulics(loop_bandwidth=20.0)"
     bore: float = 0.016
     rod: float = 0.010
     crank: float = 0.045

@@ -245,7 +245,7 @@ class Planner:
         """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball.
         position: (3,) m, of its frame.
         """
-        contact = self.contacts[foot]
+        contact = self.contacts.friction_contact(foot)
         to_ground = (
             getattr(contact, "radius", 0.0) * contact.normal
         )  # a ball touches there however it is turned

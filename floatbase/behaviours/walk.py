@@ -361,7 +361,7 @@ class Walk:
             _RAMP_LOAD_FACTOR
             * self.robot.weight
             / len(self._all_contacts)
-            / len(self._all_contacts[foot].point_names)
+            / len(self._single_contacts[foot].point_names)
         )
         minimum = float(self._limits.normal_forces(self._single_contacts[foot], t)[0].max())
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))

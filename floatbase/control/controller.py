@@ -28,7 +28,8 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver, solve
-from floatbase.robots import Robot, State, as_torque_limits
+from floatbase.robots import Robot, State
+from floatbase.robots._checks import as_torque_limits
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]

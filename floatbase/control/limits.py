@@ -31,7 +31,8 @@ from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import ConstraintLabel
-from floatbase.robots import Robot, as_torque_limits
+from floatbase.robots import Robot
+from floatbase.robots._checks import as_torque_limits
 
 SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of the blocks of x, attributes of (7)
 BLOCKS = tuple(SIZES)
@@ -142,6 +143,7 @@ class Limits(Value):
     Raises `InputError` for values that do not fit.
     """
 
+    _example = "controller.limits"
     torque_limits: Array
     facets: int = 4
     inner_approximation: bool = True
@@ -243,7 +245,7 @@ class Limits(Value):
         given = self.max_normal_force
         names = given if isinstance(given, Mapping) else contacts.names
         return np.array(
-            [contact.name in names for contact in contacts for _ in contact.point_names],
+            [c.name in names for c in contacts.friction_contacts for _ in c.point_names],
             dtype=np.bool_,
         )
 
@@ -275,7 +277,7 @@ def _bounds_at(
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
     found = []
-    for each in contacts:
+    for each in contacts.friction_contacts:
         value = given.get(each.name, otherwise)
         if callable(value):
             value = as_positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)

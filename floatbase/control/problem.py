@@ -24,7 +24,8 @@ from floatbase.dynamics import (
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
 from floatbase.qp import QP, ConstraintLabel
-from floatbase.robots import Robot, State, as_torque_limits
+from floatbase.robots import Robot, State
+from floatbase.robots._checks import as_torque_limits
 
 ModifyQP: TypeAlias = Callable[[QP, EquationsOfMotion], QP]  # of `Problem.modify_qp`
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task

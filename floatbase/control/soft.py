@@ -10,7 +10,13 @@ import numpy as np
 
 from floatbase._validation import Array, Value, as_positive, read_only
 from floatbase.affine import Affine
-from floatbase.dynamics import Block, Contact, Contacts, EquationsOfMotion
+from floatbase.dynamics import (
+    Block,
+    Contacts,
+    EquationsOfMotion,
+    FrictionContact,
+    MotionConstraint,
+)
 from floatbase.objectives import Task
 from floatbase.robots import State
 
@@ -18,20 +24,39 @@ SOFT_CONTACT_WEIGHT = 1e4  # of contacts that must give way, beside 10 of the ta
 
 
 @dataclass(frozen=True, eq=False)
-class SoftContact(Value):
-    """A contact that holds no motion: forces act at its points, inside their cones, and
-    `ContactMotionTask` asks it to stand still.
+class SoftConstraint(Value):
+    """A constraint that holds no motion: its forces act, and `ContactMotionTask` asks for its rows.
 
-    contact: the rigid contact.
+    contact: the rigid one.
     """
 
-    contact: Contact
+    contact: MotionConstraint
     row_names: ClassVar[tuple[str, ...]] = ()
 
     @property
     def name(self) -> str:
         """The contact's name."""
         return self.contact.name
+
+    @property
+    def k(self) -> int:
+        """The contact's number of force components."""
+        return self.contact.k
+
+    def jacobian(self, state: State, t: float = 0.0) -> Array:
+        """J of (4), shape (k, nv), at time t, s."""
+        return self.contact.jacobian(state, t)
+
+    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
+        """(5) without rows."""
+        return read_only(np.zeros((0, state.robot.nv))), read_only(np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class SoftContact(SoftConstraint):
+    """A soft constraint whose forces act at points, inside their cones."""
+
+    contact: FrictionContact
 
     @property
     def mu(self) -> float:
@@ -48,22 +73,9 @@ class SoftContact(Value):
         """The contact's points."""
         return self.contact.point_names
 
-    @property
-    def k(self) -> int:
-        """The contact's number of force components."""
-        return self.contact.k
-
     def positions(self, state: State) -> Array:
         """World positions of the points, shape (n, 3), m."""
         return self.contact.positions(state)
-
-    def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """J of (4), shape (k, nv), at time t, s."""
-        return self.contact.jacobian(state, t)
-
-    def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) without rows."""
-        return read_only(np.zeros((0, state.robot.nv))), read_only(np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +103,15 @@ def with_soft_contacts(
     weight.
     """
     rigid = Contacts(
-        [contact.contact if isinstance(contact, SoftContact) else contact for contact in contacts]
+        [
+            contact.contact if isinstance(contact, SoftConstraint) else contact
+            for contact in contacts
+        ]
     )
     other_tasks = [task for task in tasks if not isinstance(task, ContactMotionTask)]
     motion_task = ContactMotionTask(rigid, as_positive("contact_weight", weight))
-    return Contacts([SoftContact(contact) for contact in rigid]), (*other_tasks, motion_task)
+    soft = [SoftContact(c) if isinstance(c, FrictionContact) else SoftConstraint(c) for c in rigid]
+    return Contacts(soft), (*other_tasks, motion_task)
 
 
 def contact_weight_of(tasks: Sequence[Task]) -> float | None:

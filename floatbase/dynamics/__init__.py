@@ -9,15 +9,19 @@ from floatbase.dynamics.constraint_rank import (
     resolved_constraint,
 )
 from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
-from floatbase.dynamics.contact import UP, Contact, FlatFootContact, PointContact, grasp_matrix
+from floatbase.dynamics.contact import (
+    UP,
+    FlatFootContact,
+    FrictionContact,
+    MotionConstraint,
+    PointContact,
+    grasp_matrix,
+)
 from floatbase.dynamics.contacts import Contacts, constraint_and_jacobian
 from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
 from floatbase.dynamics.fictitious import (
     bias_forces,
-    centripetal_acceleration,
     coriolis_matrix,
-    inertia_rate,
-    power_identity,
     view_from_rotating_frame,
 )
 from floatbase.dynamics.subspace import (
@@ -36,15 +40,14 @@ from floatbase.dynamics.subspace import (
 
 # fmt: off
 __all__ = [
-    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contact", "Contacts",
+    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts",
     "EquationsOfMotion", "FeasibleSpace",
-    "FlatFootContact", "LinearConstraint", "PointContact", "RollingWheel",
+    "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint", "PointContact", "RollingWheel",
     "accelerations_from_torques", "bias_forces",
-    "centripetal_acceleration", "constraint_and_jacobian", "contact_space", "coriolis_matrix",
+    "constraint_and_jacobian", "contact_space", "coriolis_matrix",
     "delassus_matrix", "dimensions",
     "equations_of_motion", "feasible_space", "fixed_frame", "forces_from_torques", "grasp_matrix",
-    "inertia_rate",
-    "internal_forces", "motion_matrix", "moving_frame", "power_identity", "resolved_constraint",
+    "internal_forces", "motion_matrix", "moving_frame", "resolved_constraint",
     "torque_force_matrix",
     "torque_force_space", "undetermined_forces", "view_from_rotating_frame",
 ]

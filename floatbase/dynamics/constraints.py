@@ -52,9 +52,7 @@ class LinearConstraint(Value):
     name: str
     m: int
     function: Callable[[State, float], tuple[Array, Array]]
-    mu: ClassVar[float] = np.inf  # there is no friction to run out of
-    normal: ClassVar[Array] = UP  # plays no part
-    point_names: ClassVar[tuple[str, ...]] = ()
+    jacobian_is_constraint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         as_string("name of a constraint", self.name)
@@ -72,10 +70,6 @@ class LinearConstraint(Value):
     def row_names(self) -> tuple[str, ...]:
         """row 0, row 1, …"""
         return tuple(f"row {i}" for i in range(self.m))
-
-    def positions(self, state: State) -> Array:
-        """No points: shape (0, 3)."""
-        return np.zeros((0, 3))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """A itself, shape (m, nv): the constraint's force is Aᵀ λ."""
@@ -118,6 +112,7 @@ class RollingWheel(SinglePointContact):
     radius: float
     normal: Array = field(default_factory=lambda: UP)
     mu: float = DEFAULT_MU
+    jacobian_is_constraint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_contact(self)

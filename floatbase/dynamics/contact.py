@@ -18,50 +18,60 @@ from floatbase._validation import (
     read_only,
     unit_vector,
 )
-from floatbase.robots import State, as_corners
+from floatbase.robots import State
+from floatbase.robots._checks import as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
 DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete
 
 
 @runtime_checkable
-class Contact(Protocol):
-    """What every contact offers: rows A q̈ = b of the motion it holds, points where its forces act,
-    a friction cone for each.
-
-    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in
-    order.
+class MotionConstraint(Protocol):
+    """What `Contacts` are made of: rows A q̈ = b of (5), and the forces Jᵀ λ that hold them.
 
     name: in messages, active rows and pictures.
-    mu: coefficient of friction.
-    normal: unit normal out of the ground, shape (3,), world.
-    point_names: one for each point that carries a force; empty for a constraint whose forces have
-        no friction cone.
     k: number of force components.
     row_names: one for each row of (5).
+
+    A class whose J is A by definition may say so by a class attribute of its own,
+    `jacobian_is_constraint = True`: it is then asked once. Derived classes do not inherit it.
     """
 
     @property
     def name(self) -> str: ...
     @property
-    def mu(self) -> float: ...
-    @property
-    def normal(self) -> Array: ...
-    @property
-    def point_names(self) -> tuple[str, ...]: ...
-    @property
     def k(self) -> int: ...
     @property
     def row_names(self) -> tuple[str, ...]: ...
-
-    def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m, with n = len(point_names)."""
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
         """J of (4): Jᵀ λ is the generalised force of λ at time t, s; shape (k, nv)."""
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """(5) The rows A, shape (m, nv), and b, shape (m,), of A q̈ = b at time t, s."""
+
+
+@runtime_checkable
+class FrictionContact(MotionConstraint, Protocol):
+    """A constraint whose forces act at points, each inside a friction cone.
+
+    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in
+    order.
+
+    mu: coefficient of friction.
+    normal: unit normal out of the ground, shape (3,), world.
+    point_names: one for each point that carries a force.
+    """
+
+    @property
+    def mu(self) -> float: ...
+    @property
+    def normal(self) -> Array: ...
+    @property
+    def point_names(self) -> tuple[str, ...]: ...
+
+    def positions(self, state: State) -> Array:
+        """World positions of the points, shape (n, 3), m, with n = len(point_names)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +138,7 @@ class PointContact(SinglePointContact):
     mu: float = DEFAULT_MU
     radius: float = 0.0
     centre: Array = field(default_factory=lambda: np.zeros(3))
+    jacobian_is_constraint: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_contact(self)
@@ -227,7 +238,7 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
 
 
-def check_contact(contact: Contact) -> None:
+def check_contact(contact: FrictionContact) -> None:
     """Check a contact's friction coefficient and normal; scale the normal to unit length."""
     as_string("frame of a contact", contact.name)
     object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))

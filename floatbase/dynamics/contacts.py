@@ -21,32 +21,33 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.dynamics.constraints import LinearConstraint
 from floatbase.dynamics.contact import (
     DEFAULT_MU,
     UP,
-    Contact,
     FlatFootContact,
+    FrictionContact,
+    MotionConstraint,
     PointContact,
-    SinglePointContact,
 )
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
 PerFoot: TypeAlias = float | Sequence[float] | Array | Mapping[str, float]
+_FRICTION_PARTS = ("mu", "normal", "point_names", "positions")  # all of them, or none
 _HINT = "fb.Contacts.points(robot, frames=[…]) makes them from names"
 Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Value):
-    """Contacts stacked in order; none at all for free flight. `only`, `without` and `+` make new
-    ones.
+    """Contacts and other constraints stacked in order; none at all for free flight. `only`,
+    `without` and `+` make new ones.
 
     Raises `InputError` for a name that stands twice.
     """
 
-    items: Sequence[Contact]
+    _example = "fb.Contacts.points(robot)"
+    items: Sequence[MotionConstraint]
 
     def __post_init__(self) -> None:
         if not isinstance(self.items, Sequence) or isinstance(self.items, str):
@@ -55,8 +56,14 @@ class Contacts(Value):
             )
         object.__setattr__(self, "items", tuple(self.items))
         for contact in self.items:
-            if isinstance(contact, type) or not isinstance(contact, Contact):
+            if isinstance(contact, type) or not isinstance(contact, MotionConstraint):
                 raise InputError(f"{short_repr(contact)} is no contact; {_HINT}.")
+            lacks = [part for part in _FRICTION_PARTS if not hasattr(contact, part)]
+            if 0 < len(lacks) < len(_FRICTION_PARTS):
+                raise InputError(
+                    f"contact {contact.name!r} has friction but no {' and no '.join(lacks)}; see "
+                    f"floatbase.dynamics.FrictionContact."
+                )
         duplicates = sorted({name for name in self.names if self.names.count(name) > 1})
         if duplicates:
             raise InputError(
@@ -129,9 +136,16 @@ class Contacts(Value):
         return tuple(contact.name for contact in self.items)
 
     @cached_property
+    def friction_contacts(self) -> tuple[FrictionContact, ...]:
+        """Those whose forces act at points, inside friction cones; the others are constraints like
+        `LinearConstraint`.
+        """
+        return tuple(c for c in self.items if isinstance(c, FrictionContact))
+
+    @cached_property
     def point_names(self) -> tuple[str, ...]:
-        """Names of the points that carry forces, n of them; forces has 3 n entries."""
-        return tuple(name for contact in self.items for name in contact.point_names)
+        """Names of the points that carry forces, n of them, three entries of λ each."""
+        return tuple(name for contact in self.friction_contacts for name in contact.point_names)
 
     @property
     def n_points(self) -> int:
@@ -146,20 +160,23 @@ class Contacts(Value):
     @cached_property
     def normals(self) -> Array:
         """Normal of each point, shape (n, 3), world."""
-        return read_only(np.reshape([c.normal for c in self.items for _ in c.point_names], (-1, 3)))
+        return read_only(
+            np.reshape([c.normal for c in self.friction_contacts for _ in c.point_names], (-1, 3))
+        )
 
     @cached_property
     def mus(self) -> Array:
         """Coefficient of friction of each point, shape (n,)."""
-        return read_only([contact.mu for contact in self.items for _ in contact.point_names])
+        return read_only([c.mu for c in self.friction_contacts for _ in c.point_names])
 
     @cached_property
     def point_force_indices(self) -> npt.NDArray[np.intp]:
         """Which entries of λ are forces at points, shape (3 n,): all but those of a
         `LinearConstraint`.
         """
+        friction = {contact.name for contact in self.friction_contacts}
         entries = np.flatnonzero(
-            [bool(contact.point_names) for contact in self.items for _ in range(contact.k)]
+            [contact.name in friction for contact in self.items for _ in range(contact.k)]
         )
         entries.flags.writeable = False
         return entries
@@ -170,7 +187,7 @@ class Contacts(Value):
         """
         as_instance("state", state, State)
         return read_only(
-            np.vstack([np.zeros((0, 3)), *(contact.positions(state) for contact in self.items)])
+            np.vstack([np.zeros((0, 3)), *(c.positions(state) for c in self.friction_contacts)])
         )
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
@@ -223,17 +240,22 @@ class Contacts(Value):
             `UnknownNameError` for a name that is no
         contact's, `InputError` for a contact whose forces do not act at points.
         """
-        part, contact = self.force_slice(name), self[name]
-        if contact.k != 3 * len(contact.point_names):
-            raise InputError(
-                f"the forces of {name} do not act at points, so they add up to no force; see "
-                f"force_slice."
-            )
+        part = self.force_slice(self.friction_contact(name).name)
         stacked = numeric_copy(forces)
         if stacked is None or stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
             got = f"is {short_repr(forces)}" if stacked is None else f"has shape {stacked.shape}"
             raise InputError(f"forces {got}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
         return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
+
+    def friction_contact(self, name: str) -> FrictionContact:
+        """The contact of this name. Raises `InputError` for one whose forces do not act at points."""
+        contact = self[name]
+        if not isinstance(contact, FrictionContact):
+            raise InputError(
+                f"the forces of {name} do not act at points, so they add up to no force; see "
+                f"force_slice."
+            )
+        return contact
 
     def only(self, *names: str) -> Contacts:
         """The contacts of these names, in the order they have here."""
@@ -245,7 +267,7 @@ class Contacts(Value):
         dropped = [self[name].name for name in names]
         return Contacts([contact for contact in self.items if contact.name not in dropped])
 
-    def __getitem__(self, name: str) -> Contact:
+    def __getitem__(self, name: str) -> MotionConstraint:
         if not isinstance(name, str) or name not in self.names:
             raise unknown_name("contact", name, self.names)
         return self.items[self.names.index(name)]
@@ -260,7 +282,7 @@ class Contacts(Value):
             ]
         )
 
-    def __iter__(self) -> Iterator[Contact]:
+    def __iter__(self) -> Iterator[MotionConstraint]:
         return iter(self.items)
 
     def __len__(self) -> int:
@@ -270,21 +292,17 @@ class Contacts(Value):
         return f"Contacts({', '.join(self.names)}; k={self.k})"
 
 
-def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[Array, Array, Array]:
+def constraint_and_jacobian(
+    contact: MotionConstraint, state: State, t: float
+) -> tuple[Array, Array, Array]:
     """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact;
     read-only, at time t in s.
 
-    J is A where that is so by definition, as for a point: such a contact is asked once. Raises
-    `InputError` for other shapes.
+    Raises `InputError` for other shapes.
     """
-    A, b = map(read_only, contact.constraint(state, t))  # one's own may write to its arrays again
-    cls: Any = type(contact)  # one derived from ours may have another Jacobian
-    is_point = isinstance(contact, SinglePointContact) and (cls.jacobian, cls.constraint) == (
-        SinglePointContact.jacobian,
-        SinglePointContact.constraint,
-    )
-    is_linear = getattr(cls, "jacobian", None) is LinearConstraint.jacobian
-    J = A if is_point or is_linear else read_only(contact.jacobian(state, t))
+    A, b = map(read_only, contact.constraint(state, t))  # user code may write to its arrays again
+    is_A = vars(type(contact)).get("jacobian_is_constraint", False)
+    J = A if is_A else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
         required = f"they must have ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
@@ -295,7 +313,7 @@ def constraint_and_jacobian(contact: Contact, state: State, t: float) -> tuple[A
     return A, b, J
 
 
-def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Contact:
+def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
     if flat and foot.corners is not None:
         return FlatFootContact(foot.frame, foot.corners, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)

@@ -48,6 +48,7 @@ class EquationsOfMotion(Value):
     some of them.
     """
 
+    _example = "fb.equations_of_motion(state, contacts)"
     state: State
     contacts: Contacts
     t: float = 0.0

@@ -21,8 +21,6 @@ VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 # rad between two points of the grid on which the turning is added up: 1e-10 rad off after a turn
 _MAX_ROTATION_STEP = 0.01
 _MAX_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
-# m and rad to each side for central differences: curvature and rounding both leave about 1e-10 of M
-_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,38 +100,6 @@ def coriolis_matrix(state: State) -> Array:
     as_instance("state", state, State)
     model = state.robot.model
     return read_only(pin.computeCoriolisMatrix(model, model.createData(), state.q, state.v))
-
-
-def inertia_rate(state: State) -> Array:
-    """App. A: Ṁ = C + Cᵀ, shape (nv, nv): how M(q) changes in time when the robot moves with v."""
-    C = coriolis_matrix(state)
-    return read_only(C + C.T)
-
-
-def power_identity(state: State, C: npt.ArrayLike | None = None) -> float:
-    """App. A: vᵀ (Ṁ - 2 C) v, W, which is zero: fictitious forces do no net work.
-
-    Kinetic energy ½ vᵀ M v changes by vᵀ M q̈ + ½ vᵀ Ṁ v, and M q̈ = f - C v for a force f, so that
-    only vᵀ f remains. Ṁ comes from central differences of M along the motion, which know nothing of
-    C; their error is about 1e-10 of the two terms.
-    C: shape (nv, nv), `coriolis_matrix(state)` by default. Any C with the right C v gives zero.
-    """
-    as_instance("state", state, State)
-    C = coriolis_matrix(state) if C is None else as_array("C", C, (state.robot.nv, state.robot.nv))
-    dt = _STEP / max(1.0, float(np.max(np.abs(state.v), initial=0.0)))
-    after, before = (state.replace(q=state.integrate(t * state.v)).M for t in (dt, -dt))
-    return float(state.v @ ((after - before) / (2.0 * dt) - 2.0 * C) @ state.v)
-
-
-def centripetal_acceleration(omega: npt.ArrayLike, r: npt.ArrayLike) -> Array:
-    """App. A, the one-link robot: ω × (ω × r), shape (3,), m/s², of a point on a link that turns at
-    constant rate.
-
-    omega: (3,) rad/s; r: (3,) m, from a point of the axis to the link's, both in the answer's
-        frame. It points at the axis.
-    """
-    omega = as_array("omega", omega, (3,), "rad/s")
-    return read_only(np.cross(omega, np.cross(omega, as_array("r", r, (3,), "m"))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,6 +89,7 @@ class FeasibleSpace(Value):
     eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: [FBR], §2.2.2.
     """
 
+    _example = "fb.feasible_space(eom)"
     eom: EquationsOfMotion
     map: Affine
 

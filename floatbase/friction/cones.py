@@ -150,6 +150,7 @@ class FrictionPolyhedron(Value):
         `tangents` without it.
     """
 
+    _example = "FrictionPolyhedron(normal, mu)"
     normal: Array
     mu: float
     facets: int = 4

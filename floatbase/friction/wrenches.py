@@ -28,11 +28,11 @@ from floatbase._validation import (
     numeric_copy,
     read_only,
 )
-from floatbase.dynamics import Contacts, grasp_matrix
+from floatbase.dynamics import Contacts, FrictionContact, grasp_matrix
 from floatbase.errors import InfeasibleError, InputError
+from floatbase.friction._polytopes import cone_face_matrix, polytope_vertices
 from floatbase.friction.cones import FrictionPolyhedron
-from floatbase.friction.polytopes import cone_face_matrix, polytope_vertices
-from floatbase.qp import INFEASIBLE, UNBOUNDED, linear_program
+from floatbase.qp._linear_programs import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
 # N, by which `contains` lets contact forces pass their facets: what a linear program leaves
@@ -344,9 +344,7 @@ def wrench_set(
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)
-    without_cone = [
-        contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)
-    ]
+    without_cone = [c.name for c in contacts if not isinstance(c, FrictionContact)]
     if without_cone:
         raise InputError(
             f"{', '.join(without_cone)} has forces without a cone; leave it out: "

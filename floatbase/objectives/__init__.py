@@ -1,5 +1,7 @@
 """Costs: moved between spaces, on the centre of mass, and as tasks (§3 of the course text)."""
 
+from floatbase.objectives._task import Task
+from floatbase.objectives.angular_momentum import AngularMomentumTask
 from floatbase.objectives.centroidal import (
     TorquesFromForces,
     centroidal_inertia,
@@ -15,36 +17,31 @@ from floatbase.objectives.centroidal import (
     torques_from_forces,
     wrench_objective,
 )
+from floatbase.objectives.motion_tasks import (
+    CoMTask,
+    FrameTask,
+    OrientationTask,
+    PostureTask,
+    standing_tasks,
+)
 from floatbase.objectives.pullback import (
     argmin_coordinates,
     cost_on_space,
-    cost_on_torques,
     minimum_norm_coordinates,
     minimum_norm_pullback,
     partial_minimum,
 )
-from floatbase.objectives.tasks import (
-    CoMTask,
-    ForceTask,
-    FrameTask,
-    OrientationTask,
-    PostureTask,
-    Task,
-    TorqueTask,
-    standing_tasks,
-    target_shapes,
-    targets_at,
-)
+from floatbase.objectives.regularisation import ForceTask, TorqueTask
 
 # fmt: off
 __all__ = [
-    "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask", "Task", "TorqueTask",
-    "TorquesFromForces",
+    "AngularMomentumTask", "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask",
+    "Task", "TorqueTask", "TorquesFromForces",
     "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
     "com_wrench_map",
-    "cost_on_space", "cost_on_torques", "desired_wrench", "force_bias", "minimum_norm_coordinates",
+    "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",
     "minimum_norm_pullback",
     "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks",
     "tangential_bias",
-    "target_shapes", "targets_at", "torques_from_forces", "wrench_objective",
+    "torques_from_forces", "wrench_objective",
 ]

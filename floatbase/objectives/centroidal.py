@@ -24,6 +24,7 @@ from floatbase.affine import Affine, Quadratic
 from floatbase.dynamics import (
     Contacts,
     EquationsOfMotion,
+    FrictionContact,
     grasp_matrix,
     resolved_constraint,
     torque_force_space,
@@ -259,7 +260,7 @@ def _normal_matrix(contacts: Contacts) -> Array:
 
 def _require_point_forces(contacts: Contacts) -> None:
     as_instance("contacts", contacts, Contacts)
-    names = [contact.name for contact in contacts if contact.k != 3 * len(contact.point_names)]
+    names = [contact.name for contact in contacts if not isinstance(contact, FrictionContact)]
     if names:
         raise InputError(
             f"{', '.join(names)} has forces that do not act at points; leave it out: "

@@ -6,14 +6,8 @@ from __future__ import annotations
 
 from floatbase._validation import as_instance
 from floatbase.affine import Affine, Quadratic
-from floatbase.dynamics import Block, EquationsOfMotion, FeasibleSpace, accelerations_from_torques
+from floatbase.dynamics import Block, FeasibleSpace
 from floatbase.linear_algebra import null_space, svd_with_rank
-
-
-def cost_on_torques(cost_on_qdd: Quadratic, eom: EquationsOfMotion) -> Quadratic:
-    """(15) A cost on q̈ seen from the torques: Q̃(τ) = Q(η(τ)), with η of (14)."""
-    as_instance("cost_on_qdd", cost_on_qdd, Quadratic)
-    return cost_on_qdd.pullback(accelerations_from_torques(eom))
 
 
 def cost_on_space(

@@ -2,18 +2,16 @@
 course text).
 """
 
-from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set, table_top
+from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_constraints
 from floatbase.qp.labels import ConstraintLabel
-from floatbase.qp.linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Residuals, Solution
 from floatbase.qp.solve import check_solver, solve, solvers
 
 __all__ = [
-    "FEASIBILITY_TOLERANCE", "INFEASIBLE", "OPTIMAL", "QP", "UNBOUNDED", "ActiveSetRun",
+    "FEASIBILITY_TOLERANCE", "QP", "ActiveSetRun",
     "ConstraintLabel", "Iteration",
     "Residuals", "Solution", "active_set", "check_solver", "conflicting_constraints",
-    "linear_program", "solve", "solvers",
-    "table_top",
+    "solve", "solvers",
 ]  # fmt: skip

@@ -184,21 +184,6 @@ def active_set(
     )
 
 
-def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> QP:
-    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up),
-    subject to up ≥ 0.
-
-    With the minimum above the table the row "table" is inactive and might not be there; with the
-    minimum below it the row is active and might be an equality.
-    """
-    centre, H = (
-        as_array("minimum", minimum, (2,), "m"),
-        np.diag(as_array("curvature", curvature, (2,))),
-    )
-    G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
-    return QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
-
-
 @dataclass(frozen=True, eq=False)
 class _Result:
     """Where a walk ended: point, rows of W and their multipliers, the iterations that led there,

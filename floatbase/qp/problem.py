@@ -55,6 +55,7 @@ class QP(Value):
     Raises `InputError` when shapes or names do not fit.
     """
 
+    _example = "controller.qp(state)"
     H: Array
     g: Array
     A: Array

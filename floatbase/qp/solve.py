@@ -5,11 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import find_spec
 
 import numpy as np
 
 from floatbase._validation import Array, as_instance
-from floatbase.errors import SolverError, unknown_name
+from floatbase.errors import SolverError, require, unknown_name
 from floatbase.qp.active_set import active_set
 from floatbase.qp.conflicts import (
     FEASIBILITY_TOLERANCE,
@@ -40,7 +41,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     with weights too far apart, "active_set" answers, in 4 to 40 ms, and `Solution.solver` says so.
     Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the
     objective has no minimum or the solver did not converge, `UnknownNameError` for a solver that
-    does not exist.
+    does not exist, `MissingDependencyError` for "cvxpy" where it is not installed.
     """
     check_solver(solver)
     as_instance("qp", qp, QP)
@@ -56,14 +57,18 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
 
 def solvers() -> tuple[str, ...]:
-    """Names that `solve` takes."""
-    return tuple(_BACK_ENDS)
+    """Names that `solve` takes here: "cvxpy" only where it is installed."""
+    return tuple(name for name in _BACK_ENDS if name != "cvxpy" or find_spec("cvxpy"))
 
 
 def check_solver(solver: str) -> None:
-    """Raises `UnknownNameError` for a solver that `solve` does not take."""
+    """Raise `UnknownNameError` for a solver that `solve` does not take, and
+    `MissingDependencyError` for one whose package is not installed.
+    """
     if not isinstance(solver, str) or solver not in _BACK_ENDS:
         raise unknown_name("solver", solver, _BACK_ENDS)
+    if solver == "cvxpy":
+        require("cvxpy", extra="course")
 
 
 def _daqp(qp: QP) -> Solution | None:
@@ -117,8 +122,7 @@ def _cvxpy(qp: QP) -> Solution | None:
     """The whole problem, equalities included, by cvxpy and Clarabel at tight tolerances: slow and
     independent.
     """
-    import cvxpy as cp
-
+    cp = require("cvxpy", extra="course")
     reduced = qp.reduced
     # Clarabel does not check
     if np.any(

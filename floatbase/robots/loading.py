@@ -26,8 +26,9 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
+from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
-from floatbase.robots.robot import Foot, Robot, as_posture, clamp_to_limits, has_floating_base
+from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
     check_urdf,
     parse_urdf,

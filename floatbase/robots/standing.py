@@ -11,7 +11,8 @@ import pinocchio as pin
 from floatbase._validation import Array, as_array, as_half_spaces
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
-from floatbase.robots.robot import Foot, Robot, joint_limits
+from floatbase.robots._checks import joint_limits
+from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m

@@ -5,6 +5,7 @@ computed once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import ref
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,8 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
-from floatbase.robots.robot import Robot, check_unit_norms
+from floatbase.robots._checks import check_unit_norms
+from floatbase.robots.robot import Robot
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -41,6 +43,7 @@ class State(Value):
     sin) of joints without limits) that are not of unit length.
     """
 
+    _example = "robot.standing()"
     robot: Robot
     q: Array
     v: Array
@@ -60,28 +63,19 @@ class State(Value):
         vars(state).update(robot=robot, q=frozen(q.view()), v=frozen(v.view()))
         return state
 
-    def _take_data(self) -> pin.Data:
-        """Memory for Pinocchio's results: of a state that is gone, where there is some."""
-        try:
-            return self.robot._data_pool.pop()
-        except IndexError:
-            return self.robot.model.createData()
-
-    def __del__(self) -> None:
-        if (
-            "_data" in self.__dict__
-        ):  # nothing refers to this state any more, and what it handed out are copies
-            self.robot._data_pool.append(self._data)
-
-    @cached_property
+    @property
     def _data(self) -> pin.Data:
-        """Pinocchio's results at (q, v), never handed out: kinematics, then what is asked for,
-        which changes none of them.
+        """Pinocchio's results at (q, v): kinematics, then what is asked for, which changes none of
+        them. Never handed out: the next state that this thread asks about takes this memory.
         """
-        data = self._take_data()
-        # accelerations at q̈ = 0 are the drifts J̇ v
-        pin.forwardKinematics(self.robot.model, data, self.q, self.v, np.zeros(self.robot.nv))
-        return data
+        workspace = self.robot._workspace
+        if workspace.state() is not self:
+            # accelerations at q̈ = 0 are the drifts J̇ v
+            pin.forwardKinematics(
+                self.robot.model, workspace.data, self.q, self.v, np.zeros(self.robot.nv)
+            )
+            workspace.state, workspace.has_jacobians = ref(self), False
+        return workspace.data
 
     @cached_property
     def M(self) -> Array:
@@ -132,11 +126,14 @@ class State(Value):
         """
         return read_only([placement.homogeneous for placement in self._data.oMi])
 
-    @cached_property
+    @property
     def _jacobians(self) -> pin.Data:
         """Pinocchio's results with the Jacobians of all joints."""
-        pin.computeJointJacobians(self.robot.model, self._data)
-        return self._data
+        data, workspace = self._data, self.robot._workspace
+        if not workspace.has_jacobians:
+            pin.computeJointJacobians(self.robot.model, data)
+            workspace.has_jacobians = True
+        return data
 
     def frame_pose(self, frame: str) -> pin.SE3:
         """Pose T_world_frame of a frame. Raises `UnknownNameError`."""

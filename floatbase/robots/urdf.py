@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import InputError
-from floatbase.robots.robot import has_floating_base
+from floatbase.robots._checks import has_floating_base
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # types of joints that need a <limit>
@@ -77,6 +77,12 @@ def _parse_error(urdf: str, error: Exception) -> str:
 def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
     """Raise `InputError` for what Pinocchio reads without a word and (1)-(7) cannot hold."""
     root = ElementTree.fromstring(urdf)
+    for check in _CHECKS:
+        check(name, root, model)
+
+
+def _check_inertials(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """Masses and inertias are numbers, and no mass is negative."""
     for link in root.findall("link"):
         for inertial in link.findall("inertial"):
             mass, tensor = inertial.find("mass"), inertial.find("inertia")
@@ -92,14 +98,15 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
             ]
             invalid += [f"mass {values['mass']}"] if _as_float(values["mass"]) < 0.0 else []
             if invalid:
-                where = f"<inertial> of link {link.get('name')!r} of {name}"
                 raise InputError(
-                    f"{where} has {invalid[0]}; it needs a mass ≥ 0, kg, and six numbers ixx … "
-                    f"izz, kg m²."
+                    f"<inertial> of link {link.get('name')!r} of {name} has {invalid[0]}; it needs "
+                    f"a mass ≥ 0, kg, and six numbers ixx … izz, kg m²."
                 )
-    movable = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
-    names = [joint.get("name", "") for joint in movable]
-    for joint in movable:
+
+
+def _check_limits_and_axes(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """Lower limits lie below upper limits, and axes have a direction."""
+    for joint in _movable_joints(root):
         label, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
         lower, upper = (
             _as_float(limit.get(end, "0")) if limit is not None else 0.0
@@ -108,18 +115,19 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
         if joint.get("type") in _LIMITED_JOINT_TYPES and lower > upper:
             raise InputError(
                 f"joint {label!r} of {name} has the lower limit {lower:g} above the upper limit "
-                f"{upper:g} (rad, or m; a limit "
-                "that is not given is 0). Swap lower and upper in <limit>, or make it continuous "
-                "if it turns without limit."
+                f"{upper:g} (rad, or m; a limit that is not given is 0). Swap lower and upper in "
+                f"<limit>, or make it continuous if it turns without limit."
             )
         if axis is not None and not any(map(_as_float, axis.get("xyz", "1").split())):
             raise InputError(
                 f"joint {label!r} of {name} has an <axis> of zeros; give its direction, as in "
                 f'xyz="0 0 1".'
             )
-    for i, inertia in list(enumerate(model.inertias))[
-        1:
-    ]:  # with all that is welded: a sum may mend a negative part
+
+
+def _check_moments_of_inertia(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """No link has a negative moment of inertia, with all that is welded to it."""
+    for i, inertia in list(enumerate(model.inertias))[1:]:  # a sum may mend a negative part
         smallest = float(inertia.inertia.diagonal().min())
         if smallest < -_ROUNDING:
             where = (
@@ -129,31 +137,44 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
             )
             raise InputError(
                 f"{where} of {name} has a negative moment of inertia, {smallest:.4g} kg m², with "
-                f"all that is welded to it; "
-                "ixx, iyy and izz of <inertia> must be above zero there."
+                f"all that is welded to it; ixx, iyy and izz of <inertia> must be above zero there."
             )
+
+
+def _check_reserved_names(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """Nothing has the name of the base link's frame or of the base's own joint."""
     base_frame = next((frame for frame in model.frames if frame.name == "base"), None)
     if base_frame is not None and base_frame.parentJoint != int(has_floating_base(model)):
         raise InputError(
             f"a {'link' if base_frame.type == pin.BODY else 'joint'} of {name} that moves is "
-            f"called base, the word for the "
-            "link that all others hang from, on every robot; rename it."
+            f"called base, the word for the link that all others hang from, on every robot; "
+            f"rename it."
         )
     if list(model.names).count("root_joint") > 1:
         raise InputError(
             f"a joint of {name} is called root_joint, as Pinocchio calls that of a free base; "
             f"rename it."
         )
-    for moved in model.joints:
-        if moved.nv > 1 and model.names[moved.id] in names:
+
+
+def _check_joint_types(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """Every joint moves in one way."""
+    names = [joint.get("name", "") for joint in _movable_joints(root)]
+    for joint in model.joints:
+        if joint.nv > 1 and model.names[joint.id] in names:
             raise InputError(
-                f"joint {model.names[moved.id]!r} of {name} moves in {moved.nv} ways; a motor "
-                f"drives one. Make it "
-                "revolute, continuous, prismatic or fixed; the base is made free by floating=True."
+                f"joint {model.names[joint.id]!r} of {name} moves in {joint.nv} ways; a motor "
+                f"drives one. Make it revolute, continuous, prismatic or fixed; the base is made "
+                f"free by floating=True."
             )
+
+
+def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+    """No joint mimics another."""
+    names = [joint.get("name", "") for joint in _movable_joints(root)]
     masters = {
         joint.get("name", ""): mimic.get("joint", "")
-        for joint in movable
+        for joint in _movable_joints(root)
         for mimic in joint.findall("mimic")
     }
     if masters:
@@ -164,10 +185,23 @@ def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
             f"joints of {name} are coupled: {pairs}. Such couplings are not part of (1)-(7), where "
-            f"every joint has a motor of "
-            f"its own. Hold these joints still, locked={coupled}, or take <mimic> out of the URDF "
-            f"where they do have motors."
+            f"every joint has a motor of its own. Hold these joints still, locked={coupled}, or "
+            f"take <mimic> out of the URDF where they do have motors."
         )
+
+
+_CHECKS = (
+    _check_inertials,
+    _check_limits_and_axes,
+    _check_moments_of_inertia,
+    _check_reserved_names,
+    _check_joint_types,
+    _check_couplings,
+)
+
+
+def _movable_joints(root: ElementTree.Element) -> list[ElementTree.Element]:
+    return [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
 
 
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:

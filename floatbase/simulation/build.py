@@ -130,7 +130,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         )
         plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
-    for foot, feet in zip(robot.feet, Contacts.feet(robot), strict=True):
+    for foot, feet in zip(robot.feet, Contacts.feet(robot).friction_contacts, strict=True):
         _add_foot_balls(spec, foot, feet.point_names)
     _add_link_hulls(spec, robot)
     try:

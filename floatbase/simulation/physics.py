@@ -54,6 +54,8 @@ class Simulation:
     be set; what `model` and `data` hold may change. A copy has `model` and `data` of its own.
     """
 
+    _example = "fb.Simulation(robot)"
+
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self._robot = as_instance("robot", robot, Robot)
         self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)

@@ -17,7 +17,7 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.simulation.physics import Simulation
@@ -57,6 +57,7 @@ class Rollout(Value):
         τ_desired is that of the joint damping, planned forces are NaN.
     """
 
+    _example = "fb.rollout(sim, controller, duration=1.0)"
     robot: Robot
     contacts: Contacts
     time: Array
@@ -126,7 +127,7 @@ class Rollout(Value):
             else self.foot_positions - self.rolling_displacement()
         )
         max_distance, first = np.zeros(positions.shape[1]), 0
-        for contact in self.contacts:
+        for contact in self.contacts.friction_contacts:
             points = slice(first, first := first + len(contact.point_names))
             for begin, end in self._stance_intervals(contact.name):
                 distance = np.linalg.norm(
@@ -152,7 +153,7 @@ class Rollout(Value):
         """
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
-            for contact in self.contacts
+            for contact in self.contacts.friction_contacts
             for _ in contact.point_names
         ]
         rates = np.zeros((len(self), len(arms), 3))
@@ -332,16 +333,17 @@ class Recorder:
         lowest = sim.foot_contacts.positions(self._foot_centres[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
+            point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
             forces, positions = (
                 np.full((n, contact.k), np.nan),
-                np.full((n, len(contact.point_names), 3), np.nan),
+                np.full((n, len(point_names), 3), np.nan),
             )
             if contact.name in feet.names:
                 part = feet.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
-                if contact.point_names == feet[contact.name].point_names:
+                if point_names == feet.only(contact.name).point_names:
                     forces, positions = measured[:, points].reshape(n, contact.k), lowest[:, points]
-                elif len(contact.point_names) == 1:
+                elif len(point_names) == 1:
                     forces = measured[:, points].sum(axis=1)
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import judges
 import numpy as np
 import pytest
+from messages import refused
 
 import floatbase as fb
 from floatbase.dynamics import FlatFootContact, PointContact
+from floatbase.errors import InputError
 from floatbase.robots import Foot
 from floatbase.simulation import Ground
 
@@ -30,7 +32,7 @@ def tilted(name: str, seed: int) -> fb.Contacts:
 
 
 def owners(contacts: fb.Contacts) -> list[str]:
-    return [contact.name for contact in contacts for _ in contact.point_names]
+    return [contact.name for contact in contacts.friction_contacts for _ in contact.point_names]
 
 
 @dataclass
@@ -306,3 +308,22 @@ def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(
     assert (
         np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
     )  # kp times the radius, m/s²
+
+
+def test_a_constraint_of_a_users_own_needs_no_friction_and_half_of_it_is_refused() -> None:
+    class Rail:
+        name, k, row_names = "rail", 1, ("across",)
+
+        def jacobian(self, state: fb.State, t: float = 0.0) -> np.ndarray:
+            return self.constraint(state, t)[0]
+
+        def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+            return np.eye(18)[6:7], np.zeros(1)
+
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot, frames=["FL_foot"]) + fb.Contacts([Rail()])
+    assert contacts.k == 4 and contacts.point_names == ("FL_foot",)
+    assert [contact.name for contact in contacts.friction_contacts] == ["FL_foot"]
+    assert fb.equations_of_motion(robot.standing(), contacts).A.shape == (4, 18)
+    Rail.mu = 0.5
+    refused(lambda: fb.Contacts([Rail()]), InputError, "rail", "normal", "point_names")

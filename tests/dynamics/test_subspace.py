@@ -110,7 +110,9 @@ def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
 def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """M and J from MuJoCo."""
     judge = judges.mujoco_of(eom.robot.name).move_to(eom.state)
-    owners = [contact.name for contact in eom.contacts for _ in contact.point_names]
+    owners = [
+        contact.name for contact in eom.contacts.friction_contacts for _ in contact.point_names
+    ]
     points = zip(owners, eom.contacts.positions(eom.state), strict=True)
     J = [judge.jacobian(frame, point)[0] for frame, point in points]
     return judge.M, np.vstack([np.zeros((0, eom.nv)), *J])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from floatbase.friction import cone_face_matrix, polytope_vertices
+from floatbase.friction._polytopes import cone_face_matrix, polytope_vertices
 
 Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)

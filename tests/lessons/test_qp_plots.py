@@ -11,7 +11,8 @@ from messages import raises, refused
 
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.lessons import qp_plots
-from floatbase.qp import QP, table_top
+from floatbase.lessons.lessonC import table_top
+from floatbase.qp import QP
 
 BOX = (-3.0, 3.0, -2.0, 3.0)
 NONE = np.zeros((0, 2)), np.zeros(0)

@@ -59,7 +59,7 @@ def mujocos_momentum_rate(
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(
         mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
     )
-    owners = [contact.name for contact in contacts for _ in contact.point_names]
+    owners = [contact.name for contact in contacts.friction_contacts for _ in contact.point_names]
     data.qfrc_applied[:] = 0.0
     for frame, point, force in zip(
         owners, contacts.positions(state), forces.reshape(-1, 3), strict=True
@@ -443,7 +443,6 @@ NONE = np.zeros(3)
         (lambda: objectives.desired_wrench(STATE, [0.0, 0.0]), "com_acceleration", 2, 3),
         (lambda: objectives.torques_from_forces(EOM).distance(np.zeros(9)), "forces", 9, 12),
         (lambda: objectives.torques_from_forces(EOM).nearest(np.zeros(9)), "forces", 9, 12),
-        (lambda: objectives.cost_on_torques(Quadratic.zero(12), EOM), 18, 12),
         (
             lambda: objectives.partial_minimum(Quadratic.zero(12), SPACE, "lambda"),
             "lambda", "qdd", "tau", "forces",

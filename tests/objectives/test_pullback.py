@@ -83,7 +83,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
     for seed in (None, 0):
         eom = judges.at_rest(name, seed)
         cost = Quadratic.from_residual(*costs(eom)["qdd"])
-        seen = objectives.cost_on_torques(cost, eom)
+        seen = cost.pullback(fb.accelerations_from_torques(eom))
         for _ in range(5):
             tau = rng.normal(size=eom.d)
             kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
@@ -97,7 +97,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
 def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name: str) -> None:
     eom = judges.at_rest(name)
     residuals = {"qdd": costs(eom)["qdd"]}
-    seen = objectives.cost_on_torques(as_quadratics(residuals)["qdd"], eom)
+    seen = as_quadratics(residuals)["qdd"].pullback(fb.accelerations_from_torques(eom))
     assert seen(seen.minimiser()) == pytest.approx(least(eom, residuals), rel=1e-6)
 
 

@@ -15,7 +15,8 @@ from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError, SolverError
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ActiveSetRun, active_set, solve, table_top
+from floatbase.lessons.lessonC import table_top
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ActiveSetRun, active_set, solve
 
 Array = np.ndarray
 BOX = np.vstack([np.eye(2), -np.eye(2)])

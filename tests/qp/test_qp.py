@@ -18,22 +18,19 @@ from messages import missing, raises, refused
 import floatbase as fb
 from floatbase.affine import Affine
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
+from floatbase.lessons.lessonC import table_top
 from floatbase.qp import (
-    INFEASIBLE,
-    OPTIMAL,
     QP,
-    UNBOUNDED,
     ConstraintLabel,
     Residuals,
     Solution,
     active_set,
     check_solver,
     conflicting_constraints,
-    linear_program,
     solve,
     solvers,
-    table_top,
 )
+from floatbase.qp._linear_programs import INFEASIBLE, OPTIMAL, UNBOUNDED, linear_program
 
 seeds = st.integers(0, 100_000)
 

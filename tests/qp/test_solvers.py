@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 
 import judges
@@ -10,7 +11,7 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.errors import InfeasibleError, SolverError
+from floatbase.errors import InfeasibleError, MissingDependencyError, SolverError
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
@@ -360,4 +361,18 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
     assert "active_set" in answered, (
         "DAQP managed: these states no longer try what this test is about"
+    )
+
+
+def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "cvxpy", None)  # as if it were not installed
+    assert "cvxpy" not in solvers()
+    refused(lambda: solve(corner(), "cvxpy"), MissingDependencyError, "cvxpy", "floatbase[course]")
+    robot = judges.load("go2")
+    refused(
+        lambda: fb.WholeBodyController(robot, judges.stance(robot), [], solver="cvxpy"),
+        MissingDependencyError,
+        "floatbase[course]",
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from operator import attrgetter, methodcaller
 from typing import Any
 
@@ -128,12 +129,26 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name: str) -> None:
             for ask in ("point", "frame_jacobian", "frame_velocity", "frame_drift")
         )
         questions += [*of_frame, lambda s, frame=frame: s.frame_pose(frame).homogeneous]
-    alone = [ask(robot.random_state(5)) for ask in questions]
+    alone = [[ask(robot.random_state(seed)) for ask in questions] for seed in (5, 6)]
     rng = np.random.default_rng(0)
     for _ in range(N):
-        state = robot.random_state(5)
-        for i in rng.permutation(2 * len(questions)) % len(questions):  # each twice
-            assert np.array_equal(questions[i](state), alone[i])
+        two, answers = (robot.random_state(5), robot.random_state(6)), []
+        for i in rng.permutation(4 * len(questions)):  # each twice of both states, interleaved
+            which, question = i % 2, i // 2 % len(questions)
+            answers.append((questions[question](two[which]), alone[which][question]))
+        assert all(np.array_equal(found, expected) for found, expected in answers)  # still so
+
+
+def test_threads_may_ask_the_same_state(name: str) -> None:
+    robot = judges.load(name)
+    states = [robot.random_state(seed) for seed in range(4)]
+    expected = [robot.random_state(seed).frame_drift("base") for seed in range(4)]
+
+    def ask(i: int) -> bool:
+        return np.array_equal(states[i % 4].frame_drift("base"), expected[i % 4])
+
+    with ThreadPoolExecutor(4) as threads:
+        assert all(threads.map(ask, range(400)))
 
 
 def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:

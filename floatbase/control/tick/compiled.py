@@ -20,9 +20,8 @@ import numpy as np
 
 from floatbase._validation import Array
 from floatbase.control.problem import Problem, assemble_qp, residual_of
-from floatbase.control.tick.problem_arrays import TASK_KINDS, dynamics_of, pack_problem
+from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
-from floatbase.objectives import target_shapes, targets_at
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
@@ -129,7 +128,7 @@ class CompiledTick:
         self.unchecked_tasks = [
             task
             for i, task in enumerate(problem.tasks)
-            if i in time_varying or type(task) not in TASK_KINDS
+            if i in time_varying or task_kind(task) is None
         ]
         self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
@@ -202,11 +201,10 @@ class CompiledTick:
         return something else.
         """
         values: dict[int, dict[str, Any]] = {}
-        for index, task, first in self._time_varying_tasks:
+        for index, moving, first in self._time_varying_tasks:
             values[index] = {}
-            for name, shape in target_shapes(
-                task, self._problem.robot, self._problem.contacts.k
-            ).items():
+            shapes = moving.shapes_for(self._problem.robot, self._problem.contacts.k)
+            for name, shape in shapes.items():
                 values[index][name] = inputs.packed[first : first + prod(shape)].reshape(shape)
                 first += prod(shape)
         eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
@@ -268,7 +266,7 @@ class CompiledTick:
         targets, robot = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot
         k = self._problem.contacts.k
         for _, task, first in self._time_varying_tasks:
-            for value in targets_at(task, robot, k, t):
+            for value in task.targets_at(robot, k, t):
                 targets[first : first + value.size] = value.ravel()
                 first += value.size
         return targets

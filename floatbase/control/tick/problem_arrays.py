@@ -20,25 +20,16 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem
-from floatbase.dynamics import Contact, FlatFootContact, PointContact
+from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
-from floatbase.objectives import (
-    CoMTask,
-    ForceTask,
-    FrameTask,
-    OrientationTask,
-    PostureTask,
-    Task,
-    TorqueTask,
-    target_shapes,
-    targets_at,
-)
+from floatbase.objectives import Task
+from floatbase.objectives._task import TargetTask
 from floatbase.robots import Robot
 
 COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
-TASK_KINDS: dict[type, int] = {
-    CoMTask: COM, OrientationTask: ORIENTATION, FrameTask: FRAME, PostureTask: POSTURE,
-    ForceTask: FORCE, TorqueTask: TORQUE
+_TASK_KINDS = {
+    "com": COM, "orientation": ORIENTATION, "frame": FRAME, "posture": POSTURE, "force": FORCE,
+    "torque": TORQUE
 }  # fmt: skip
 POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
@@ -104,11 +95,18 @@ if hasattr(os, "register_at_fork"):
 dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
 
 
+def task_kind(task: Task) -> int | None:
+    """The compiled form of a task, which its own class declares; None where it has none, and its
+    residual is called.
+    """
+    return _TASK_KINDS.get(vars(type(task)).get("compiled_as", ""))
+
+
 class TimeVaryingTask(NamedTuple):
     """A task whose targets are a function of time."""
 
     task_index: int  # of the task
-    task: Task
+    task: TargetTask
     first: int  # where its targets start among all
 
 
@@ -179,14 +177,17 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 
 
 def _pack_contact(
-    robot: Robot, contact: Contact, options: PolyhedronOptions
+    robot: Robot, contact: MotionConstraint, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     """One contact: row of the table, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
-    n = len(contact.point_names)
+    n = 0
+    cones: Array = np.zeros((0, 5))
+    if isinstance(contact, FrictionContact):
+        n, cones = len(contact.point_names), _cones(contact, options)
     row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k)
-    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), _cones(contact, options)
+    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), cones
 
 
 @lru_cache(maxsize=256)
@@ -209,10 +210,8 @@ def _pack_builtin_contact(
     )
 
 
-def _cones(contact: Contact, options: PolyhedronOptions) -> Array:
+def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
     """Facets and -normal of each point with their lengths, and a zero, (p (F + 1), 5)."""
-    if not contact.point_names:
-        return np.zeros((0, 5))
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
     rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
@@ -225,26 +224,26 @@ def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
 
     Those of the package: where one of another kind stands among them does not matter.
     """
-    known = [i for i, task in enumerate(problem.tasks) if type(task) in TASK_KINDS]
-    n, robot = len(known), problem.robot
+    known = [
+        (i, kind, cast(TargetTask, task))
+        for i, task in enumerate(problem.tasks)
+        if (kind := task_kind(task)) is not None
+    ]
+    n, robot, k = len(known), problem.robot, problem.contacts.k
     table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE_SIZE))
     targets: list[Array] = [np.zeros(0)]
     first, time_varying = 0, []
-    for i, index in enumerate(known):
-        task = problem.tasks[index]
-        joint, poses[i] = (
-            _frame_placement(robot, task.frame)
-            if isinstance(task, OrientationTask | FrameTask)
-            else (0, np.zeros(_POSE_SIZE))
-        )
-        table[i] = TASK_KINDS[type(task)], joint, first
+    for i, (index, kind, task) in enumerate(known):
+        frame, joint = getattr(task, "frame", None), 0
+        if frame is not None:
+            joint, poses[i] = _frame_placement(robot, frame)
+        table[i] = kind, joint, first
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
-        shapes = target_shapes(task, robot, problem.contacts.k)
-        values: list[Array] = [np.zeros(shape) for shape in shapes.values()]
-        if callable(getattr(task, next(iter(shapes)))):
+        values: list[Array] = [np.zeros(shape) for shape in task.shapes_for(robot, k).values()]
+        if task.is_time_varying:
             time_varying.append(TimeVaryingTask(index, task, first))
         else:
-            values = targets_at(task, robot, problem.contacts.k, 0.0)
+            values = task.targets_at(robot, k, 0.0)
         targets += [target.ravel() for target in values]
         first += sum(target.size for target in values)
     return table, gains, poses, np.concatenate(targets), time_varying

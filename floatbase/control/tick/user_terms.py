@@ -15,7 +15,7 @@ from floatbase._validation import Array, read_only
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem, residual_of
-from floatbase.control.tick.problem_arrays import CONTACT_KINDS, TASK_KINDS
+from floatbase.control.tick.problem_arrays import CONTACT_KINDS, task_kind
 from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -52,7 +52,7 @@ class UserTerms:
         self._tasks = [
             (i, task, BLOCKS.index(task.block))
             for i, task in enumerate(problem.tasks)
-            if type(task) not in TASK_KINDS
+            if task_kind(task) is None
         ]
         self._contacts = [
             contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS

@@ -72,7 +72,8 @@ def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike)
     for contact in contacts:
         own = flat[first : first + contact.k]
         first += contact.k
-        one, corners = contacts.only(contact.name), _to_pixels(contact.positions(state))
+        one = contacts.only(contact.name)
+        corners = _to_pixels(one.positions(state))
         drawn += _polygon(corners)
         for (x, y), normal in zip(corners, own[2::3], strict=True):
             radius = 0.8 * np.sqrt(max(float(normal), 0.0))

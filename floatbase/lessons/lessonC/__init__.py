@@ -14,6 +14,7 @@ from floatbase.lessons.lessonC.helpers import (
     row_to_drop,
     run_with_push,
     standing_controller,
+    table_top,
 )
 from floatbase.lessons.lessonC.pictures import (
     ActiveSetGame,
@@ -43,4 +44,5 @@ __all__ = [
     "show_solver_path",
     "show_table",
     "standing_controller",
+    "table_top",
 ]  # fmt: skip

@@ -24,6 +24,19 @@ PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it 
 _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
+def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> fb.QP:
+    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up),
+    subject to up ≥ 0.
+
+    With the minimum above the table the row "table" is inactive and might not be there; with the
+    minimum below it the row is active and might be an equality.
+    """
+    centre = as_array("minimum", minimum, (2,), "m")
+    H = np.diag(as_array("curvature", curvature, (2,)))
+    G, h = np.array([[0.0, -1.0]]), np.zeros(1)  # -up ≤ 0
+    return fb.QP(H, -H @ centre, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=("table",))
+
+
 def corner_table(
     minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike = (1.0, 0.5)
 ) -> fb.QP:

@@ -22,9 +22,9 @@ from PIL import Image
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import qp_plots, static_export
-from floatbase.lessons.lessonC.helpers import corner_table
+from floatbase.lessons.lessonC.helpers import corner_table, table_top
 from floatbase.lessons.rounding import rounded
-from floatbase.qp import QP, table_top
+from floatbase.qp import QP
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.scene.colours import GREYS, hex_code
 

@@ -20,7 +20,7 @@ from floatbase._validation import (
     as_string,
     short_repr,
 )
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.shapes import Item, Picture, with_normal_paths
@@ -171,9 +171,7 @@ def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.b
     be drawn.
     """
     as_instance("contacts", contacts, Contacts)
-    drawn = np.array(
-        [contact.k == 3 * len(contact.point_names) for contact in contacts], dtype=bool
-    )
+    drawn = np.array([isinstance(c, FrictionContact) for c in contacts], dtype=bool)
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
     return contacts.only(*names), np.repeat(
         drawn, np.array([contact.k for contact in contacts], dtype=int)

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from floatbase._validation import Array, as_instance, numeric_copy, short_repr
+from floatbase.dynamics import FrictionContact
 from floatbase.errors import InputError
 from floatbase.viewer.export.recording import as_rollout
 from floatbase.viewer.scene.colours import (
@@ -250,7 +251,13 @@ def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
     """
     points, starts = (
         _normal(rollout, forces),
-        np.cumsum([0] + [len(contact.point_names) for contact in rollout.contacts]),
+        np.cumsum(
+            [0]
+            + [
+                len(contact.point_names) if isinstance(contact, FrictionContact) else 0
+                for contact in rollout.contacts
+            ]
+        ),
     )
     return np.array([points[a:b].sum(axis=0) for a, b in pairwise(starts)])
 

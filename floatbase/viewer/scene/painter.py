@@ -106,7 +106,7 @@ class Painter:
         if contacts is not None and contacts.n_points:
             stands = [
                 contact.name not in chosen.swing_feet
-                for contact in contacts
+                for contact in contacts.friction_contacts
                 for _ in contact.point_names
             ]
             picture |= self._contacts(
@@ -344,7 +344,7 @@ class Painter:
         numbers of its corners.
         """
         picture: Picture = {}
-        for contact in contacts:
+        for contact in contacts.friction_contacts:
             rows = [list(contacts.point_names).index(name) for name in contact.point_names]
             middle = positions[rows].mean(axis=0)
             away = (middle - state.com) * [1.0, 1.0, 0.0]

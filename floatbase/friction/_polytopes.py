@@ -16,7 +16,7 @@ import numpy.typing as npt
 from floatbase._validation import Array
 from floatbase.errors import SolverError
 from floatbase.linear_algebra import svd_with_rank
-from floatbase.qp import linear_program
+from floatbase.qp._linear_programs import linear_program
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
