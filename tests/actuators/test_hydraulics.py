@@ -458,7 +458,11 @@ def test_robots_that_cannot_have_cylinders_are_refused() -> None:
     refused(lambda: HydraulicActuators(endless), InputError, "RR_calf_joint", "go2")
     refused(lambda: HydraulicActuators(go2, 20.0), InputError, "hydraulics", 20.0)  # type: ignore[arg-type]
     refused(
-        lambda: HydraulicActuators(go2, max_lever_angle=np.zeros(3)), InputError, "centre", 3, 12
+        lambda: HydraulicActuators(go2, max_lever_angle=np.zeros(3)),
+        InputError,
+        "max_lever_angle",
+        3,
+        12,
     )
     refused(lambda: Cylinders(HYQ, [0.0], [0.0]), InputError, 0)
     refused(lambda: HydraulicActuators(panda), InputError, "panda_finger_joint1")  # it slides
