@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING, Any
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
 from floatbase.lessons.exercises import (
-    Exercise,
     NumericJudge,
-    ShapeJudge,
-    Verdict,
     all_exercises,
-    array_or_verdict,
     check,
     reveal,
     show_progress,
@@ -55,14 +51,10 @@ _LAZY = {
 __all__ = [
     "FIGURES",
     "ConstantTorques",
-    "Exercise",
     "NumericJudge",
-    "ShapeJudge",
     "SliderPanel",
     "TorqueCommand",
-    "Verdict",
     "all_exercises",
-    "array_or_verdict",
     "check",
     "compare",
     "controller_factory",
