@@ -135,8 +135,8 @@ class Bench:
         self.samples.append(self._sample(u))
 
     def _sample(self, u: float) -> BenchSample:
-        pressures = self.actuators.state.pressures[:, 0].tolist()
-        return BenchSample(self.time, self.torque, u, *pressures, self.angle)
+        a, b = self.actuators.state.pressures[:, 0].tolist()
+        return BenchSample(self.time, self.torque, u, a, b, self.angle)
 
 
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
