@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    Verdict,
+    function_or_verdict,
+)
 from floatbase.lessons.lessonC.helpers import braking_qp
 from floatbase.qp import QP, active_set
 
@@ -176,16 +182,9 @@ def _judge_step(answer: Any) -> Verdict:
 
 def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
     """Run cases of a learner's function; the first that has something to say decides."""
-    if answer is None or answer is Ellipsis:
-        return Verdict(
-            False, "There is no answer yet: give your function, without brackets.", "no_answer"
-        )
-    if not callable(answer):
-        return Verdict(
-            False,
-            f"The answer is a function, written with def; this is {type(answer).__name__}.",
-            "no_function",
-        )
+    program = function_or_verdict(answer)
+    if isinstance(program, Verdict):
+        return program
     for case in cases:
         try:
             with np.errstate(all="ignore"):
