@@ -44,5 +44,5 @@ def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_ev
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
     assert float(shown["dynamics/constraint_rank", "CONSTRAINT_NOISE"]) == CONSTRAINT_NOISE
     assert float(shown["qp/conflicts", "FEASIBILITY_TOLERANCE"]) == FEASIBILITY_TOLERANCE
-    assert shown["qp/solve", "CLARABEL"] == "(1e-12, 1e-10, 1e-8)"
+    assert shown["qp/solve", "CLARABEL_TOLERANCES"] == "(1e-12, 1e-10, 1e-8)"
     assert all(len(reason) > 15 for *_, reason in conventions.tolerances())

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from floatbase._validation import Array
 from floatbase.actuators import VACUUM, Hydraulics
 from floatbase.lessons import props, svg
-from floatbase.lessons.lessonB.bench import Bench, BenchSample, hold_then_turn, run_force_loop
+from floatbase.lessons.lessonB.helpers import Bench, BenchSample, hold_then_turn, run_force_loop
 from floatbase.lessons.rounding import rounded
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, prefixed, shapes
