@@ -161,7 +161,9 @@ FIGURES: dict[str, Callable[..., Viewer]] = {
 
 
 def _example_forces(weight: float) -> Array:
-    """Forces at four feet, (4, 3), N: they carry the weight unevenly, and lean, inside their cones."""
+    """Forces at four feet, (4, 3), N: they carry the weight unevenly, and lean, inside their
+    cones.
+    """
     shares = np.array([0.32, 0.21, 0.27, 0.20])
     lean = np.array([[-0.25, 0.15, 1.0], [0.30, 0.20, 1.0], [0.10, 0.35, 1.0], [-0.35, 0.20, 1.0]])
     return weight * shares[:, None] * lean

@@ -98,7 +98,9 @@ def append(name: str, entry: dict[str, Any]) -> str:
 
 
 def storage_problem() -> str:
-    """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no file."""
+    """Why tries and predictions cannot be kept, and what to do; "" where they can. Makes no
+    file.
+    """
     return _append_line(b"")
 
 

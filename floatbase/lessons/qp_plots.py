@@ -163,5 +163,6 @@ def _plot_constraint(qp: QP, i: int, thick: bool, box: Box, axis: Axes) -> None:
             textcoords="offset points", ha="center",
             va="center",
             color=GREYS[0], weight="bold" if thick else "normal", annotation_clip=True,
-            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none",
+                  "alpha": 0.8},
         )  # fmt: skip

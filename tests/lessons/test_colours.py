@@ -94,9 +94,7 @@ def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(
     assert found and not found & TAKEN
 
 
-def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_a_colour_of_forces_or_cones() -> (
-    None
-):
+def test_bars_of_forces_have_the_colour_of_planned_forces_and_no_other_bar_has() -> None:
     base, qdd, tau, forces = lesson03.motion_bars(np.ones(18), np.ones(12), np.ones(12)).split(
         "<svg"
     )[1:]

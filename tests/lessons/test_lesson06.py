@@ -15,6 +15,7 @@ from floatbase.lessons.lesson06 import (
     ConeController,
     compass_row,
     constrained_minimiser,
+    friction_ratios,
     make_controller,
     region_picture,
     show_force,
@@ -115,8 +116,10 @@ def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
         state_with_feet_at(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
 
 
-def test_the_normal_of_a_slope() -> None:
+def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:
     assert np.allclose(slope_normal(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
+    assert np.allclose(friction_ratios([0, 0, 50.0, 30.0, 0, 40.0], UP), [0.0, 0.75])
+    assert np.allclose(friction_ratios([0, 0, 50.0], slope_normal(20)), np.tan(np.deg2rad(20)))
 
 
 @pytest.mark.parametrize(

@@ -103,9 +103,7 @@ def test_how_a_record_ended_in_words() -> None:
         assert outcome_text(replace(record, outcome="fell", q=q)) == words
 
 
-def test_corner_forces_make_the_wrench_where_the_rows_allow_it_and_stay_inside_where_they_do_not() -> (
-    None
-):
+def test_corner_forces_make_the_wrench_where_the_rows_allow_it_else_stay_inside() -> None:
     possible = np.array([20.0, -30.0, 443.0, 5.0, -12.0, 6.0])
     forces = corner_forces(STATE, LEFT, possible)
     assert np.max(limits().face_matrix @ possible) < 0.0

@@ -76,7 +76,9 @@ def data_of(shown: Any) -> dict[str, Any]:
 def scene_at(
     data: dict[str, Any], stop: str | None = None, view: int = 0
 ) -> dict[tuple[str, ...], bytes]:
-    """Key -> command of the first scene, or of that of a stop, put together as pictures.js does it."""
+    """Key -> command of the first scene, or of that of a stop, put together as pictures.js does
+    it.
+    """
     commands, scene = static_export.commands(data), {}
     changes = data["stops"][stop][1 + view] if stop is not None else []
     for numbers in (data["first"][view], changes):

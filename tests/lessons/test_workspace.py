@@ -128,7 +128,9 @@ def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
 
 @pytest.mark.parametrize("forget", [False, True])
 def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forget: bool) -> None:
-    """Whichever file the learner goes on in, and also when it is not known any more what was laid."""
+    """Whichever file the learner goes on in, and also when it is not known any more what was
+    laid.
+    """
     write(mine / LESSON, "first = 'my answer'")
     for n, name in ((2, NEW), (3, NEW2)):
         update(mine.parent, n)

@@ -20,10 +20,12 @@ LIFT_URDF = """
 <robot name="lift">
   <link name="rail"/>
   <link name="box">
-    <inertial> <mass value="5"/> <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/> </inertial>
+    <inertial> <mass value="5"/>
+      <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/> </inertial>
   </link>
   <joint name="slide" type="prismatic">
-    <parent link="rail"/> <child link="box"/> <axis xyz="0 0 1"/> <limit lower="0" upper="2" effort="200" velocity="1"/>
+    <parent link="rail"/> <child link="box"/> <axis xyz="0 0 1"/>
+    <limit lower="0" upper="2" effort="200" velocity="1"/>
   </joint>
 </robot>
 """

@@ -65,7 +65,9 @@ def tool_displacement(record: Rollout) -> Array:
 
 
 def load_disc() -> Robot:
-    """A robot without joints: a solid disc of 1 kg and 0.2 m radius, free to move; its axle is y."""
+    """A robot without joints: a solid disc of 1 kg and 0.2 m radius, free to move; its axle is
+    y.
+    """
     return fb.load_urdf(assets_root() / "models" / "disc.urdf")
 
 

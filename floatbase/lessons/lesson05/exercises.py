@@ -49,7 +49,9 @@ MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a sl
 
 
 def _moments_by_jacobian() -> Array:
-    """G_τ from the base's rows of J: the moment at the base's origin, moved to the centre of mass."""
+    """G_τ from the base's rows of J: the moment at the base's origin, moved to the centre of
+    mass.
+    """
     state, J = three_feet_eom().state, three_feet_eom().J
     pose = state.frame_pose("base")
     at_base = pose.rotation @ J[:, 3:6].T
@@ -175,7 +177,9 @@ def _stub_names() -> dict[str, Any]:
 
 
 def _judge_design(answer: Any) -> Verdict:
-    """Any cost on λ whose least point does what exercise 05.4 states, on paper and on the physics."""
+    """Any cost on λ whose least point does what exercise 05.4 states, on paper and on the
+    physics.
+    """
     eom = standing_go2_eom()
     forces = minimiser_or_verdict(answer, eom.k, "λ")
     if isinstance(forces, Verdict):

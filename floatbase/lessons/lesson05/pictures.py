@@ -1,4 +1,6 @@
-"""Lesson 05, Steering the centre of mass: forces with the wrench that they make, a plan that pulls."""
+"""Lesson 05, Steering the centre of mass: forces with the wrench that they make, a plan that
+pulls.
+"""
 
 from __future__ import annotations
 

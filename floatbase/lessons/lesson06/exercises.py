@@ -48,7 +48,9 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
 
 
 def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
-    """The steepest slope, degrees, whose cone or polyhedron holds a vertical force, by bisection."""
+    """The steepest slope, degrees, whose cone or polyhedron holds a vertical force, by
+    bisection.
+    """
     low, high = 0.0, 89.0
     while high - low > 1e-9:  # degrees
         middle = 0.5 * (low + high)
@@ -135,7 +137,9 @@ def _out_of_balance(f: Array) -> Verdict | None:
 
 
 def _judge_margins(f: Array) -> Verdict:
-    """Of forces in balance on the hill, shape (4, 3), N: whether each has room enough in its cone."""
+    """Of forces in balance on the hill, shape (4, 3), N: whether each has room enough in its
+    cone.
+    """
     names, n = stance_on_hill()[1].names, slope_normal(HILL)
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])

@@ -14,7 +14,6 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
 from floatbase.lessons import svg
-from floatbase.lessons.lesson05 import friction_ratios
 from floatbase.viewer import View, Viewer, prefixed, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
@@ -130,9 +129,10 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
     contacts = fb.Contacts.points(robot, normals=slope_normal(believed))
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start), facets=facets)
     planned = controller(start.q, start.v).forces
-    true_contacts = fb.Contacts.points(robot, normals=n)
-    front, rear = friction_ratios(true_contacts, planned)[[0, 2]]
-    picture = view.painter.picture(start, true_contacts, planned=planned, cones=False)
+    front, rear = friction_ratios(planned, n)[[0, 2]]
+    picture = view.painter.picture(
+        start, fb.Contacts.points(robot, normals=n), planned=planned, cones=False
+    )
     drawn = view.painter.picture(start, contacts, planned=planned)
     view.draw(
         picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"}
@@ -161,6 +161,14 @@ def slope_normal(degrees: float) -> Array:
     """Unit normal of a slope that rises towards x, shape (3,)."""
     angle = np.deg2rad(degrees)
     return np.array([-np.sin(angle), 0.0, np.cos(angle)])
+
+
+def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
+    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the
+    surface of its cone.
+    """
+    parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
+    return np.array([part.alpha_par / part.alpha_perp for part in parts])
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:

@@ -56,7 +56,9 @@ def _rows_on_three_feet() -> int:
 
 
 def _judge_rows(answer: Any) -> Verdict:
-    """Rows G, whose G x ≤ 0 are tried on vectors x: any order and any length of the rows will do."""
+    """Rows G, whose G x ≤ 0 are tried on vectors x: any order and any length of the rows will
+    do.
+    """
     G = array_or_verdict(answer, (4, 42))
     if isinstance(G, Verdict):
         return G

@@ -151,7 +151,9 @@ class Bench:
 
 
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
-    """One cylinder with its force loop, at zero torque: the supply may change, its size does not."""
+    """One cylinder with its force loop, at zero torque: the supply may change, its size does
+    not.
+    """
     actuators = HydraulicActuators(standing_go2_eom().robot, hydraulics)
     size = KNEE_TORQUE / Hydraulics().weakest_torque
     actuators.cylinders = Cylinders(hydraulics, [size], [0.0])

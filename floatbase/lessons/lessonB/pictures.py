@@ -211,9 +211,9 @@ def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
         else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
     )
     boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
-    total = 2 * HEIGHT + 2 * GAP
+    picture = svg.drawing(drawn, WIDTH, f"0 -8 {WIDTH} {2 * HEIGHT + 2 * GAP}")
     return (
-        f"{svg.drawing(drawn, WIDTH, f'0 -8 {WIDTH} {total}')}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
+        f"{picture}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
         f"{max(torques[150:]):.1f} N·m; {boils}</div>"
     )
 

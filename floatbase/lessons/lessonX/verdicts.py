@@ -70,7 +70,9 @@ def named_fault(line: str) -> str:
 
 
 def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
-    """What is to be said of a line about a case, a fault and its evidence; of a right one nothing."""
+    """What is to be said of a line about a case, a fault and its evidence; of a right one
+    nothing.
+    """
     said, fault = named_fault(line), case.injected_fault.kind or NOTHING
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")

@@ -141,12 +141,14 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
         if description["words"]
         else ""
     )
+    seen = f'<div class="floatbase-scenes">{scenes}</div>' if scenes else ""
     return (
         f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
         f'data-picture="{name}">'
-        f'<div class="floatbase-seen">{f"""<div class="floatbase-scenes">{scenes}</div>""" if scenes else ""}'
+        f'<div class="floatbase-seen">{seen}'
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
-        f'<div class="floatbase-controls">{controls}</div>{words}<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>'
+        f'<div class="floatbase-controls">{controls}</div>{words}'
+        f"<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>"
     )
 
 

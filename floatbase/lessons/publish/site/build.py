@@ -192,7 +192,9 @@ def _write_reference(target: Path) -> None:
 
 
 def _with_anchors(page: str) -> str:
-    """The map with places that links lead to, and its functions linked to the pages of the library."""
+    """The map with places that links lead to, and its functions linked to the pages of the
+    library.
+    """
     known = addresses()
 
     def link(match: re.Match[str]) -> str:

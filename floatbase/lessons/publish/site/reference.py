@@ -14,7 +14,9 @@ _MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
 
 
 def pages() -> dict[str, str]:
-    """File name -> text, reStructuredText, of all pages of the library, with one that lists them."""
+    """File name -> text, reStructuredText, of all pages of the library, with one that lists
+    them.
+    """
     listed = "\n".join(f"   {package} <{package}>" for package in PACKAGES)
     rows = "\n".join(f"* :doc:`{package}`: {about}" for package, about in PACKAGES.items())
     index = (
