@@ -32,11 +32,8 @@ import floatbase as fb
 ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 MU = 0.7
-WAYS = (
-    "compiled",
-    "own",
-    "reference",
-)  # floatbase's answers; own: compiled, with a task as a user writes it
+# floatbase's answers; own: compiled, with a task as a user writes it
+WAYS = ("compiled", "own", "reference")
 # weight; with that of standing_tasks, 1e-3, the peers' solver loses the digits in which torques are
 # compared
 POSTURE = 0.1

@@ -27,9 +27,8 @@ from floatbase.errors import InputError
 
 MAX_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB
 CURVATURE_TOLERANCE = 1e-12  # curvature below this part of the largest counts as none
-_NEGATIVE_CURVATURE_TOLERANCE = (
-    1e-9  # part of the largest curvature that one may be negative by: rounding of pullbacks
-)
+# part of the largest curvature that one may be negative by: rounding of pullbacks
+_NEGATIVE_CURVATURE_TOLERANCE = 1e-9
 # part of 1 + the largest |g| that a slope without curvature may have: rounding of pullbacks
 _SLOPE_TOLERANCE = 1e-7
 

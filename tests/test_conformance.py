@@ -50,7 +50,11 @@ ZERO = np.zeros(12)
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
 FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
 # what makes sense after all; a problem is checked when its QP is built
-ACCEPTED = {"about(x=NaN)", "Problem(robot=of another robot)", "Problem(contacts=of another robot)"}
+ACCEPTED = {
+    "rounded(x=NaN)",
+    "Problem(robot=of another robot)",
+    "Problem(contacts=of another robot)",
+}
 
 # for every kind of check
 WRONG: dict[str, Any] = {
@@ -131,7 +135,7 @@ def right() -> dict[str, Any]:
         "x": ZERO, "r": ZERO,
         "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:],
         "v_joints": ZERO,
-        "size": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
+        "scale": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
         "v": state.v, "dv":
         np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,
@@ -147,7 +151,7 @@ def right() -> dict[str, Any]:
         "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind,
         "qp_plots.feasible_polygon.qp": table_top(),
         "qp_plots.plot.qp": table_top(), "block": "tau",
-        "pieces": [(0.0, 1.0, np.zeros(2), np.ones(2))],
+        "segments": [(0.0, 1.0, np.zeros(2), np.ones(2))],
         "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2),
         "neutral_point.velocity": np.zeros(2), "dcm_error":
         np.zeros(2),
@@ -156,7 +160,7 @@ def right() -> dict[str, Any]:
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3,
         "alpha": 0.1, "rate": 30.0,
-        "high": 1.0, "low": 0.0, "lift": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
+        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0, "centripetal_acceleration.omega": UP,
         "centripetal_acceleration.r": UP, "view_from_rotating_frame.omega": UP,
         "LinearInequality.coefficients":
         (np.eye(18), np.ones(18)),
@@ -170,8 +174,8 @@ def right() -> dict[str, Any]:
 
 # what only the package makes
 RESULTS = """
-    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces Pose
-    Power Robot PushRecovery Table Step AnalyticCommand Command Verdict Piece Item ConstraintLabel recording.Animation HydraulicState
+    EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition TorquesFromForces CylinderGeometry
+    PowerBalance Robot PushRecovery Table StepPlan AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
     "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),

@@ -47,9 +47,8 @@ from floatbase.lessons.publish import NOTEBOOKS
 CONFIGURATION = NOTEBOOKS.parent / ".binder" / "jupyterhub_config.py"
 PROXY = os.environ.get("CONFIGURABLE_HTTP_PROXY") or shutil.which("configurable-http-proxy")
 STUDENTS = ("ada", "bob")
-STANDS = (
-    1e-3  # m: a robot that nobody pushes sways by less, one that falls goes down by 0.1 m and more
-)
+# m: a robot that nobody pushes sways by less, one that falls goes down by 0.1 m and more
+STANDS = 1e-3
 START, SPACE = "00_start_here", "03_feasible_space"
 
 pytestmark = [

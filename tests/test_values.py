@@ -40,13 +40,13 @@ NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
     "Simulation WholeBodyController",
     "a text": "ConstraintLabel",
-    "memory of a thread or a window": "LiveSimulation SliderPanel Viewer Window",
-    "an answer that rollout copies": "Torques",
+    "memory of a thread or a window": "LiveSimulation SliderPanel Viewer",
+    "an answer that rollout copies": "TorqueCommand",
     "with a memory of what they do": "Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
     "views of a MuJoCo model": "Conversion",
-    "shapes of a picture": "Item Piece View",
-    "made of functions of a lesson": "ConstantTorques Exercise LeastCost Numeric Shaped Verdict",
+    "shapes of a picture": "Item View",
+    "made of functions of a lesson": "ConstantTorques Exercise MinimumCostController NumericJudge ShapeJudge Verdict",
 }
 
 

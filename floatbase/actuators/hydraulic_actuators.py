@@ -15,18 +15,14 @@ from floatbase.errors import InputError
 from floatbase.robots import Robot
 
 _MAX_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
-_MAX_DURATION = (
-    10.0  # s in one call: torques and velocities that stay the same for longer are a slip of units
-)
-_STEP_ROUNDING = (
-    1e-9  # of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
-)
-_INTEGRAL_FRACTION = (
-    0.05  # of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
-)
-_MIN_LEVER_FRACTION = (
-    1e-9  # of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
-)
+# s in one call: torques and velocities that stay the same for longer are a slip of units
+_MAX_DURATION = 10.0
+# of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
+_STEP_ROUNDING = 1e-9
+# of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
+_INTEGRAL_FRACTION = 0.05
+# of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+_MIN_LEVER_FRACTION = 1e-9
 _StateArrays = tuple[
     Array, Array, Array
 ]  # the parts of a `HydraulicState`, between the steps of the integration

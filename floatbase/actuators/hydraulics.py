@@ -12,9 +12,8 @@ import numpy.typing as npt
 from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
 from floatbase.errors import InputError
 
-_LAMINAR_DROP = (
-    1e5  # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
-)
+# Pa: below about this drop an orifice's flow grows with the drop rather than with its root
+_LAMINAR_DROP = 1e5
 # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the
 # valve's all
 _MIN_GAIN = 1e-9

@@ -13,9 +13,8 @@ from floatbase._validation import Value, as_instance, as_integer, as_number, as_
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
-TIME_TOLERANCE = (
-    1e-9  # s: times of a schedule that differ by less are the same; sums of periods round
-)
+# s: times of a schedule that differ by less are the same; sums of periods round
+TIME_TOLERANCE = 1e-9
 _MAX_PERIOD = 100.0  # s, of a period: more is a slip of units
 _MAX_PHASES = 1000  # asked for at once
 

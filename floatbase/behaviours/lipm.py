@@ -23,9 +23,8 @@ from floatbase._validation import (
 from floatbase.errors import InputError
 
 ZMPSegment: TypeAlias = tuple[float, float, Array, Array]
-_MAX_EXPONENT = (
-    300.0  # ω times the length of a plan: e^{300} is a number still, and half a minute of any robot
-)
+# ω times the length of a plan: e^{300} is a number still, and half a minute of any robot
+_MAX_EXPONENT = 300.0
 _MAX_GAP = 1e-6  # s: segments of a ZMP that are further apart are not one after the other
 
 

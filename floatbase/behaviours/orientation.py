@@ -11,9 +11,8 @@ import pinocchio as pin
 
 from floatbase._validation import Array, as_callable
 
-_DIFFERENCE_STEP = (
-    1e-4  # s, of the differences: their error is below 1e-5 of what a base does in a second
-)
+# s, of the differences: their error is below 1e-5 of what a base does in a second
+_DIFFERENCE_STEP = 1e-4
 
 
 def pitch_and_yaw(

@@ -43,9 +43,8 @@ _RESTART_GAP = 0.2  # s without a tick, after which another controller may have 
 # s after which the height of a foot shows that of the ground: feet that aim where others just
 # touched climb
 _TOUCHDOWN_SETTLING_TIME = 0.05
-_ZMP_SHIFT_TIME = (
-    0.8  # s before the first lift-off and after the last landing in which the ZMP moves
-)
+# s before the first lift-off and after the last landing in which the ZMP moves
+_ZMP_SHIFT_TIME = 0.8
 # m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω
 # 1.2 s}
 _DCM_DEAD_ZONE = 0.02
@@ -55,9 +54,8 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # part of its distance from the middle that a foot keeps to its own side: legs must not cross
 _MIN_SIDE_FRACTION = 0.25
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-_RAMP_LOAD_FACTOR = (
-    2.0  # times its even share of the weight: the normal force from which a ramp comes down
-)
+# times its even share of the weight: the normal force from which a ramp comes down
+_RAMP_LOAD_FACTOR = 2.0
 _SOFT_CONTACT_WEIGHT = 1e4  # weight of contacts that must give way, beside 10 of the tasks
 _MAX_SPEED = 10.0  # m/s and rad/s: more is a slip of units
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB

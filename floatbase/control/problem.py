@@ -29,9 +29,8 @@ from floatbase.robots import Robot, State, as_torque_limits
 
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
-INCONSISTENCY_TOLERANCE = (
-    1e-6  # m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
-)
+# m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+INCONSISTENCY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

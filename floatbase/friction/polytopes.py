@@ -27,9 +27,8 @@ _FLATNESS_TOLERANCE = 1e-9
 # ten
 _MAX_ROUNDS = 200
 _QHULL_TOLERANCE = 1e-8  # part of the size by which qhull's facets may miss the points on them
-_SLIVER_TOLERANCE = (
-    1e-7  # singular value, of the largest, below which rays are too nearly dependent to fix a facet
-)
+# singular value, of the largest, below which rays are too nearly dependent to fix a facet
+_SLIVER_TOLERANCE = 1e-7
 _SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one: qhull's triangles of one facet
 _DIGITS = 9  # to which the equations of qhull's triangles of one facet agree
 

@@ -15,9 +15,8 @@ from floatbase.errors import InputError
 _PLAIN_EXPONENTS = range(
     -4, 6
 )  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7
-_RELATIVE_NOISE = (
-    1e-6  # of an array's largest entry: a smaller one is what rounding has left of a zero
-)
+# of an array's largest entry: a smaller one is what rounding has left of a zero
+_RELATIVE_NOISE = 1e-6
 # digits more that are rounded to first: 12.5 and what another processor makes of it, 12.4999999,
 # both give 13
 _GUARD_DIGITS = 4

@@ -47,9 +47,8 @@ Target: TypeAlias = (
 )
 _ZERO3 = (0.0, 0.0, 0.0)
 _TRIPLE_HINT = "all three together, as in lambda t: (position, velocity, acceleration)"
-_ROTATION_TOLERANCE = (
-    1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
-)
+# R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+_ROTATION_TOLERANCE = 1e-6
 _IDENTITY = frozen(np.eye(3))
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 

@@ -15,16 +15,13 @@ from floatbase._validation import Array
 from floatbase.errors import InfeasibleError, SolverError
 from floatbase.qp.labels import ConstraintLabel
 
-FEASIBILITY_TOLERANCE = (
-    1e-9  # how far a solver may violate an inequality of unit length: N, N·m; well above rounding
-)
-MULTIPLIER_TOLERANCE = (
-    1e-9  # of the multipliers of a conflict, which add up to 1: a row with less has no part in it
-)
+# how far a solver may violate an inequality of unit length: N, N·m; well above rounding
+FEASIBILITY_TOLERANCE = 1e-9
+# of the multipliers of a conflict, which add up to 1: a row with less has no part in it
+MULTIPLIER_TOLERANCE = 1e-9
 _ROUNDING = 1e-12  # part of a row, of its |h| and of the largest |x| that may be rounding
-_STEPS_PER_CONSTRAINT = (
-    100  # for each row, before the search for a conflict gives up; it takes about one
-)
+# for each row, before the search for a conflict gives up; it takes about one
+_STEPS_PER_CONSTRAINT = 100
 _MAX_LISTED = 4  # rows that are listed in one line
 
 

@@ -22,14 +22,10 @@ from floatbase.qp.conflicts import (
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Solution
 
-_CLARABEL_TOLERANCES = (
-    1e-12,
-    1e-10,
-    1e-8,
-)  # asked for in turn; now and then it makes no progress on the way to the first
-_CONVEXITY_TOLERANCE = (
-    1e-10  # part of the largest |H| that a curvature may be negative by: rounding of the pullback
-)
+# requested of Clarabel in turn: now and then it makes no progress on the way to the first
+_CLARABEL_TOLERANCES = (1e-12, 1e-10, 1e-8)
+# part of the largest |H| that a curvature may be negative by: rounding of the pullback
+_CONVEXITY_TOLERANCE = 1e-10
 # part of the largest variable that polishing may move any: beyond it, it mends no last digits
 _MAX_POLISHING_STEP = 1e-4
 

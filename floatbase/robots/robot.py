@@ -40,9 +40,8 @@ _LIMIT_TOLERANCE = 1e-6  # rad or m: angles printed with seven digits pass
 # 1e-15
 _SINGULAR_M = 1e-10
 _PARTICIPATION_TOLERANCE = 0.05  # part in a motion without inertia from which a joint is named
-_AREA_TOLERANCE = (
-    1e-6  # m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
-)
+# m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
+_AREA_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

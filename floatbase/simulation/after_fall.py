@@ -11,9 +11,8 @@ from floatbase.dynamics import Contacts
 from floatbase.simulation.physics import Push, Simulation
 from floatbase.simulation.record import Recorder, Rollout
 
-_DAMPING_TIME_CONSTANT = (
-    0.05  # s, time constant with which the damping stops a joint that nothing else moves
-)
+# s, time constant with which the damping stops a joint that nothing else moves
+_DAMPING_TIME_CONSTANT = 0.05
 _REST_SPEED = 0.05  # m/s and rad/s: slower than this a robot is at rest
 
 

@@ -23,9 +23,8 @@ from floatbase.simulation.conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-_IMPEDANCE_RATIO = (
-    100.0  # friction as stiff as the normal force: feet creep less under a steady load
-)
+# friction as stiff as the normal force: feet creep less under a steady load
+_IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
 _CONTACT_IMPEDANCE = (
@@ -36,16 +35,13 @@ _CONTACT_IMPEDANCE = (
     2.0,
 )  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-_PENETRATION_RECOVERY_TIME = (
-    0.2  # s in which a link comes out that was in the ground before it touched
-)
-_CORNER_BALL_RADIUS = (
-    0.005  # m: a flat foot stands on small balls whose lowest points are its corners
-)
+# s in which a link comes out that was in the ground before it touched
+_PENETRATION_RECOVERY_TIME = 0.2
+# m: a flat foot stands on small balls whose lowest points are its corners
+_CORNER_BALL_RADIUS = 0.005
 HULL_PREFIX = "hull of"  # so begin the names of the links' geoms
-_MIN_BALL_RADIUS = (
-    1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
-)
+# m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+_MIN_BALL_RADIUS = 1e-4
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
 # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for
 # rounding

@@ -18,9 +18,8 @@ from floatbase.robots import Robot
 _MIN_THICKNESS = 1e-3  # m: flatter points have no hull for MuJoCo
 _PRISM_SIDES = 24  # of the prism that stands for a cylinder: it is within 1 % of the radius
 _BLOCK_SIZE = 1024  # points at a time: what one core's cache holds
-_N_DIRECTIONS = (
-    1000  # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
-)
+# a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
+_N_DIRECTIONS = 1000
 
 
 @lru_cache(maxsize=16)

@@ -91,9 +91,8 @@ class LiveSimulation:
         self._reset_requested = False
         self._calls: list[Callable[[], None]] = []
         self._status = "paused"
-        self._last_record: Rollout | None = (
-            None  # the last slice where the controller is off; only the thread has to do with it
-        )
+        # the last slice where the controller is off; only the thread has to do with it
+        self._last_record: Rollout | None = None
         self._listener: Callable[[str], None] | None = None
         self._last_call = time.monotonic()
         self._stop = threading.Event()  # ends the present thread; set while paused

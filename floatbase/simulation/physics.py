@@ -33,18 +33,16 @@ from floatbase.simulation.build import Ground, body_name, build_model
 from floatbase.simulation.conversion import Conversion
 from floatbase.simulation.fallen_model import FallenModel, build_fallen_model
 
-_FALLEN_HEIGHT_FRACTION = (
-    0.4  # part of the base's height at the last reset: a crouch keeps more, lying down does not
-)
+# part of the base's height at the last reset: a crouch keeps more, lying down does not
+_FALLEN_HEIGHT_FRACTION = 0.4
 _FALLEN_COSINE = float(
     np.cos(np.deg2rad(60.0))
 )  # of the base's tilt since the last reset: no leg brings it back from there
 # m: a base that begins lower than this lies on the ground, and its height measures no fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
-_CLOCK_TOLERANCE = (
-    1e-9  # s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
-)
+# s: the clock is a sum of timesteps; the rounding of a minute of milliseconds is 5e-11 s
+_CLOCK_TOLERANCE = 1e-9
 _RECREATE_HINT = "make another, fb.Simulation(robot, ground=…, timestep=…)"
 _RESET_HINT = "sim.reset(sim.state.replace(q=…, v=…)) puts the robot there, at time 0"
 _FIRST_FATAL_WARNING = int(

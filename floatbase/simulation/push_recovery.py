@@ -34,9 +34,8 @@ from floatbase.simulation.sweep import sweep
 
 _MIN_DIRECTIONS = 3  # directions: fewer are no closed line
 _FACETS = 16  # of the polyhedra in the friction cones: they leave out 2 % of them
-_MAX_FORCE_IN_WEIGHTS = (
-    100.0  # of the robot's weight: a push that is survived beyond it is not carried by the ground
-)
+# of the robot's weight: a push that is survived beyond it is not carried by the ground
+_MAX_FORCE_IN_WEIGHTS = 100.0
 # least cosine between direction and an edge's normal: less is an edge along the direction, never
 # met
 _MIN_COSINE = 1e-9

@@ -30,9 +30,8 @@ from floatbase.simulation.record import Outcome, Recorder, Rollout
 _MAX_STEPS = (
     10**7
 )  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
-_PERIOD_TOLERANCE = (
-    1e-6  # part of a period by which a time may miss a whole number of them: how people round
-)
+# part of a period by which a time may miss a whole number of them: how people round
+_PERIOD_TOLERANCE = 1e-6
 _TIME_TOLERANCE = 1e-9  # part of the time by which it may: the rounding of many periods
 
 

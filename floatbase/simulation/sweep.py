@@ -24,16 +24,13 @@ from floatbase._validation import signature_error
 from floatbase.errors import InputError, SimulationError
 from floatbase.simulation.table import RESERVED_NAMES, Row, RowStore, Table, as_json_value
 
-_WORKER_IDLE_TIMEOUT = (
-    60.0  # s after which a worker without work ends; the next sweep within them saves its start
-)
-_PARENT_CHECK_PERIOD = (
-    1.0  # s between a worker's looks whether the program that started it is still there
-)
+# s after which a worker without work ends; the next sweep within them saves its start
+_WORKER_IDLE_TIMEOUT = 60.0
+# s between a worker's looks whether the program that started it is still there
+_PARENT_CHECK_PERIOD = 1.0
 _POINTS_PER_WORKER = 2  # points handed out for each worker: one that it is at, and the next
-_MIN_CLUSTER_THREADS = (
-    32  # threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
-)
+# threads that a Dask cluster may get while the sweep goes on, if it has fewer at first
+_MIN_CLUSTER_THREADS = 32
 _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
 _SINGLE_THREAD_ENV = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"

@@ -562,7 +562,7 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
             lambda: Walk(robot, contacts, trot, foothold=lambda foot: np.zeros(2)),
             "foothold",
             "foot",
-            "land",
+            "touchdown",
             "walk",
         ),
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),

@@ -465,7 +465,7 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
         0.5,
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
-    refused(chimney.torques, InputError, "max_normal_force")
+    refused(chimney.moment_vertices, InputError, "max_normal_force")
     refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
@@ -539,7 +539,7 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
         (
             lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix,
-            "rows",
+            "face_matrix",
             "max_normal_force",
         ),
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),

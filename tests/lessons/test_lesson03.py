@@ -20,9 +20,8 @@ from floatbase.lessons.lesson03 import (
 )
 
 GO2 = fb.load("go2")
-RANK_TOLERANCE = (
-    1e-9  # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
-)
+# of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
+RANK_TOLERANCE = 1e-9
 
 
 def test_the_solo8_of_03_4_moves_without_asking_its_feet_for_the_impossible() -> None:

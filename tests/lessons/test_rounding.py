@@ -15,9 +15,8 @@ from floatbase.errors import InputError
 from floatbase.lessons import rounded
 
 LAST_BITS = 1e-7  # relative: far more than what processors differ by in a lesson's numbers
-HALF_A_STEP = (
-    0.05  # relative: the second of two digits is off by a half at most, and the first is 1 at least
-)
+# relative: the second of two digits is off by a half at most, and the first is 1 at least
+HALF_A_STEP = 0.05
 SECOND_ROUNDING = 1e-5  # relative: what the first rounding, to six digits, adds
 
 

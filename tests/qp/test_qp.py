@@ -363,12 +363,17 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
             (
                 lambda most=most: active_set(table_top(), max_iterations=most),
                 InputError,
-                "most",
+                "max_iterations",
                 most,
             )
             for most in (0, -1, 1.5, "3")
         ],
-        (lambda: active_set(table_top(), max_iterations=True), InputError, "most", "True"),
+        (
+            lambda: active_set(table_top(), max_iterations=True),
+            InputError,
+            "max_iterations",
+            "True",
+        ),
     ],
 )
 def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:

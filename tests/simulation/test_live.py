@@ -78,7 +78,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
         ("fell", "fell"),
         (
             "controller failed: no point satisfies all constraints. In conflict:\n  6 × friction.",
-            "rows",
+            "constraints",
         ),
         ("stopped: 0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],

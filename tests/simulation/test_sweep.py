@@ -217,7 +217,7 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         fb.sweep(square, {"x": [1]}, file=tmp_path / "nowhere" / "rows.jsonl", progress=False)
     with raises(InputError, "lambda"):
         fb.sweep(lambda x: x, {"x": [1]}, file=path, progress=False)
-    with raises(InputError, "to", 3):
+    with raises(InputError, "file", 3):
         fb.sweep(square, {"x": [1]}, file=3, progress=False)
     with raises(UnknownNameError, 0, "error", "result", "x", "table.rows"):
         list(first)
@@ -240,7 +240,7 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(
         (square, {"y": [1]}, {}, "grid", "y", "square", "x"),
         (square, [{"x": 1}, {"x": 1, "y": 1}], {}, "grid", "x", "y", "square"),
         (square, {"x": [square]}, {}, "x", "function"),
-        (square, {"x": [1]}, {"file": 3.5}, "to", 3.5),
+        (square, {"x": [1]}, {"file": 3.5}, "file", 3.5),
         (square, {"x": [1]}, {"workers": 0}, "workers", 0),
         (square, {"x": [1]}, {"workers": 1.5}, "workers", 1.5),
         (square, {"x": [1]}, {"workers": 1, "cluster": "tcp://127.0.0.1:1"}, "workers", "cluster"),

@@ -213,7 +213,9 @@ def test_what_cannot_be_drawn_is_refused_by_name(
     refused(
         lambda: viewer.walk_overlay(walk, fb.load("solo12").standing()), InputError, "go2", "solo12"
     )
-    refused(lambda: viewer.step_overlay(walk, 0.0, run.final), InputError, "step", "Step", "Walk")
+    refused(
+        lambda: viewer.step_overlay(walk, 0.0, run.final), InputError, "step", "StepPlan", "Walk"
+    )
     refused(
         lambda: viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final),
         UnknownNameError,
@@ -224,7 +226,7 @@ def test_what_cannot_be_drawn_is_refused_by_name(
         lambda: viewer.step_overlay(walk.history[1], np.nan, run.final), InputError, "t", np.nan
     )
     refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
-    refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "Step", "Rollout")
+    refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout")
     refused(lambda: plots.plot_normal_forces(run, [plt.gca()]), InputError, "axes", 1, 4)
     refused(lambda: plots.plot_gait(arm()), InputError, "contacts")
     plt.close("all")

@@ -62,9 +62,8 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     assert "ur5 at http://127.0.0.1" in process.stdout.readline()
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
-    compiled = (
-        "floatbase compiles its controller, once: about a minute.\n"  # where `make setup` did not
-    )
+    # where `make setup` did not
+    compiled = "floatbase compiles its controller, once: about a minute.\n"
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 

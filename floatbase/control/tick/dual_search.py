@@ -25,15 +25,13 @@ INACCURATE, INFEASIBLE = (
 )  # why there is no answer: it lacks digits, or there seems to be none
 # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
 PIVOT_TOLERANCE = 1e-13
-DEPENDENCE_TOLERANCE = (
-    1e-12  # part of a row, squared, outside the active rows: with less it depends on them
-)
+# part of a row, squared, outside the active rows: with less it depends on them
+DEPENDENCE_TOLERANCE = 1e-12
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 STEP_TOLERANCE = 1e-6  # part of β: what a step this small leaves is rounding
 MAX_FINAL_STEP = 1e-4  # part of β that the last step may still move
-SIGN_TOLERANCE = (
-    1e-9  # part of the largest multiplier by which one may be negative through rounding
-)
+# part of the largest multiplier by which one may be negative through rounding
+SIGN_TOLERANCE = 1e-9
 
 
 class ActiveSet(NamedTuple):

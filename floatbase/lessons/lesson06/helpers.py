@@ -31,9 +31,8 @@ STIFFNESS, DAMPING = (
 )  # 1/s² and 1/s of the centre of mass and of the base's rotation, as in lesson 05
 FACETS = 4  # of each foot's polyhedron, inside its cone
 BIAS, NORMAL_BIAS = 1e-3, 0.1  # weight of (23) beside (22), and its α, as in lesson 05
-VALLEY_SLOPE = (
-    40.0  # degrees: each side of the valley in which the centre of mass stands beside the feet
-)
+# degrees: each side of the valley in which the centre of mass stands beside the feet
+VALLEY_SLOPE = 40.0
 LEFT_FEET_Y, RIGHT_FEET_Y = (
     0.16,
     -0.06,

@@ -13,9 +13,8 @@ from floatbase.simulation import Perturbation, PerturbedSimulation, Rollout
 
 MU, PERIOD = 0.7, 4e-3  # friction; s between ticks
 BAG_MASS = 6.0  # kg, of exercise P.1
-HIDDEN_MASS = (
-    1.37  # of exercise P.3: the mass in that world, as a multiple of what the controller believes
-)
+# of exercise P.3: the mass in that world, as a multiple of what the controller believes
+HIDDEN_MASS = 1.37
 _HIDDEN_KP = 250.0  # 1/s², which is nobody's default
 _SETTLING_TIME = 2.0  # s after which a robot that is heavier than it believes has come to rest
 _LEAN_TIME = 1.0  # s to shift the centre of mass, on four feet

@@ -11,9 +11,8 @@ from floatbase._validation import Array, cross
 from floatbase.lessons.lessonX.black_box import BlackBox
 
 _MIN_LOAD = 5.0  # N of a foot that bears on the ground
-_MIN_SLIP_SPEED = (
-    0.3  # m/s of a contact point: the soft contacts of the physics let feet that hold creep by less
-)
+# m/s of a contact point: the soft contacts of the physics let feet that hold creep by less
+_MIN_SLIP_SPEED = 0.3
 
 
 def accelerations(box: BlackBox) -> Array:

@@ -46,7 +46,12 @@ def motor_fault(box: BlackBox) -> str:
     return swapped_joints(box, got, told, off)
 
 
-def swapped_joints(box: BlackBox, got: np.ndarray, told: np.ndarray, off: np.ndarray) -> str:
+def swapped_joints(
+    box: BlackBox,
+    got: np.ndarray,
+    told: np.ndarray,
+    off: np.ndarray,
+) -> str:
     """Two joints that got each other's orders, as far as their motors can."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""

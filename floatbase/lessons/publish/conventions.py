@@ -4,10 +4,8 @@ reason.
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator
-from itertools import takewhile
 from pathlib import Path
 
 import floatbase
@@ -18,9 +16,10 @@ _SKIPPED_PACKAGES = (
     "lessons",
     "viewer",
 )  # their numbers choose what is drawn, not what is answered
-_NAME = re.compile(r"_?([A-Z][A-Z0-9_]*)")
-# a number, a tuple, a quotient, or a number made by float() or int()
-_VALUE = re.compile(r"[-(\d]|float\(|int\(")
+# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int(). The reason
+# may also stand in comment lines above.
+_VALUE = r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)"
+_TOLERANCE = re.compile(rf"((?:^# [^\n]+\n)*){_VALUE}(?:  # ([^\n]+))?$", re.MULTILINE)
 
 
 def page() -> str:
@@ -72,31 +71,17 @@ def _with_symbol_table(text: str) -> str:
 
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
     """File, name, value and reason of every numeric constant of the package, each as its source
-    states it: the reason is the comment beside the constant or on the lines above.
+    states it.
     """
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
-        if place.parts[0] in _SKIPPED_PACKAGES:
-            continue
-        source = path.read_text(encoding="utf-8")
-        for node in ast.parse(source).body:
-            if isinstance(node, ast.AnnAssign | ast.Assign) and node.value is not None:
-                target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
-                name = _NAME.fullmatch(ast.unparse(target))
-                value = _in_one_line(ast.get_source_segment(source, node.value) or "")
-                reason = _comment(source.splitlines(), node.lineno, node.end_lineno or node.lineno)
-                if name and reason and '"' not in value and _VALUE.match(value):
-                    package = place.with_suffix("").as_posix()
-                    yield package, name[1], value, reason.replace("|", "\\|")
-
-
-def _in_one_line(value: str) -> str:
-    words = " ".join(re.sub(r"#.*", "", value).split())
-    return words.replace("( ", "(").replace(", )", ")")
-
-
-def _comment(lines: list[str], first: int, last: int) -> str:
-    """The comments on these lines, from 1, or where there are none, on the lines right above."""
-    beside = [line.split("  # ", 1)[1] for line in lines[first - 1 : last] if "  # " in line]
-    above = list(takewhile(lambda line: line.startswith("# "), reversed(lines[: first - 1])))
-    return " ".join(beside or [line[2:] for line in reversed(above)])
+        if place.parts[0] not in _SKIPPED_PACKAGES:
+            for above, name, value, beside in _TOLERANCE.findall(path.read_text(encoding="utf-8")):
+                reason = beside or " ".join(line[2:] for line in above.splitlines())
+                if reason:
+                    yield (
+                        place.with_suffix("").as_posix(),
+                        name,
+                        value.strip(),
+                        reason.replace("|", "\\|"),
+                    )

@@ -25,9 +25,8 @@ from floatbase.viewer.scene.threejs import Shape
 COLOUR = GREYS[
     1
 ]  # of all that is neither a force nor the centre of mass; it shows on any background
-_HEIGHT_ABOVE_GROUND = (
-    0.005  # of the robot's size, above the ground: no flicker with its lines and the support region
-)
+# of the robot's size, above the ground: no flicker with its lines and the support region
+_HEIGHT_ABOVE_GROUND = 0.005
 _RING_RADIUS, _DIAMOND_SIZE = (
     0.07,
     0.05,

@@ -13,9 +13,8 @@ from floatbase.viewer.scene import threejs
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.shapes import Item, grid_lines, ground_grid, transform
 
-MIN_VERTICAL = (
-    0.2  # least vertical part of a normal of the ground: contacts with less stand on walls
-)
+# least vertical part of a normal of the ground: contacts with less stand on walls
+MIN_VERTICAL = 0.2
 # m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody
 # sees it
 GRID_JUMP = 2.5

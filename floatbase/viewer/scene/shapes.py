@@ -33,9 +33,8 @@ from floatbase.viewer.scene.threejs import Shape
 
 _RIM = 0.025  # thickness of a rim, over the radius of the mouth
 FACET_ALPHA = 0.75
-ARROW_SLENDERNESS = (
-    0.085  # width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
-)
+# width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+ARROW_SLENDERNESS = 0.085
 ARROW_LENGTH = 0.2  # m
 ARROW = (
     (0.0, 0.0),

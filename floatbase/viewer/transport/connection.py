@@ -22,9 +22,8 @@ from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.output_history import OutputHistory
 
 TIMEOUT = 30.0  # s; a page that takes longer over one frame is let go, and connects again by itself
-UNANSWERED_INTERVAL = (
-    0.05  # s from frame to frame for a page whose answers wait until a cell has ended
-)
+# s from frame to frame for a page whose answers wait until a cell has ended
+UNANSWERED_INTERVAL = 0.05
 MAX_UNANSWERED = (
     32 << 20
 )  # bytes under way to it: half an hour of a walking robot's frames, or the whole scene many times

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from floatbase.viewer.scene.store import Scene
 
-MAX_FROZEN = (
-    20  # pictures at most; they share their commands with each other and with the live scene
-)
+# pictures at most; they share their commands with each other and with the live scene
+MAX_FROZEN = 20
 
 
 class OutputHistory:
