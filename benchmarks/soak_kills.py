@@ -161,7 +161,7 @@ def judge_copies(course: Path, mine: Path, marks: set[str], is_done: bool = Fals
             if text
             not in [held[:CELLS] for name, held in copies.items() if name.split(".")[0] == lesson]
         }
-        faults["left over"] = {path.name for path in mine.iterdir()} - {*copies, ".from.json"}
+        faults["left over"] = {path.name for path in mine.glob("[!.]*")} - {*copies}
     for what, names in faults.items():
         assert not names, f"{when} {what}: {', '.join(sorted(names))}"
 

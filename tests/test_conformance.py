@@ -196,7 +196,7 @@ LEFT_OUT = {
         "Limits.normal_forces",
         "Limits.bounded_points", "Problem.check",
         "recording.swing_feet_at", "Cylinders.force", "Cylinders.line_pressures",
-        "Cylinders.orifice_flow",
+        "Cylinders.advance", "Cylinders.orifice_flow",
         "Cylinders.valve_flows",
         "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates",
         "Cylinders.pressure_decay",

@@ -2,8 +2,14 @@
 (App. B of the course text).
 """
 
-from floatbase.actuators.hydraulic_actuators import VACUUM, HydraulicActuators, HydraulicState
-from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydraulics, PowerBalance
+from floatbase.actuators.hydraulic_actuators import HydraulicActuators, HydraulicState
+from floatbase.actuators.hydraulics import (
+    VACUUM,
+    CylinderGeometry,
+    Cylinders,
+    Hydraulics,
+    PowerBalance,
+)
 from floatbase.actuators.lags import Delay, FirstOrderLag
 
 __all__ = [

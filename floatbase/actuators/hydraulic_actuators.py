@@ -26,7 +26,6 @@ _MIN_LEVER_FRACTION = 1e-9
 _StateArrays = tuple[
     Array, Array, Array
 ]  # the parts of a `HydraulicState`, between the steps of the integration
-VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,19 +179,11 @@ class HydraulicActuators:
         """Opening, pressures and integral `step` s later when the loop desires `force`, (d,) N, at
         joint velocities v.
         """
-        cylinders, hydraulics, (opening, pressures, integral) = (
-            self.cylinders,
-            self.cylinders.hydraulics,
-            state,
-        )
-        rate = 2.0 * np.pi * hydraulics.loop_bandwidth
+        cylinders, (opening, pressures, integral) = self.cylinders, state
+        rate = 2.0 * np.pi * cylinders.hydraulics.loop_bandwidth
         error = force - cylinders.force(pressures)
         force_rate = rate * (error + _INTEGRAL_FRACTION * rate * integral)
         u = cylinders.opening_for(force_rate, pressures, geometry, v)
         integral = integral + step * np.where(np.abs(u) < 1.0, error, 0.0)
         u = np.minimum(np.maximum(u, -1.0), 1.0)
-        new_opening = u + (opening - u) * np.exp(-2.0 * np.pi * hydraulics.valve_bandwidth * step)
-        mean_opening = 0.5 * (opening + new_opening)
-        pressure_change = step * cylinders.pressure_rates(mean_opening, pressures, geometry, v)
-        pressure_change /= 1.0 + step * cylinders.pressure_decay(mean_opening, pressures, geometry)
-        return new_opening, np.maximum(pressures + pressure_change, VACUUM), integral
+        return *cylinders.advance(opening, pressures, u, geometry, v, step), integral

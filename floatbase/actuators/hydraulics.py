@@ -17,6 +17,7 @@ _LAMINAR_DROP = 1e5
 # N/s: least change of force by an open valve. Chambers at line pressure have none; they get the
 # valve's all
 _MIN_GAIN = 1e-9
+VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
 _CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
@@ -271,6 +272,25 @@ class Cylinders(Value):
             / np.hypot(drop, _LAMINAR_DROP) ** 2.5
         )
         return (np.abs(x) * slope + self._leakage) / geometry.compliance
+
+    def advance(
+        self,
+        opening: Array,
+        pressures: Array,
+        u: Array,
+        geometry: CylinderGeometry,
+        v: Array,
+        step: float,
+    ) -> tuple[Array, Array]:
+        """Opening, (d,), and pressures, (2, d) Pa, `step` s later with the valves' inputs u, (d,),
+        -1 to 1: the spool exactly, the pressures by linearly implicit Euler, never below `VACUUM`.
+        """
+        decay = np.exp(-2.0 * np.pi * self.hydraulics.valve_bandwidth * step)
+        new_opening = u + (opening - u) * decay
+        x = 0.5 * (opening + new_opening)
+        change = step * self.pressure_rates(x, pressures, geometry, v)
+        change /= 1.0 + step * self.pressure_decay(x, pressures, geometry)
+        return new_opening, np.maximum(pressures + change, VACUUM)
 
     def opening_for(
         self, force_rate: Array, pressures: Array, geometry: CylinderGeometry, v: Array

@@ -10,12 +10,8 @@ from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
 from floatbase.lessons.exercises import (
-    Exercise,
     NumericJudge,
-    ShapeJudge,
-    Verdict,
     all_exercises,
-    array_or_verdict,
     check,
     reveal,
     show_progress,
@@ -56,14 +52,10 @@ _LAZY = {
 __all__ = [
     "FIGURES",
     "ConstantTorques",
-    "Exercise",
     "NumericJudge",
-    "ShapeJudge",
     "SliderPanel",
     "TorqueCommand",
-    "Verdict",
     "all_exercises",
-    "array_or_verdict",
     "check",
     "compare",
     "controller_factory",

@@ -1,5 +1,5 @@
-"""Controllers of the lessons: constant torques, and a servo in every joint. Neither knows where the
-ground is.
+"""Controllers of the lessons: constant torques, a servo in every joint, and one whose QP somebody
+else solves.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_array, as_callable, as_instance, as_positive
+from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
+from floatbase.qp import QP
 from floatbase.robots import State
 
 # s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of
@@ -56,6 +58,29 @@ class ConstantTorques:
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """The torques, and the prediction for configuration q and velocity v."""
         return TorqueCommand(self.tau, self._predict(q, v) if self._predict is not None else None)
+
+
+class SolverController:
+    """A controller that hands the QP of every tick to a solver.
+
+    controller: makes the QP. solver: is called with it, and returns x = (q̈, τ, λ), shape (n,).
+    """
+
+    def __init__(
+        self, controller: WholeBodyController, solver: Callable[[QP], npt.ArrayLike]
+    ) -> None:
+        self.robot, self.contacts = controller.robot, controller.contacts
+        self.controller, self.solver = controller, solver
+
+    def qp(self, state: State, t: float = 0.0) -> QP:
+        """The QP of one tick."""
+        return self.controller.qp(state, t)
+
+    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
+        """The torques for configuration q and velocity v."""
+        qp = self.qp(State(self.robot, q, v), t)
+        x = as_array("x", self.solver(qp), (qp.n,))
+        return TorqueCommand(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
 
 
 def joint_servo(

@@ -13,16 +13,19 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import MAX_MAGNITUDE, Array
 from floatbase.affine import Quadratic
-from floatbase.errors import FloatbaseError, unknown_name
+from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import rounded
+
+if TYPE_CHECKING:
+    from floatbase.simulation import Rollout
 
 TRIES_BEFORE_REVEAL = 2  # so many before `reveal` shows a solution
 NEAR_MISS = 0.02  # of the right value: as much as a number with two digits may spoil
@@ -103,6 +106,38 @@ def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
             False, "The answer holds numbers that are not finite, or far too large.", "not_finite"
         )
     return given
+
+
+def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
+    """The answer if it is a function, or a `Verdict` that says that it is none."""
+    if answer is None or answer is Ellipsis:
+        return Verdict(
+            False, "There is no answer yet: give your function, without brackets.", "no_answer"
+        )
+    if not callable(answer):
+        return Verdict(
+            False,
+            f"The answer is a function, written with def; this is {type(answer).__name__}.",
+            "no_function",
+        )
+    return answer
+
+
+def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | Verdict:
+    """The record of a run on the physics, or a `Verdict` that says why there is none, or how it
+    ended early.
+
+    run: raises `InputError` where the answer makes no run. why: ends the text about an early end.
+    """
+    try:
+        record = run()
+    except InputError as error:
+        return Verdict(False, str(error), "input_error")
+    if record.outcome == "completed":
+        return record
+    stood = rounded(record.time[-1], "s")
+    text = f"It does not last: {record.outcome} {stood} after the start.{why}"
+    return Verdict(False, text, "falls")
 
 
 def _shape_error(given: tuple[int, ...], expected: tuple[int, ...]) -> str:

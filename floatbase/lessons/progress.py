@@ -22,8 +22,6 @@ from floatbase.affine import Quadratic
 _FILE_NAME = "progress.jsonl"
 # characters of an answer that is kept; the longest right one of the course takes less than 20 000
 _MAX_ANSWER_LENGTH = 100_000
-# one object for all tries, written by floatbase up to 0.2.0: read, and left as it is
-_OLD_FILE_NAME = "progress.json"
 
 
 def path() -> Path:
@@ -184,17 +182,11 @@ def _append_line(line: bytes) -> str:
     return ""
 
 
-def _lines() -> Iterator[bytes]:
-    """Each is an object of counts: all of the file from before, then line by line what came since."""
-    yield _read(_OLD_FILE_NAME)
-    yield from _read(_FILE_NAME).split(b"\n")
-
-
-def _read(name: str) -> bytes:
+def _lines() -> list[bytes]:
     try:
-        return path().with_name(name).read_bytes()
+        return path().read_bytes().split(b"\n")
     except (OSError, RuntimeError):
-        return b""
+        return []
 
 
 def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:

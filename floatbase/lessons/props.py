@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import rotation_z
 from floatbase._validation import as_array, as_positive, unit_vector
 from floatbase.errors import InputError
 from floatbase.viewer import Item, Picture
@@ -41,11 +42,9 @@ def wheel(
     up = np.array([0.0, 0.0, 1.0]) if abs(axle[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
     x = up - axle * (axle @ up)
     x /= np.linalg.norm(x)
-    c, s = np.cos(angle), np.sin(angle)
     rest = np.stack([x, np.cross(axle, x), axle], axis=1)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     thick = 0.35 * radius if width is None else width
-    return Item(_unit_wheel(), transform(centre, rest @ turn, (radius, radius, thick)))
+    return Item(_unit_wheel(), transform(centre, rest @ rotation_z(angle), (radius, radius, thick)))
 
 
 def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
@@ -57,11 +56,7 @@ def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
         line points along x.
     """
     as_positive("radius of the turntable", radius, "m")
-    c, s = np.cos(angle), np.sin(angle)
-    return Item(
-        _unit_table(),
-        transform(centre, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), radius),
-    )
+    return Item(_unit_table(), transform(centre, rotation_z(angle), radius))
 
 
 def hydraulic_cylinder(

@@ -54,7 +54,9 @@ def perturbation(settings: Settings, robot: Robot) -> Perturbation:
     off = settings.actual_off
     return Perturbation(
         mass=settings.mass[1],
-        disabled_contacts=Contacts.feet(robot).only(settings.leg).point_names if "forces" in off else (),
+        disabled_contacts=Contacts.feet(robot).only(settings.leg).point_names
+        if "forces" in off
+        else (),
         adhesion_force=float(round(robot.weight)) if "cones" in off else 0.0,
         **_switched_off({term.name: term.perturbation_option for term in EQUATION}, off),
     )

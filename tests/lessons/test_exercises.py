@@ -124,19 +124,18 @@ DAMAGED = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["progress.json", "progress.jsonl"])
 @pytest.mark.parametrize("text", DAMAGED)
 def test_damage_is_left_out_and_left_as_it_is(
-    tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / name).write_text(text)
+    (tmp_path / "progress.jsonl").write_text(text)
     check("00.1", 3.0)
     check("00.1", LIFTED)
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
     reveal("00.1")
     show_progress()
     assert "00.1 ✓" in capsys.readouterr().out
-    assert (tmp_path / name).read_text().startswith(text)
+    assert (tmp_path / "progress.jsonl").read_text().startswith(text)
 
 
 def test_a_full_disk_costs_one_try(tmp_path: Path) -> None:
@@ -163,9 +162,7 @@ def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(
     tmp_path: Path, worker: Any
 ) -> None:
     older = {f"old.{i}": {"tries": 2, "right": 1} for i in range(50)}
-    (tmp_path / "progress.json").write_text(
-        json.dumps(older, indent=1)
-    )  # as floatbase 0.2.0 wrote it
+    (tmp_path / "progress.jsonl").write_text(json.dumps(older))
     names = ["00.1", "00.1", "01.1"]
     workers = [worker(target=record_often, args=(name,)) for name in names]
     for one in workers:

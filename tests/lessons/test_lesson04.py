@@ -9,7 +9,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.lessons import ConstantTorques
-from floatbase.lessons.lesson03 import standing_space, standing_still_beta
+from floatbase.lessons.lesson03 import standing_go2_eom, standing_still_beta
 from floatbase.lessons.lesson04 import (
     DESIRED_ACCELERATION,
     MinimumCostController,
@@ -43,7 +43,8 @@ def turn_cost(eom: Any) -> fb.Quadratic:
 def test_04_2_counts_the_flat_directions_that_accelerate_the_free_foot(
     feet: tuple[str, ...],
 ) -> None:
-    space = standing_space(GO2, *feet)
+    contacts = fb.Contacts.points(GO2, mu=0.7).only(*feet)
+    space = fb.feasible_space(fb.equations_of_motion(GO2.standing(), contacts))
     eom = space.eom
     flat = null_space((com_cost(eom) + turn_cost(eom)).pullback(space.qdd).H)
     moving = rank(eom.state.frame_jacobian("RR_foot")[:3] @ space.qdd.A @ flat, absolute=True)
@@ -89,7 +90,7 @@ def test_the_pictures_are_drawn() -> None:
     )  # both at (1, 1): right of and above the middle
     assert "nan" not in level_curves(valley, [0.0, 0.0], 2.0, "x", "y")
     assert len(effort_picture({"a": ([0, 1], [0, 1])}).axes) == 1
-    space = standing_space(GO2)
+    space = fb.feasible_space(standing_go2_eom())
     view = fb.Viewer(GO2)
     try:
         np.testing.assert_allclose(

@@ -51,19 +51,9 @@ def knee(hydraulics: Hydraulics) -> HydraulicActuators:
     return actuators
 
 
-@pytest.mark.parametrize(
-    ("bandwidth", "speed", "wanted", "supply"),
-    [
-        (50.0, 0.5, 12.0, 160e5),
-        (5.0, 4.0, -20.0, 160e5),
-        (1.0, 15.0, 12.0, 60e5),
-        (20.0, 2.0, 60.0, 160e5),
-    ],
-)
-def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
-    bandwidth: float, speed: float, wanted: float, supply: float
-) -> None:
-    """Turned fast, out of reach, boiling: 0.4 s of go2's knee."""
+def test_the_bench_is_the_knee_of_go2() -> None:
+    """Turned fast, out of reach, boiling: 0.4 s."""
+    bandwidth, speed, wanted, supply = 1.0, 15.0, 12.0, 60e5
     hydraulics = Hydraulics(loop_bandwidth=bandwidth, supply_pressure=supply)
     actuators, motion = knee(hydraulics), hold_then_turn(speed)
     rows = run_force_loop(Bench(motion, wanted, hydraulics), bandwidth, 0.4)
@@ -78,21 +68,12 @@ def test_the_bench_in_plain_numbers_is_the_packages_cylinder_and_loop(
         )
 
 
-def test_the_benchs_spring_rate_and_reach_are_the_cylinders() -> None:
-    actuators = HydraulicActuators(ROBOT)
-    cylinders, angle = actuators.cylinders, 0.4
-    bench, geometry = (
-        Bench(lambda t: (angle, 0.0)),
-        cylinders.geometry(cylinders.max_lever_angle + angle),
-    )
-    assert bench.stiffness == pytest.approx(
-        geometry.lever[KNEE] ** 2 * geometry.stiffness[KNEE], rel=1e-12
-    )
-    assert bench.volumes == pytest.approx(tuple(geometry.volumes[:, KNEE]), rel=1e-12)
-    assert bench.torque_range() == pytest.approx(
-        tuple((geometry.lever * cylinders.force_limits())[:, KNEE]), rel=1e-12
-    )
-    pressures = np.array([[bench.pressure_a], [bench.pressure_b]]) * np.ones(12)
+def test_the_benchs_rate_is_the_cylinders() -> None:
+    cylinders, angle = HydraulicActuators(ROBOT).cylinders, 0.4
+    bench = Bench(lambda t: (angle, 0.0))
+    geometry = cylinders.geometry(cylinders.max_lever_angle + angle)
+    _, _, _, pressure_a, pressure_b, _ = bench.samples[0]
+    pressures = np.array([[pressure_a], [pressure_b]]) * np.ones(12)
     for side in (1.0, -1.0):
         rates = cylinders.pressure_rates(np.full(12, side), pressures, geometry, np.zeros(12))
         leaking = cylinders.pressure_rates(np.zeros(12), pressures, geometry, np.zeros(12))

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import resource
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 import nbformat
-import numpy as np
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from floatbase.errors import InputError
-from floatbase.lessons import progress
 from floatbase.lessons.publish import MY_FOLDER, prepare_workspace
 
-KILLS = 20
 LESSON, NEW, NEW2 = "00_a.ipynb", "00_a.new.ipynb", "00_a.new2.ipynb"
 
 
@@ -223,9 +217,7 @@ def test_what_counts_as_writing(course: Path, change: str) -> None:
         "null",
         "5",
         "[1]",
-        '{"laid": 5}',
-        '{"laid": {}, "offered": [1]}',
-        '{"laid": {"00_a.ipynb": [1]}}',
+        '{"00_a.ipynb": [1]}',
         "[" * 100_000,
         "",
         "\0",
@@ -238,11 +230,7 @@ def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) 
     prepare_workspace(mine.parent)
     assert (mine / LESSON).read_text() == "half a noteb"
     assert source(mine / NEW) == source(mine / "01_b.new.ipynb") == "first = 2"
-    again = (
-        f"{LESSON}: yours is empty or damaged; to get the course's again, move it away and "
-        f"start again"
-    )
-    assert prepare_workspace(mine.parent) == [again]
+    assert prepare_workspace(mine.parent) == []
     (mine / LESSON).rename(mine / "away")
     assert prepare_workspace(mine.parent) == [f"{LESSON}: new"]
 
@@ -279,11 +267,7 @@ def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_u
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [
-            line
-            for line in prepare_workspace(mine.parent)
-            if "not brought" in line or "cannot be stored" in line
-        ]
+        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -314,7 +298,7 @@ def test_a_folder_that_cannot_be_is_told_in_words(
     course: Path, make: Callable[[Path], object]
 ) -> None:
     make(course / MY_FOLDER)
-    with pytest.raises(InputError, match="it must be a folder"):
+    with pytest.raises(InputError, match="must be a folder"):
         prepare_workspace(course)
 
 
@@ -332,72 +316,13 @@ def full_disk(size: int) -> Iterator[None]:
 def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) -> None:
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
-    with full_disk(5_000):  # room for the memory, none for the lesson
+    with full_disk(5_000):  # room for the record, none for the lesson
         assert "not brought up to date: File too large" in prepare_workspace(mine.parent)[0]
     assert source(mine / LESSON) == "first = 1"
     assert files(mine) == {LESSON, "01_b.ipynb", "page.md"}
     write(mine / LESSON, "first = 'my answer'")
     prepare_workspace(mine.parent)
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
-
-
-def work(course: Path, first: int, acknowledged: int) -> None:
-    """Update the course and use it, again and again."""
-    for n in count(first):
-        for name in ("00_a", "01_b"):
-            write(course / "part", f"first = {n}")
-            (course / "part").replace(course / f"{name}.ipynb")
-        prepare_workspace(course)
-        progress.record_try("00.1", True)
-        os.write(acknowledged, b".")
-
-
-@pytest.mark.front_end
-def test_a_kill_at_any_moment_loses_nothing(
-    mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    write(mine / LESSON, "first = 'my answer'")
-    written, (read_end, write_end) = (mine / LESSON).read_bytes(), os.pipe()
-    for i, moment in enumerate(np.random.default_rng(0).uniform(0.0, 0.06, KILLS)):
-        process = multiprocessing.get_context("fork").Process(
-            target=work, args=(mine.parent, 1_000 * i, write_end)
-        )
-        process.start()
-        process.join(moment)
-        process.kill()
-        process.join()
-        source(mine / "01_b.ipynb")  # is whole
-        update(mine.parent, 1_000 * i + 999)
-        prepare_workspace(mine.parent)
-        assert (mine / LESSON).read_bytes() == written
-        assert source(mine / "01_b.ipynb") == source(mine.parent / "01_b.ipynb")
-        assert files(mine) <= {LESSON, NEW, "01_b.ipynb", "page.md"}
-    os.close(write_end)
-    with os.fdopen(read_end, "rb") as acknowledged:
-        done = len(acknowledged.read())
-    assert done <= progress.load().get("00.1", {"tries": 0})["tries"] <= done + KILLS
-    assert source(mine / NEW) == source(mine.parent / LESSON)
-
-
-@pytest.mark.front_end
-def test_two_at_once_are_both_right(mine: Path) -> None:
-    write(mine / LESSON, "first = 'my answer'")
-    for n in range(2, 12):
-        update(mine.parent, n)
-        both = [
-            multiprocessing.get_context("fork").Process(
-                target=prepare_workspace, args=(mine.parent,)
-            )
-            for _ in range(2)
-        ]
-        for process in both:
-            process.start()
-        for process in both:
-            process.join()
-        assert [process.exitcode for process in both] == [0, 0]
-        assert source(mine / "01_b.ipynb") == source(mine / NEW) == f"first = {n}"
-    assert files(mine) == {LESSON, NEW, "01_b.ipynb", "page.md"}
 
 
 def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Path) -> None:

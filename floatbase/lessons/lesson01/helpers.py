@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import floatbase as fb
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
@@ -37,7 +38,7 @@ def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], A
 
     It starts and ends at rest.
     """
-    return lambda t: angle * _minimum_jerk(t / duration) * np.eye(6)[joint]
+    return lambda t: angle * minimum_jerk(t / duration)[0] * np.eye(6)[joint]
 
 
 def joint_circle(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
@@ -49,16 +50,10 @@ def joint_circle(first: int, second: int, size: float, duration: float) -> Calla
     """
 
     def path(t: float) -> Array:
-        angle = 2.0 * np.pi * _minimum_jerk(t / duration)
+        angle = 2.0 * np.pi * minimum_jerk(t / duration)[0]
         return size * (np.sin(angle) * np.eye(6)[first] + (1.0 - np.cos(angle)) * np.eye(6)[second])
 
     return path
-
-
-def _minimum_jerk(s: float) -> float:
-    """From 0 to 1 with no velocity or acceleration at the ends."""
-    s = min(max(s, 0.0), 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 def weightless_simulation(robot: Robot) -> fb.Simulation:

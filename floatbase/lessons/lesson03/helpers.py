@@ -53,16 +53,6 @@ def rising_solo8_eom() -> EquationsOfMotion:
     )
 
 
-def standing_space(robot: Robot, *frames: str) -> FeasibleSpace:
-    """The space of motions (13) of a robot in its standing state on the feet of these frames; on
-    all feet without `frames`.
-    """
-    contacts = fb.Contacts.points(robot, mu=0.7)
-    return fb.feasible_space(
-        fb.equations_of_motion(robot.standing(), contacts.only(*frames) if frames else contacts)
-    )
-
-
 def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
     """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the
     forces as little as possible.

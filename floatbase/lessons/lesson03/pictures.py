@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import FeasibleSpace
+from floatbase.lessons import svg
 from floatbase.lessons.lesson03.helpers import upright_solo12
 from floatbase.linear_algebra import rank
 from floatbase.robots import Robot
@@ -116,50 +117,38 @@ def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: fl
     most: what a bar of full length means.
     """
     width, bottom = BLOCK * len(blocks), ZERO_LINE + FULL_BAR
-    parts = [f'<text y="12" font-size="13">{title}</text>']
-    parts.append(f'<path d="M0 {ZERO_LINE}H{width}" stroke="currentColor" stroke-opacity="0.5"/>')
+    drawn = svg.element("text", title, y=12, font_size=13)
+    drawn += svg.line((0, ZERO_LINE), (width, ZERO_LINE), stroke_opacity="0.5")
     for i, ((block, marks, unit), three) in enumerate(zip(blocks, values, strict=True)):
-        parts.append(
-            f'<text x="{BLOCK * (i + 0.5)}" y="{bottom + 28}" text-anchor="middle">{block}</text>'
-        )
+        drawn += svg.text((BLOCK * (i + 0.5), bottom + 28), block, 11)
         for j, (mark, value) in enumerate(zip(marks, three, strict=True)):
             x, number = (
                 BLOCK * i + BAR * j + GAP // 2,
                 f"{value:.4g}" if abs(value) > 1e-6 * most else "0",
             )
-            parts.append(f"<g><title>{title.split(',')[0]} {block} {mark}: {number} {unit}</title>")
-            parts.append(_bar(x, value / most, colour))
-            parts.append(
-                f'<text x="{x + BAR / 2}" y="{bottom + 14}" '
-                f'text-anchor="middle">{mark[0]}</text></g>'
-            )
-    size = (
-        f'width="{max(width, LETTER_WIDTH * len(title))}" height="{bottom + 32}" role="img" '
-        f'aria-label="{title}"'
-    )
-    return f'<svg {size} font-size="11" fill="currentColor">{"".join(parts)}</svg>'
+            name = f"{title.split(',')[0]} {block} {mark}: {number} {unit}"
+            bar = f"<title>{name}</title>{_bar(x, value / most, colour)}"
+            drawn += f"<g>{bar}{svg.text((x + BAR / 2, bottom + 14), mark[0], 11)}</g>"
+    wide = max(width, LETTER_WIDTH * len(title))
+    style = {"role": "img", "aria_label": title, "font_size": "11", "fill": "currentColor"}
+    return svg.element("svg", drawn, width=wide, height=bottom + 32, **style)
 
 
-def _bar(x: float, part: float, colour: str) -> str:
+def _bar(x: int, part: float, colour: str) -> str:
     """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full
     length.
     """
-    length = min(abs(part), 1.0) * FULL_BAR
+    length = float(min(abs(part), 1.0) * FULL_BAR)
     top, end = (
         (ZERO_LINE - length, ZERO_LINE - FULL_BAR)
         if part > 0
-        else (ZERO_LINE, ZERO_LINE + FULL_BAR - 3)
+        else (float(ZERO_LINE), ZERO_LINE + FULL_BAR - 3)
     )
-    drawn = (
-        f'<rect x="{x}" y="{ZERO_LINE - FULL_BAR}" width="{BAR}" height="{2 * FULL_BAR + 16}" '
-        f'fill-opacity="0"/>'
-    )
-    drawn += (
-        f'<rect x="{x + 1}" y="{top:.1f}" width="{BAR - 2}" height="{length:.1f}" fill="{colour}"/>'
-    )
-    return drawn + (
-        f'<rect x="{x + 1}" y="{end}" width="{BAR - 2}" height="3"/>' if abs(part) > 1.0 else ""
-    )
+    column = {"width": BAR, "height": 2 * FULL_BAR + 16, "fill_opacity": 0}
+    drawn = svg.element("rect", x=x, y=ZERO_LINE - FULL_BAR, **column)
+    drawn += svg.element("rect", x=x + 1, y=top, width=BAR - 2, height=length, fill=colour)
+    too_long = svg.element("rect", x=x + 1, y=end, width=BAR - 2, height=3)
+    return drawn + (too_long if abs(part) > 1.0 else "")
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:

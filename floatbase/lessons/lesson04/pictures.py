@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.lessons import svg
 from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.scene.colours import COM, GREYS, hex_code
 
@@ -85,29 +86,20 @@ def level_curves(
     turn = -np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
     s = 130.0 / half  # pixels for 1
     x, y = (np.array([1, -1]) * s * np.asarray(point)) + 130
-    at = (
-        f'transform="translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) '
-        f'rotate({turn:.2f})"'
-    )
+    place = f"translate({130 + s * centre[0]:.1f} {130 - s * centre[1]:.1f}) rotate({turn:.2f})"
     grey = hex_code(GREYS[1])
-    rings = "".join(
-        f'<ellipse rx="{s * (2 * level / values[1]) ** 0.5:.1f}" '
-        f'ry="{s * (2 * level / values[0]) ** 0.5:.1f}" {at} '
-        f'fill="{grey}" fill-opacity="0.15" stroke="{grey}" stroke-width="1.5"/>'
-        for level in LEVELS
-    )
-    return (
-        f'<svg width="310" viewBox="-40 0 310 290" style="max-width: 100%" fill="currentColor">'
-        f'<svg x="0" y="0" width="260" height="260"><rect width="260" height="260" '
-        f'fill-opacity="0.05"/>{rings}'
-        f'<path d="M0 130H260M130 0V260" stroke="currentColor" stroke-opacity="0.4" '
-        f'stroke-dasharray="3 3"/>'
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6"/></svg>'
-        f'<text x="130" y="278" text-anchor="middle" font-size="13">{x_name}, ± {half:g}</text>'
-        f'<text transform="translate(-10 130) rotate(-90)" text-anchor="middle" '
-        f'font-size="13">{y_name}, ± {half:g}</text>'
-        "</svg>"
-    )
+    drawn = svg.element("rect", width=260, height=260, fill_opacity="0.05")
+    for level in LEVELS:
+        rx, ry = (float(s * (2 * level / value) ** 0.5) for value in values[::-1])
+        style = {"fill": grey, "fill_opacity": "0.15", "stroke": grey, "stroke_width": "1.5"}
+        drawn += svg.element("ellipse", rx=rx, ry=ry, transform=place, **style)
+    style = {"stroke": "currentColor", "stroke_opacity": "0.4", "stroke_dasharray": "3 3"}
+    drawn += svg.element("path", d="M0 130H260M130 0V260", **style)
+    drawn += svg.circle((x, y), 6)
+    drawn = svg.element("svg", drawn, x=0, y=0, width=260, height=260)
+    drawn += svg.text((130, 278), f"{x_name}, ± {half:g}")
+    drawn += svg.upright_text((-10, 130), f"{y_name}, ± {half:g}")
+    return svg.drawing(drawn, 310, "-40 0 310 290")
 
 
 def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) -> Figure:

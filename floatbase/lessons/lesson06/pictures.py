@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
+from floatbase.lessons import svg
 from floatbase.viewer import View, Viewer, prefixed, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
@@ -21,7 +22,7 @@ FORCE_SCALE = 0.01  # m drawn for 1 N at a single foot
 CONE_HEIGHT = 0.7  # m: height of a single cone
 SINGLE_FOOT_VIEW = View(25.0, 20.0, 1.0, around=((0.0, 0.0, 0.36), 0.52))  # of a single foot
 TOP_VIEW = View(180.0, 89.0, 1.0)  # forwards is up, as in the plots
-DRAWING_SIZE = 250  # pixels of a drawing from above
+DRAWING_SIZE = (250, 250)  # pixels of a drawing from above
 
 
 def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
@@ -72,15 +73,13 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
     picture["patch"] = shapes.contact_patch(np.zeros(3), inner.normal, 0.05)
     view.draw(view.painter.ground_only() | picture)
     rays = {"inside": (inner.rays, ""), "outside": (outer.rays, "6 4")}
-    half = DRAWING_SIZE / 2
+    half = DRAWING_SIZE[0] / 2
     s = 0.64 * half / mu  # pixels for 1: a triangle outside reaches 2 μ, and its corners may be cut
     drawn = "".join(
-        _polygon(half + s * _to_pixels(corners), dashes) for corners, dashes in rays.values()
+        _polygon(svg.from_above(corners, (half, half), s), dashes)
+        for corners, dashes in rays.values()
     )
-    circle = (
-        f'<circle cx="{half}" cy="{half}" r="{s * mu:.1f}" fill="none" stroke="currentColor" '
-        f'stroke-width="2"/>'
-    )
+    drawn += svg.circle((half, half), s * mu, fill="none", stroke="currentColor", stroke_width=2)
     areas = " · ".join(
         f"{name} {100 * cone.area_ratio:.0f} %"
         for name, cone in (("inside", inner), ("outside", outer))
@@ -89,9 +88,8 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
         f"weakest {inner.mu_facet:.2f} inside, strongest "
         f"{np.linalg.norm(outer.rays[0, :2]):.2f} outside"
     )
-    return _svg(
-        drawn + circle, f"{facets} facets from above; forwards is up", f"area: {areas}", weakest
-    )
+    title = f"{facets} facets from above; forwards is up"
+    return svg.captioned(drawn, DRAWING_SIZE, 25, title, f"area: {areas}", weakest)
 
 
 def compass_row(**stances: WrenchSet) -> Figure:
@@ -180,58 +178,24 @@ def region_picture(state: fb.State, feet: Array, region: Array) -> str:
     feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none
         says nowhere.
     """
-    half, s, middle = (
-        DRAWING_SIZE / 2,
-        DRAWING_SIZE / 0.6,
-        feet[:, :2].mean(axis=0),
-    )  # s: pixels for 1 m
+    middle, (width, height) = feet[:, :2].mean(axis=0), DRAWING_SIZE
 
     def seen(points: Array) -> Array:
-        return half + s * _to_pixels(np.asarray(points) - middle)
+        return svg.from_above(points - middle, (width / 2, height / 2), width / 0.6)
 
     words = "filled: where the CoM may be" if len(region) else "nowhere: the feet cannot carry it"
     drawn = _polygon(seen(feet[ConvexHull(feet[:, :2]).vertices, :2]), "6 4")
     if len(region) > 2:
         drawn += _polygon(seen(region), "", 0.35)
-    x, y = seen(state.com[None, :2])[0]
-    dots = "".join(
-        f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="currentColor"/>'
-        for a, b in seen(feet[:, :2])
-    )
-    dots += (
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="{hex_code(GREYS[1])}" '
-        f'stroke="currentColor"/>'
-    )
-    return _svg(
-        drawn + dots, "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM"
-    )
-
-
-def _to_pixels(points: Array) -> Array:
-    """Where horizontal places, shape (n, 2) or more, are in a drawing with x upwards and y to the
-    left.
-    """
-    return np.column_stack([-points[:, 1], -points[:, 0]])
+    for foot in seen(feet[:, :2]):
+        drawn += svg.circle(foot, 3.5, fill="currentColor")
+    com = seen(state.com[None, :2])[0]
+    drawn += svg.circle(com, 7, fill=hex_code(GREYS[1]), stroke="currentColor")
+    lines = "from above; forwards is up", words, "dashed: the feet's hull, dot: the CoM"
+    return svg.captioned(drawn, DRAWING_SIZE, 25, *lines)
 
 
 def _polygon(corners: Array, dashes: str, opacity: float = 0.12) -> str:
-    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
-    fill = f'fill="{grey}" fill-opacity="{0 if dashes else opacity}"'
-    return (
-        f'<polygon points="{points}" {fill} stroke="{grey}" stroke-width="2" '
-        f'stroke-dasharray="{dashes}"/>'
-    )
-
-
-def _svg(drawn: str, *lines: str) -> str:
-    words = "".join(
-        f'<text x="{DRAWING_SIZE / 2}" y="{DRAWING_SIZE + 18 + 18 * i}" text-anchor="middle" '
-        f'font-size="13">{line}</text>'
-        for i, line in enumerate(lines)
-    )
-    box = f'<svg x="0" y="0" width="{DRAWING_SIZE}" height="{DRAWING_SIZE}">{drawn}</svg>'
-    height = DRAWING_SIZE + 18 * len(lines) + 10
-    return (
-        f'<svg width="300" viewBox="-25 0 300 {height}" style="max-width: 100%" '
-        f'fill="currentColor">{box}{words}</svg>'
-    )
+    style = {"fill_opacity": f"{0 if dashes else opacity}", "stroke_dasharray": dashes}
+    grey = hex_code(GREYS[1])
+    return svg.polygon(corners, fill=grey, stroke=grey, stroke_width=2, **style)

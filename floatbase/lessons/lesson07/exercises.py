@@ -10,7 +10,6 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.errors import InputError
 from floatbase.lessons.exercises import (
     Example,
     Exercise,
@@ -18,6 +17,7 @@ from floatbase.lessons.exercises import (
     ShapeJudge,
     Verdict,
     array_or_verdict,
+    lasting_or_verdict,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson07.helpers import (
@@ -35,7 +35,6 @@ from floatbase.simulation import Rollout
 INNER = MU * np.cos(np.pi / 4)  # of a pyramid inside the cone
 HARD, AFTER = 150.0, 1.0  # N, and s after the push's end: what exercise 07.4 asks for
 AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm
-BEGIN = (100.0, 20.0, 10.0, 1e-3)  # the gains and weights of `fb.standing_tasks`
 STEP = 0.005  # by which μ grows in exercise 07.3
 
 
@@ -224,16 +223,9 @@ def _judge_design(answer: Any) -> Verdict:
             "Gains and weights are not negative, and the centre of mass needs a weight above 0.",
             "negative",
         )
-    try:
-        record = _record(tuple(given.tolist()))
-    except InputError as error:
-        return Verdict(False, str(error), "input_error")
-    if record.outcome != "completed":
-        return Verdict(
-            False,
-            f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.",
-            "falls",
-        )
+    record = lasting_or_verdict(lambda: _record(tuple(given.tolist())))
+    if isinstance(record, Verdict):
+        return record
     away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
     strayed = 1e3 * record.slip().max()
     end = rounded(round(away[-1], 1), "mm", floor=0.5)

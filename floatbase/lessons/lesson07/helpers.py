@@ -16,8 +16,7 @@ from scipy.linalg import block_diag
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.control import AnalyticController
-from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.controllers import TorqueCommand
+from floatbase.lessons.controllers import SolverController
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.simulation import Controller, Rollout
 
@@ -26,7 +25,7 @@ MU = 0.7
 LEFT = np.array([0.0, 1.0, 0.0])
 
 
-class WithoutInequalities:
+class WithoutInequalities(SolverController):
     """A controller from which the inequality rows of some kinds were taken away: its QP without
     them, at every tick.
 
@@ -34,47 +33,37 @@ class WithoutInequalities:
     """
 
     def __init__(self, controller: fb.WholeBodyController, *kinds: str):
-        self.robot, self.contacts = controller.robot, controller.contacts
-        self.controller, self.kinds = controller, kinds
-
-    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
-        solution = fb.solve(self.controller.qp(fb.State(self.robot, q, v), t).without(*self.kinds))
-        return TorqueCommand(solution["tau"], solution["forces"])
+        super().__init__(controller, lambda qp: fb.solve(qp.without(*kinds)).x)
 
 
-class WithConstraints:
+class WithConstraints(SolverController):
     """The costs of one controller with the rows of another: ψ of lesson 05, least where (27) holds.
 
     costs: of objectives alone. constraints: gives the equalities and inequalities.
     """
 
     def __init__(self, costs: AnalyticController, constraints: fb.WholeBodyController):
-        self.robot, self.contacts = costs.robot, costs.contacts
-        self.costs, self.constraints = costs, constraints
+        super().__init__(constraints, lambda qp: fb.solve(qp).x)
+        self.costs = costs
 
-    def qp(self, eom: EquationsOfMotion) -> fb.QP:
+    def qp(self, state: fb.State, t: float = 0.0) -> fb.QP:
         """The QP of one tick."""
-        qp, costs = self.constraints.qp(eom.state), self.costs.objective(eom)
+        qp = super().qp(state, t)
+        costs = self.costs.objective(fb.equations_of_motion(state, self.costs.contacts))
         H, g = block_diag(*(cost.H for cost in costs)), np.concatenate([cost.g for cost in costs])
         return fb.QP(
             H, g, qp.A, qp.b, qp.G, qp.h, qp.equality_names, qp.inequality_names, qp.blocks
         )
 
-    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
-        solution = fb.solve(
-            self.qp(fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts))
-        )
-        return TorqueCommand(solution["tau"], solution["forces"])
 
+def run_with_push(
+    controller: Controller, newtons: float, duration: float = 0.6, towards: Array = LEFT
+) -> Rollout:
+    """The record of go2 on the physics, pushed at the base from 0.05 to 0.15 s.
 
-def run_with_push(controller: Controller, newtons: float, duration: float = 0.6) -> Rollout:
-    """The record of go2 on the physics, pushed to its left at the base from 0.05 to 0.15 s.
-
-    newtons: how hard. duration: s, of the record.
+    newtons: how hard. duration: s, of the record. towards: (3,), unit vector.
     """
-    push = fb.Push(newtons * LEFT, start=PUSH_START, duration=PUSH_DURATION)
+    push = fb.Push(newtons * towards, start=PUSH_START, duration=PUSH_DURATION)
     return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
 
 

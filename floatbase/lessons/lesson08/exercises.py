@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.errors import InputError
 from floatbase.friction import wrench_set
 from floatbase.lessons.exercises import (
     Example,
@@ -21,6 +20,7 @@ from floatbase.lessons.exercises import (
     ShapeJudge,
     Verdict,
     array_or_verdict,
+    lasting_or_verdict,
 )
 from floatbase.lessons.lesson08.helpers import (
     CRAWL_DURATION,
@@ -29,7 +29,6 @@ from floatbase.lessons.lesson08.helpers import (
     smallest_support_margin,
     uneven_stance,
 )
-from floatbase.lessons.rounding import rounded
 
 FOOT = "FR_foot"  # of exercise 08.1
 CLEARANCE = 0.05  # m, of exercise 08.2
@@ -209,16 +208,9 @@ def _judge_crawl(answer: Any) -> Verdict:
         )
     if forwards < 0:
         return Verdict(False, "Forwards, please.", "backwards")
-    try:
-        record = run_crawl(swing, pause, forwards)
-    except InputError as error:
-        return Verdict(False, str(error), "input_error")
-    if record.outcome != "completed":
-        return Verdict(
-            False,
-            f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the start.",
-            "falls",
-        )
+    record = lasting_or_verdict(lambda: run_crawl(swing, pause, forwards))
+    if isinstance(record, Verdict):
+        return record
     far = 1e3 * float((record.com[-1] - record.com[0])[0])
     inside, pressed = 1e3 * smallest_support_margin(record), float(record.measured[:, 2::3].max())
     told = (

@@ -11,7 +11,6 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
-from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.exercises import (
     Example,
@@ -20,6 +19,7 @@ from floatbase.lessons.exercises import (
     ShapeJudge,
     Verdict,
     array_or_verdict,
+    lasting_or_verdict,
 )
 from floatbase.lessons.lesson09.helpers import (
     LEAN_START,
@@ -142,19 +142,9 @@ def _judge_lean(answer: Any) -> Verdict:
         return Verdict(
             False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range"
         )
-    try:
-        record = run_lean(seconds, posture)
-    except InputError as error:
-        return Verdict(False, str(error), "input_error")
-    if record.outcome != "completed":
-        why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
-        return Verdict(
-            False,
-            f"It does not last: {record.outcome} {rounded(record.time[-1], 's')} after the "
-            f"start.{why}",
-            "falls",
-        )
-    return _judge_record(record, seconds)
+    why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
+    record = lasting_or_verdict(lambda: run_lean(seconds, posture), why)
+    return record if isinstance(record, Verdict) else _judge_record(record, seconds)
 
 
 def _judge_record(record: Rollout, seconds: float) -> Verdict:

@@ -16,6 +16,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.behaviours import StepPlan
 from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench
+from floatbase.lessons import svg
 from floatbase.lessons.lesson09.helpers import centre_of_pressure_path, corner_forces
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, prefixed, shapes
@@ -31,7 +32,7 @@ _BESIDE, _SIZE = (
     (-0.1, 0.21, 0.002),
     0.3,
 )  # m, world: where the scale of forces is, and the size of two feet
-WIDE, HIGH = 300, 250  # pixels of a drawing
+DRAWING_SIZE = WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
 _LIMIT_TOLERANCE = 1e-6  # of the normal force: a wrench this near to a limit is within it
 _ZERO_TOLERANCE = 1e-9  # of a row of length one: rounding
@@ -75,21 +76,16 @@ def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike)
         one = contacts.only(contact.name)
         corners = _to_pixels(one.positions(state))
         drawn += _polygon(corners)
-        for (x, y), normal in zip(corners, own[2::3], strict=True):
+        for corner, normal in zip(corners, own[2::3], strict=True):
             radius = 0.8 * np.sqrt(max(float(normal), 0.0))
-            drawn += (
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{hex_code(PLANNED)}"/>'
-            )
+            drawn += svg.circle(corner, radius, fill=hex_code(PLANNED))
         if own[2::3].sum() > MIN_FORCE:
             drawn += _cross(_to_pixels(centre_of_pressure(state, one, own)[None])[0], 5)
     drawn += _cross(_to_pixels(centre_of_pressure(state, contacts, flat)[None])[0], 9)
-    x, y = _to_pixels(state.com[None])[0]
-    drawn += (
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="9" fill="none" stroke="{hex_code(GREYS[1])}" '
-        f'stroke-width="3"/>'
-    )
+    com = _to_pixels(state.com[None])[0]
+    drawn += svg.circle(com, 9, fill="none", stroke=hex_code(GREYS[1]), stroke_width=3)
     words = ("small crosses: where each sole is pushed", "large cross: both together; ring: x_c")
-    return _svg(drawn, "from above; forwards is up", *words)
+    return svg.captioned(drawn, DRAWING_SIZE, 20, "from above; forwards is up", *words)
 
 
 def show_sole(
@@ -201,21 +197,17 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])
     corners = np.column_stack([WIDE / 2 + sx * across, HIGH / 2 - sy * twist])
-    drawn = (
-        f'<path d="M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}" stroke="{hex_code(GREYS[2])}" '
-        f'stroke-width="1"/>'
-    )
+    cross = f"M0 {HIGH / 2}H{WIDE}M{WIDE / 2} 0V{HIGH}"
+    drawn = svg.element("path", d=cross, stroke=hex_code(GREYS[2]), stroke_width=1)
     drawn += _polygon(corners, 0.35) if len(corners) else ""
     at = -1e3 * wrench[4] / wrench[2], wrench[5]
-    drawn += (
-        f'<circle cx="{WIDE / 2 + sx * at[0]:.1f}" cy="{HIGH / 2 - sy * at[1]:.1f}" r="6" '
-        f'fill="currentColor"/>'
-    )
+    at_pixel = WIDE / 2 + sx * at[0], HIGH / 2 - sy * at[1]
+    drawn += svg.circle(at_pixel, 6, fill="currentColor")
     axes = (
         f"across: centre of pressure, ±{half:.0f} mm",
         f"up: twist, ±{most:.0f} N·m; filled: allowed",
     )
-    return _svg(drawn, *axes, *lines)
+    return svg.captioned(drawn, DRAWING_SIZE, 20, *axes, *lines)
 
 
 def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
@@ -285,11 +277,7 @@ def plot_lean(record: Rollout) -> Axes:
 
 
 def _to_pixels(places: Array) -> Array:
-    """Where horizontal places, shape (n, 2) or more, m, are in a drawing with x upwards and y to
-    the left.
-    """
-    scale = WIDE / 0.44  # pixels for 1 m
-    return np.column_stack([WIDE / 2 - scale * places[:, 1], HIGH / 2 - scale * places[:, 0]])
+    return svg.from_above(places, (WIDE / 2, HIGH / 2), WIDE / 0.44)
 
 
 def _cross(at: Array, half: float) -> str:
@@ -297,26 +285,9 @@ def _cross(at: Array, half: float) -> str:
     path = (
         f"M{x - half:.1f} {y - half:.1f}l{2 * half} {2 * half}m{-2 * half} 0l{2 * half} {-2 * half}"
     )
-    return f'<path d="{path}" stroke="currentColor" stroke-width="2.5"/>'
+    return svg.element("path", d=path, stroke="currentColor", stroke_width="2.5")
 
 
 def _polygon(corners: Array, opacity: float = 0.12) -> str:
-    points, grey = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners), hex_code(GREYS[1])
-    return (
-        f'<polygon points="{points}" fill="{grey}" fill-opacity="{opacity}" stroke="{grey}" '
-        f'stroke-width="2"/>'
-    )
-
-
-def _svg(drawn: str, *lines: str) -> str:
-    words = "".join(
-        f'<text x="{WIDE / 2}" y="{HIGH + 18 + 18 * i}" text-anchor="middle" '
-        f'font-size="13">{line}</text>'
-        for i, line in enumerate(lines)
-    )
-    box = f'<svg x="0" y="0" width="{WIDE}" height="{HIGH}">{drawn}</svg>'
-    height = HIGH + 18 * len(lines) + 10
-    return (
-        f'<svg width="340" viewBox="-20 0 340 {height}" style="max-width: 100%" '
-        f'fill="currentColor">{box}{words}</svg>'
-    )
+    grey, opaque = hex_code(GREYS[1]), {"fill_opacity": f"{opacity}"}
+    return svg.polygon(corners, fill=grey, stroke=grey, stroke_width=2, **opaque)

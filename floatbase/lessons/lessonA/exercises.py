@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
+from floatbase._geometry import rotation_z
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
 from floatbase.lessons.exercises import Exercise, NumericJudge
@@ -32,11 +33,7 @@ def _force_on_the_walker() -> Array:
     """Mass times the second difference of where the child is in the world."""
 
     def place(t: float) -> Array:
-        angle = PLATFORM_RATE[2] * t
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (
-            CHILD_POSITION + t * CHILD_VELOCITY
-        )
+        return rotation_z(PLATFORM_RATE[2] * t) @ (CHILD_POSITION + t * CHILD_VELOCITY)
 
     return np.asarray(CHILD_MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 import floatbase as fb
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array
 from floatbase.behaviours import pitch_and_yaw
 from floatbase.simulation import Rollout
@@ -63,8 +64,7 @@ def elliptic_rotation(
     total, shift = loops / rate, np.deg2rad(phase)
 
     def angles(t: float) -> Array:
-        s = np.clip(rate * min(t, total - t), 0.0, 1.0)
-        size = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        size = minimum_jerk(rate * min(t, total - t))[0]
         return np.asarray(
             size
             * np.array(

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, view_from_rotating_frame
-from floatbase.lessons import props
+from floatbase.lessons import props, svg
 from floatbase.lessons.exercises import format_vector
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, shapes
@@ -89,21 +89,11 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
     def seen(points: Array) -> Array:
         return half + scale * np.asarray(points)[..., :2] * [1.0, -1.0]
 
-    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in seen(position))
-    x, y = seen(position[-1])
-    tip = seen(np.array([0.95 * TABLE_RADIUS, 0.0]))
-    drawn = (
-        f'<circle cx="{half}" cy="{half}" r="{scale * TABLE_RADIUS:.1f}" fill="none" '
-        f'stroke="currentColor"/>'
-    )
-    drawn += (
-        f'<line x1="{half}" y1="{half}" x2="{tip[0]:.1f}" y2="{tip[1]:.1f}" '
-        f'stroke="currentColor" stroke-width="3"/>'
-    )
-    drawn += (
-        f'<polyline points="{path}" fill="none" stroke="{hex_code(GREYS[1])}" stroke-width="3"/>'
-    )
-    drawn += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7"/>'
+    middle, grey = (half, half), hex_code(GREYS[1])
+    drawn = svg.circle(middle, scale * TABLE_RADIUS, fill="none", stroke="currentColor")
+    drawn += svg.line(middle, seen(np.array([0.95 * TABLE_RADIUS, 0.0])), stroke_width=3)
+    drawn += svg.polyline(seen(position), stroke=grey, stroke_width=3)
+    drawn += svg.circle(seen(position[-1]), 7)
     for acceleration, dashes in ((centrifugal, "4 3"), (coriolis, "")):
         drawn += _arrow(
             seen(position[-1]), seen(position[-1] + ACCELERATION_SCALE * acceleration), dashes
@@ -114,16 +104,9 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
         f"dashed: centrifugal, {sizes[0]:.1f} m/s²",
         f"solid: Coriolis, {sizes[1]:.1f} m/s²",
     )
-    lines = "".join(
-        f'<text x="{half}" y="{SIDE + 40 + 18 * i}" text-anchor="middle" '
-        f'font-size="13">{word}</text>'
-        for i, word in enumerate(words)
-    )
-    return (
-        f'<svg width="300" viewBox="-25 -30 300 {SIDE + 18 * len(words) + 65}" style="max-width: '
-        f'100%" '
-        f'fill="currentColor">{drawn}{lines}</svg>'
-    )
+    for i, word in enumerate(words):
+        drawn += svg.text((half, SIDE + 40 + 18 * i), word)
+    return svg.drawing(drawn, 300, f"-25 -30 300 {SIDE + 18 * len(words) + 65}")
 
 
 def _arrow(start: Array, end: Array, dashes: str) -> str:
@@ -134,13 +117,8 @@ def _arrow(start: Array, end: Array, dashes: str) -> str:
         return ""
     along, aside = way / length, np.array([-way[1], way[0]]) / length
     corners = [end, end - 9.0 * along + 4.5 * aside, end - 9.0 * along - 4.5 * aside]
-    tip = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-    (x1, y1), (x2, y2) = start, end - 8.0 * along
-    line = (
-        f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="currentColor" '
-        f'stroke-width="2"'
-    )
-    return f'{line} stroke-dasharray="{dashes}"/><polygon points="{tip}"/>'
+    shaft = svg.line(start, end - 8.0 * along, stroke_width=2, stroke_dasharray=dashes)
+    return shaft + svg.polygon(np.array(corners))
 
 
 def show_tumble(view: Viewer, glide: float, spin: float) -> str:

@@ -1,8 +1,12 @@
 """Lesson B, Torque is an abstraction."""
 
-from floatbase.lessons.lessonB.bench import Bench, hold_then_turn, run_force_loop
 from floatbase.lessons.lessonB.exercises import EXERCISES
-from floatbase.lessons.lessonB.helpers import push_response
+from floatbase.lessons.lessonB.helpers import (
+    Bench,
+    hold_then_turn,
+    push_response,
+    run_force_loop,
+)
 from floatbase.lessons.lessonB.pictures import (
     JOINT_VIEW,
     plot_com_sway,

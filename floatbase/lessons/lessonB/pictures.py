@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 
 from floatbase._validation import Array
 from floatbase.actuators import VACUUM, Hydraulics
-from floatbase.lessons import props
-from floatbase.lessons.lessonB.bench import Bench, BenchSample, hold_then_turn, run_force_loop
+from floatbase.lessons import props, svg
+from floatbase.lessons.lessonB.helpers import Bench, BenchSample, hold_then_turn, run_force_loop
 from floatbase.lessons.rounding import rounded
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, prefixed, shapes
@@ -211,13 +211,9 @@ def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
         else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
     )
     boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
-    total = 2 * HEIGHT + 2 * GAP
-    svg = (
-        f'<svg width="{WIDTH}" viewBox="0 -8 {WIDTH} {total}" style="max-width: 100%" '
-        f'fill="currentColor">{drawn}</svg>'
-    )
+    picture = svg.drawing(drawn, WIDTH, f"0 -8 {WIDTH} {2 * HEIGHT + 2 * GAP}")
     return (
-        f"{svg}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
+        f"{picture}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
         f"{max(torques[150:]):.1f} N·m; {boils}</div>"
     )
 
@@ -232,22 +228,12 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
     def y(value: float) -> float:
         return float(top + HEIGHT * (high - value) / (high - low))
 
-    drawn = f'<text x="14" y="{top + HEIGHT / 2}" font-size="12" text-anchor="middle" '
-    drawn += f'transform="rotate(-90 14 {top + HEIGHT / 2})">{title}</text>'
+    drawn = svg.upright_text((14, top + HEIGHT / 2), title, 12)
     for value in ticks:
-        drawn += (
-            f'<line x1="{LEFT}" y1="{y(value):.1f}" x2="{right}" y2="{y(value):.1f}" '
-            f'stroke="currentColor" opacity="0.15"/>'
-        )
-        drawn += (
-            f'<text x="{LEFT - 6}" y="{y(value) + 4:.1f}" font-size="11" '
-            f'text-anchor="end">{value:.0f}</text>'
-        )
+        drawn += svg.line((LEFT, y(value)), (right, y(value)), opacity="0.15")
+        drawn += svg.text((LEFT - 6, y(value) + 4), f"{value:.0f}", 11, "end")
     for t in np.linspace(0.0, RUN_DURATION, 5):
-        drawn += (
-            f'<text x="{x(t):.1f}" y="{top + HEIGHT + 15}" font-size="11" '
-            f'text-anchor="middle">{1000 * t:.0f} ms</text>'
-        )
+        drawn += svg.text((x(t), top + HEIGHT + 15), f"{1000 * t:.0f} ms", 11)
     heights = [y(values[-1]) for values in curves.values()]
     if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other
         up = 1.0 if heights[0] > heights[1] else -1.0
@@ -256,8 +242,8 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
     for (name, values), at, dash, grey in zip(
         curves.items(), heights, ("5 4", ""), (GREYS[2], GREYS[1]), strict=True
     ):
-        path = " ".join(f"{x(1e-3 * i):.1f},{y(value):.1f}" for i, value in enumerate(values))
-        style = f'stroke="{hex_code(grey)}" stroke-width="2.5" stroke-dasharray="{dash}"'
-        drawn += f'<polyline points="{path}" fill="none" {style}/>'
-        drawn += f'<text x="{right + 6}" y="{at + 4:.1f}" font-size="12">{name}</text>'
+        points = np.array([(x(1e-3 * i), y(value)) for i, value in enumerate(values)])
+        style = {"stroke_width": "2.5", "stroke_dasharray": dash}
+        drawn += svg.polyline(points, stroke=hex_code(grey), **style)
+        drawn += svg.text((right + 6, at + 4), name, 12, "start")
     return drawn

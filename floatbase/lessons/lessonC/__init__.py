@@ -1,9 +1,9 @@
 """Lesson C, How a QP solver thinks."""
 
+from floatbase.lessons.controllers import SolverController
 from floatbase.lessons.lessonC.exercises import EXERCISES, rounds_from_guess
 from floatbase.lessons.lessonC.helpers import (
     LimitedActiveSet,
-    SolverController,
     answer_or_default,
     beale_problem,
     braking_qp,

@@ -4,7 +4,7 @@ solver is the learner's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -12,15 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 import floatbase as fb
+from floatbase._geometry import rotation_z
 from floatbase._validation import Array, as_array
-from floatbase.lessons.controllers import TorqueCommand
+from floatbase.lessons import lesson07
 from floatbase.lessons.exercises import all_exercises
-from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.qp import ActiveSetRun, active_set
 from floatbase.simulation import Controller, Rollout
 
-MU = 0.7
-PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it lasts
 _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
@@ -65,8 +63,7 @@ def hexagon_table() -> fb.QP:
     lowest at (1, 3.9).
     """
     angles = np.pi / 3 * np.arange(6) + np.pi / 6
-    turn = np.deg2rad(15.0)
-    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    axes = rotation_z(np.deg2rad(15.0))[:2, :2]
     H = axes @ np.diag([1.0, 8.0]) @ axes.T
     names = tuple(f"edge {i}" for i in range(6))
     G = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -92,25 +89,6 @@ def beale_problem(curvature: float = 0.1) -> fb.QP:
     )
 
 
-class SolverController:
-    """A controller that hands the QP of every tick to a solver.
-
-    controller: makes the QP. solver: is called with it, and returns x = (q̈, τ, λ), shape (n,).
-    """
-
-    def __init__(
-        self, controller: fb.WholeBodyController, solver: Callable[[fb.QP], npt.ArrayLike]
-    ):
-        self.robot, self.contacts = controller.robot, controller.contacts
-        self.controller, self.solver = controller, solver
-
-    def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
-        qp = self.controller.qp(fb.State(self.robot, q, v), t)
-        x = as_array("x", self.solver(qp), (qp.n,))
-        return TorqueCommand(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
-
-
 class LimitedActiveSet:
     """A solver for `SolverController`: the package's `active_set`, stopped after so many rounds,
     from nothing or from the tick before.
@@ -132,10 +110,7 @@ class LimitedActiveSet:
 
 def standing_controller() -> fb.WholeBodyController:
     """go2 that stands, as in lesson 07: 42 variables, 30 equalities, 44 inequalities."""
-    state = standing_go2_eom().state
-    return fb.WholeBodyController(
-        state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state)
-    )
+    return lesson07.make_controller()
 
 
 def run_with_push(
@@ -146,12 +121,8 @@ def run_with_push(
     newtons: how hard. duration: s, of the record. towards: degrees, 0 forwards, 90 to its left.
     """
     angle = np.deg2rad(towards)
-    push = fb.Push(
-        newtons * np.array([np.cos(angle), np.sin(angle), 0.0]),
-        start=PUSH_START,
-        duration=PUSH_DURATION,
-    )
-    return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    return lesson07.run_with_push(controller, newtons, duration, direction)
 
 
 @cache

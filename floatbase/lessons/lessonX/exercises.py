@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, ShapeJudge, Verdict
+from floatbase.lessons.exercises import (
+    Example,
+    Exercise,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    function_or_verdict,
+)
 from floatbase.lessons.lessonX import investigation
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import (
@@ -177,18 +184,11 @@ def _unseen_case(i: int) -> tuple[Case, BlackBox]:
 
 def _judge_program(answer: Any) -> Verdict:
     """A function of a box, tried on boxes of each kind that nobody has seen."""
-    if answer is None or answer is Ellipsis:
-        return Verdict(
-            False, "There is no answer yet: give your function, without brackets.", "no_answer"
-        )
-    if not callable(answer):
-        return Verdict(
-            False,
-            f"The answer is a function, written with def; this is {type(answer).__name__}.",
-            "no_function",
-        )
+    program = function_or_verdict(answer)
+    if isinstance(program, Verdict):
+        return program
     for i in range(len(FAULTS) + 2):
-        if wrong := _tried(answer, *_unseen_case(i)):
+        if wrong := _tried(program, *_unseen_case(i)):
             return wrong
     return Verdict(
         True,

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from floatbase._validation import Array
+from floatbase.lessons import svg
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.diagnostics import lagged
 from floatbase.simulation import Rollout
@@ -79,10 +80,9 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
     told = box.tau[: len(got)]
     orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
-    drawn = frame.ticks() + frame.curve(
-        times, got[:, joint], f'stroke="{hex_code(GREYS[2])}" stroke-width="6"'
-    )
-    drawn += frame.curve(times, orders[:, joint], 'stroke="currentColor" stroke-width="1.5"')
+    drawn = frame.ticks()
+    drawn += frame.curve(times, got[:, joint], stroke=hex_code(GREYS[2]), stroke_width=6)
+    drawn += frame.curve(times, orders[:, joint], stroke="currentColor", stroke_width="1.5")
     off = float(np.median(np.abs(orders - got)))
     words = (
         f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
@@ -92,8 +92,7 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
     text = "".join(
         f"<div>{line}</div>" for line in words
     )  # not in the drawing, which shrinks on a narrow page
-    size = f'viewBox="0 0 {WIDTH} {HEIGHT + 32}" style="max-width: 100%; width: {WIDTH}px"'
-    return f'<svg {size} fill="currentColor">{drawn}</svg>{text}'
+    return svg.drawing(drawn, WIDTH, f"0 0 {WIDTH} {HEIGHT + 32}") + text
 
 
 @dataclass(frozen=True)
@@ -115,34 +114,19 @@ class _PlotFrame:
             10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low)
         )
 
-    def curve(self, times: Array, torques: Array, style: str) -> str:
-        points = " ".join(
-            f"{x:.1f},{y:.1f}" for x, y in zip(self.across(times), self.up(torques), strict=True)
-        )
-        return f'<polyline points="{points}" fill="none" {style}/>'
+    def curve(self, times: Array, torques: Array, **style: str | float) -> str:
+        return svg.polyline(np.column_stack([self.across(times), self.up(torques)]), **style)
 
     def ticks(self) -> str:
         """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
-        drawn = (
-            f'<text x="{EDGE - 6}" y="{HEIGHT + 27}" font-size="11" text-anchor="end">N·m</text>'
-        )
+        drawn = svg.text((EDGE - 6, HEIGHT + 27), "N·m", 11, "end")
         for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
             if self.low <= torque <= self.high:
-                y, width = float(self.up(torque)), 0.2 if torque else 0.5
-                ends = f'x1="{EDGE}" y1="{y:.1f}" x2="{WIDTH - EDGE}" y2="{y:.1f}"'
-                drawn += f'<line {ends} stroke="currentColor" stroke-width="{width}"/>'
-                drawn += (
-                    f'<text x="{EDGE - 6}" y="{y + 4:.1f}" font-size="11" '
-                    f'text-anchor="end">{torque:g}</text>'
-                )
+                y, width = float(self.up(torque)), "0.2" if torque else "0.5"
+                drawn += svg.line((EDGE, y), (WIDTH - EDGE, y), stroke_width=width)
+                drawn += svg.text((EDGE - 6, y + 4), f"{torque:g}", 11, "end")
         for tenth in range(int(np.ceil(10 * self.begin)), int(10 * self.end) + 1):
             x = float(self.across(tenth / 10))
-            drawn += (
-                f'<line x1="{x:.1f}" y1="5" x2="{x:.1f}" y2="{HEIGHT}" stroke="currentColor" '
-                f'stroke-width="0.2"/>'
-            )
-            drawn += (
-                f'<text x="{x:.1f}" y="{HEIGHT + 12}" font-size="11" '
-                f'text-anchor="middle">{tenth / 10:.1f} s</text>'
-            )
+            drawn += svg.line((x, 5), (x, HEIGHT), stroke_width="0.2")
+            drawn += svg.text((x, HEIGHT + 12), f"{tenth / 10:.1f} s", 11)
         return drawn

@@ -1,6 +1,4 @@
-"""The table of contents: the lessons that exist, read from their notebooks, and those that are
-planned.
-"""
+"""The table of contents: the lessons, read from their notebooks."""
 
 from __future__ import annotations
 
@@ -11,43 +9,20 @@ from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 README = NOTEBOOKS.parent / "README.md"
-# number -> title, equations of the course text; a lesson is ready once a notebook has its number
-PLANNED = {
-    "05": ("Steering the centre of mass", "(20)-(25)"),
-    "06": ("Friction cones", "(28)"),
-    "07": ("Control as a quadratic program", "(26), (27)"),
-    "08": ("Standing, shifting, stepping", ""),
-    "09": ("Feet with area: the humanoid", ""),
-    "A": ("Fictitious forces", "App. A"),
-    "B": ("Torque is an abstraction", "App. B"),
-    "C": ("How a QP solver thinks", "App. C"),
-    "P": ("Playground", ""),
-}
 _BEGIN = "<!-- lessons: made by `python -m floatbase.lessons.publish map` -->\n"
 _END = "<!-- end of lessons -->\n"
 
 
 def lesson_table(folder: Path = NOTEBOOKS) -> str:
-    """The lessons as a table of Markdown: number, title, equations, ready or planned.
+    """The lessons as a table of Markdown: number, title, equations.
 
     folder: of the notebooks, whose names start with their number, as in
         02_equations_of_motion.ipynb.
     """
-    rows = {
-        number: f"| {number} | {title} | {equations} | planned |"
-        for number, (title, equations) in PLANNED.items()
-    }
-    for path in folder.glob("*.ipynb"):
-        number = path.name.split("_")[0]
-        title = title_of(path).split(" · ")[-1]
-        rows[number] = (
-            f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} | ready |"
-        )
-    lines = [
-        "| | lesson | equations | |",
-        "|---|---|---|---|",
-        *(rows[number] for number in sorted(rows)),
-    ]
+    lines = ["| | lesson | equations |", "|---|---|---|"]
+    for path in sorted(folder.glob("*.ipynb")):
+        number, title = path.name.split("_")[0], title_of(path).split(" · ")[-1]
+        lines.append(f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} |")
     return "\n".join(lines).replace("|  |", "| |") + "\n"
 
 

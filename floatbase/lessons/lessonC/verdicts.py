@@ -1,0 +1,239 @@
+"""Lesson C, How a QP solver thinks: what is said of a learner's parts of a solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from floatbase.lessons.exercises import Verdict, function_or_verdict
+
+_CLOSE = 1e-6  # of lengths, which are between 0 and 1
+
+
+# C.2 ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _StepCase:
+    """A step in the plane, whose answer is known from how it was made, and what is said of a
+    function that misses it.
+    """
+
+    hint: str  # its name
+    text: str
+    p: tuple[float, float]
+    G: Sequence[Sequence[float]]
+    h: Sequence[float]
+    W: Sequence[int]
+    answer: tuple[float, int | None]
+
+
+_STEP_CASES = (
+    _StepCase(
+        "free", "Nothing is in the way here: 1, to arrive, and None.",
+        (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None),
+    ),
+    _StepCase(
+        "halfway", "A row is in the way halfway: where it holds with equality, slack = length · "
+                   "speed.",
+        (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
+    ),
+    _StepCase(
+        "away", "A row that the step moves away from (speed < 0) is never in the way.",
+        (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
+    ),
+    _StepCase(
+        "along", "A row along which the step runs (speed 0) is never in the way, and nothing can "
+                 "be divided by its speed.",
+        (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
+    ),
+    _StepCase(
+        "nearest", "Two rows are in the way: the step must end at the first that it meets.",
+        (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
+    ),
+    _StepCase(
+        "soonest",
+        "Here two rows are in the way at different speeds: it is not the slack alone that counts, "
+        "but how soon it is used up.",
+        (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
+    ),
+    _StepCase(
+        "held", "A row of W is held already, and rounding must not let it block.",
+        (1, 0), [[1, 1e-8], [1, 0]], [0, 0.5], [0], (0.5, 1),
+    ),
+    _StepCase(
+        "touches",
+        "The point touches a row that is not in W and would cross it: then the step has length 0, "
+        "and that row blocks.",
+        (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
+    ),
+    _StepCase(
+        "beyond", "The row lies beyond the end of the step: length 1, and nothing blocks.",
+        (1, 0), [[1, 0]], [1.5], [], (1.0, None),
+    ),
+    _StepCase(
+        "slack_rounding",
+        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of "
+        "equal rows the first.",
+        (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
+    ),
+    _StepCase(
+        "speed_rounding",
+        "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the "
+        "limit.",
+        (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
+    ),
+)  # fmt: skip
+
+
+def judge_step(answer: Any) -> Verdict:
+    """A function that returns the longest step of exercise C.2, tried on cases."""
+
+    def one(way: _StepCase) -> Verdict | None:
+        for origin in (
+            np.zeros(2),
+            np.array([0.3, -0.2]),
+        ):  # the same step elsewhere: the slack is h - G x
+            G = np.array(way.G, dtype=np.float64)
+            h = np.array(way.h, dtype=np.float64) + G @ origin
+            given = answer(origin, np.array(way.p, dtype=np.float64), G, h, list(way.W))
+            if not isinstance(given, tuple) or len(given) != 2:
+                return Verdict(
+                    False,
+                    "Return two things: the length, and the number of the row or None.",
+                    "not_two",
+                )
+            length, row = given
+            if not isinstance(length, int | float | np.number) or not np.isfinite(length):
+                told = (
+                    f"The length is {length!r}; it should be a number from 0 to 1. Was it "
+                    f"divided by a speed of zero?"
+                )
+                return Verdict(False, told, "no_length")
+            if length < 0:
+                return Verdict(
+                    False, f"A length is negative ({length:.2g}). {way.text}", "negative"
+                )
+            if row is not None and not isinstance(row, int | np.integer):
+                return Verdict(
+                    False, f"The row is {row!r}; it should be its number in G, or None.", "no_row"
+                )
+            right, blocks = way.answer
+            if abs(length - right) > _CLOSE or row != blocks:
+                if row is not None and row in way.W:
+                    return Verdict(
+                        False, f"Row {row} is in W and must not block. {way.text}", "held"
+                    )
+                if np.any(origin):
+                    return Verdict(
+                        False, f"Is the slack h - G x, or h alone? {way.text}", "elsewhere"
+                    )
+                return Verdict(False, way.text, way.hint)
+        return None
+
+    return _tried(
+        answer,
+        [partial(one, way) for way in _STEP_CASES],
+        "As far as all rows hold, and no further.",
+    )
+
+
+def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
+    """Run cases of a learner's function; the first that has something to say decides."""
+    program = function_or_verdict(answer)
+    if isinstance(program, Verdict):
+        return program
+    for case in cases:
+        try:
+            with np.errstate(all="ignore"):
+                said = case()
+        except Exception as error:  # whatever a learner's function raises
+            said = Verdict(
+                False, f"Your function stops with {type(error).__name__}: {error}", "stops"
+            )
+        if said:
+            return said
+    return Verdict(True, praise)
+
+
+# C.3 ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Drop:
+    """Rows that are on and their prices, and what is said of a function that does not drop the
+    right one.
+    """
+
+    hint: str  # its name
+    text: str
+    W: list[int]
+    prices: list[float]
+    answer: int | None
+
+
+_DROP_CASES = (
+    _Drop(
+        "pulls",
+        "One row pulls (its price is negative): that one has to go.",
+        [5, 3, 8],
+        [2.0, -0.5, 1.0],
+        3,
+    ),
+    _Drop(
+        "pushes",
+        "No price is negative here: every row pushes, and none leaves.",
+        [4, 2],
+        [1.0, 0.5],
+        None,
+    ),
+    _Drop("empty", "W may be empty: then there is nothing to drop.", [], [], None),
+    _Drop(
+        "most_negative",
+        "Two rows pull: drop the one with the most negative price.",
+        [5, 3, 8],
+        [-0.5, 1.0, -2.0],
+        8,
+    ),
+    _Drop(
+        "negative_alone",
+        "Only a negative price counts, however large another one is.",
+        [1, 6],
+        [9.0, -0.1],
+        6,
+    ),
+    _Drop(
+        "rounding",
+        "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9.",
+        [1, 6],
+        [3.0, -1e-14],
+        None,
+    ),
+)
+
+
+def judge_drop(answer: Any) -> Verdict:
+    """A function that returns the row to drop of exercise C.3, tried on cases."""
+
+    def one(drop: _Drop) -> Verdict | None:
+        given = answer(list(drop.W), np.array(drop.prices))
+        if given is not None and not isinstance(given, int | np.integer):
+            return Verdict(
+                False,
+                f"The answer is {given!r}; it should be a row's number in G, or None.",
+                "no_number",
+            )
+        if given is not None and given not in drop.W:
+            return Verdict(
+                False, "Give the row's number in G, which stands in W, not its place in W.", "place"
+            )
+        return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
+
+    cases = [partial(one, drop) for drop in _DROP_CASES]
+    return _tried(
+        answer, cases, "A row may push, never pull: that is the whole test of an optimum."
+    )
