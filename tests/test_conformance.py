@@ -160,7 +160,8 @@ def right() -> dict[str, Any]:
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3,
         "alpha": 0.1, "rate": 30.0,
-        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0, "view_from_rotating_frame.omega": UP,
+        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0,
+        "view_from_rotating_frame.omega": UP,
         "LinearInequality.coefficients":
         (np.eye(18), np.ones(18)),
         "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",

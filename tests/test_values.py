@@ -41,7 +41,8 @@ NO_VALUES = {
     "with a memory of what they do": "Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
     "shapes of a picture": "Item View",
-    "made of functions of a lesson": "ConstantTorques Exercise MinimumCostController NumericJudge ShapeJudge Verdict",
+    "made of functions of a lesson": "ConstantTorques Exercise "
+    "MinimumCostController NumericJudge ShapeJudge Verdict",
 }
 
 

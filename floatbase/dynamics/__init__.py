@@ -42,7 +42,8 @@ from floatbase.dynamics.subspace import (
 __all__ = [
     "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts",
     "EquationsOfMotion", "FeasibleSpace",
-    "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint", "PointContact", "RollingWheel",
+    "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint", "PointContact",
+    "RollingWheel",
     "accelerations_from_torques", "bias_forces",
     "constraint_and_jacobian", "contact_space", "coriolis_matrix",
     "delassus_matrix", "dimensions",

@@ -248,7 +248,7 @@ class Contacts(Value):
         return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
 
     def friction_contact(self, name: str) -> FrictionContact:
-        """The contact of this name. Raises `InputError` for one whose forces do not act at points."""
+        """The contact of this name. Raises `InputError` for one without contact points."""
         contact = self[name]
         if not isinstance(contact, FrictionContact):
             raise InputError(

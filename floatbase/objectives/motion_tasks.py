@@ -19,9 +19,8 @@ from floatbase.robots._checks import check_unit_norms
 
 _ZERO3 = (0.0, 0.0, 0.0)
 _POINT: Shapes = {"position": (3,), "velocity": (3,), "acceleration": (3,)}
-_ROTATION_TOLERANCE = (
-    1e-6  # R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
-)
+# R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+_ROTATION_TOLERANCE = 1e-6
 _IDENTITY = frozen(np.eye(3))
 _ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
 

@@ -12,9 +12,8 @@ from floatbase.errors import InputError
 # quaternions printed with seven digits pass; normalising what is further off could hide a fault
 UNIT_NORM_TOLERANCE = 1e-6
 _LIMIT_TOLERANCE = 1e-6  # rad or m: angles printed with seven digits pass
-_AREA_TOLERANCE = (
-    1e-6  # m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
-)
+# m: corners nearer to one line than this span no area; feet are measured to 0.1 mm
+_AREA_TOLERANCE = 1e-6
 
 
 def has_floating_base(model: pin.Model) -> bool:

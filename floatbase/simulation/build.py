@@ -35,15 +35,12 @@ _CONTACT_IMPEDANCE = (
     2.0,
 )  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-_PENETRATION_RECOVERY_TIME = (
-    0.2  # s in which a link comes out that was in the ground before it touched
-)
-_CORNER_BALL_RADIUS = (
-    0.005  # m: a flat foot stands on small balls whose lowest points are its corners
-)
-_MIN_BALL_RADIUS = (
-    1e-4  # m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
-)
+# s in which a link comes out that was in the ground before it touched
+_PENETRATION_RECOVERY_TIME = 0.2
+# m: a flat foot stands on small balls whose lowest points are its corners
+_CORNER_BALL_RADIUS = 0.005
+# m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+_MIN_BALL_RADIUS = 1e-4
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
 # relative: a thin plate meets the triangle inequality of principal inertias with equality, but for
 # rounding

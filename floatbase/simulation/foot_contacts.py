@@ -78,4 +78,5 @@ class FootContacts:
         centres: (…, points, 3), m, world, of the balls.
         """
         nearest = np.argmin(self._ground.clearances(centres), axis=-1)
-        return centres - self._radii * self._ground.normals[nearest]
+        positions: Array = centres - self._radii * self._ground.normals[nearest]
+        return positions

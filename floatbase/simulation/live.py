@@ -83,9 +83,8 @@ class LiveSimulation:
         self._calls: list[Callable[[], None]] = []
         self._status: Status = "paused"
         self._reason = ""
-        self._last_record: Rollout | None = (
-            None  # the last slice where the controller is off; only the thread has to do with it
-        )
+        # the last slice where the controller is off; only the thread has to do with it
+        self._last_record: Rollout | None = None
         self._listener: Callable[[Status], None] | None = None
         self._last_call = time.monotonic()
         self._stop = threading.Event()  # ends the present thread; set while paused

@@ -271,7 +271,8 @@ class Simulation:
         ordered as `point_names`.
         """
         geoms, contact_frame_forces = self.read_contacts()
-        return self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
+        forces: Array = self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
+        return forces
 
     def read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
         """The feet's contacts now, as `FootContacts.read` gives them."""

@@ -143,7 +143,6 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
         if description["words"]
         else ""
     )
-    seen = f'<div class="floatbase-scenes">{scenes}</div>' if scenes else ""
     return (
         f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
         f'data-picture="{name}">'
