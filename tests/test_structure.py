@@ -29,7 +29,8 @@ LAYERS = (
     ("simulation",),
     ("behaviours",),
     ("viewer",),
-    ("playground", "lessons"),
+    ("playground",),
+    ("lessons",),
     ("__main__",),
 )
 LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
