@@ -23,7 +23,7 @@ from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import InfeasibleError
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
-from floatbase.simulation.conversion import Conversion
+from floatbase.simulation._conversion import Conversion
 
 Array = npt.NDArray[np.float64]
 

@@ -135,7 +135,9 @@ def right() -> dict[str, Any]:
         "x": ZERO, "r": ZERO,
         "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:],
         "v_joints": ZERO,
-        "scale": np.ones(12), "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
+        "scale": np.ones(12),
+        "LiveSimulation.set_time_scale.scale": 1.0,
+        "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
         "v": state.v, "dv":
         np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,

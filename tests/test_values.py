@@ -27,6 +27,8 @@ WITHOUT_ARRAYS = (
     "ActiveSetRun",
     "FeasibleSpace",
     "Gains",
+    "LinearConstraint",
+    "drive",
     "Gait",
     "Problem",
     "Residuals",
@@ -40,9 +42,8 @@ NO_VALUES = {
     "an answer that rollout copies": "TorqueCommand",
     "with a memory of what they do": "Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
-    "shapes of a picture": "Item View",
-    "made of functions of a lesson": "ConstantTorques Exercise "
-    "MinimumCostController NumericJudge ShapeJudge Verdict",
+    "shapes of a picture": "Item PictureOptions View",
+    "made of functions of a lesson": "ConstantTorques MinimumCostController NumericJudge",
 }
 
 

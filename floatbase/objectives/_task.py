@@ -162,10 +162,13 @@ class TargetTask(Value):
         values = [getattr(self, name) for name in shapes]
         if self.is_time_varying:
             values = self._split(values[0](t), *shapes.values())
+        else:
+            values = [
+                _zeros(shape) if value is None else value
+                for value, shape in zip(values, shapes.values(), strict=True)
+            ]
         targets = [
-            _zeros(shape)
-            if value is None
-            else value
+            value
             if type(value) is np.ndarray and value.shape == shape and not value.flags.writeable
             else as_array(f"{name} of {self.name}", value, shape)
             for (name, shape), value in zip(shapes.items(), values, strict=True)

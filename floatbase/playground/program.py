@@ -15,7 +15,7 @@ from floatbase.robots import Robot, load
 from floatbase.simulation import Push
 
 _DURATION = 3.0  # s that the program simulates
-_PUSH_START = 0.5  # s
+_PUSH_START = 0.5  # s: the robot stands quietly by then
 
 
 def program(settings: Settings, robot: Robot, period: float, push: Push | None = None) -> str:

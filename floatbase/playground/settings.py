@@ -26,8 +26,8 @@ GAITS = {  # by number of feet
 IDEAL_BANDWIDTH = 100.0  # Hz: actuators at this end of their slider are perfect
 IDEAL_KP = 100.0  # 1/s², of tasks with perfect actuators
 _MAX_FACETS = 1000
-_MAX_SLOPE = 89.0  # degrees
-_MAX_SHIFT = 10.0  # m
+_MAX_SLOPE = 89.0  # degrees: at 90 the ground is a wall
+_MAX_SHIFT = 10.0  # m: more is a slip of units
 _MAX_SPEED = 5.0  # m/s and rad/s: more is a slip of units
 _GAIT_NAMES = tuple(name for gaits in GAITS.values() for name in gaits)
 

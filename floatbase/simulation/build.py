@@ -19,7 +19,7 @@ from floatbase._validation import Array, Value, as_half_spaces, as_positive, rea
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
-from floatbase.simulation.conversion import rotation_matrix
+from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters

@@ -22,8 +22,8 @@ from floatbase._validation import (
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
+from floatbase.simulation._conversion import Conversion
 from floatbase.simulation.build import Ground, body_name, build_model
-from floatbase.simulation.conversion import Conversion
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.push import Push, as_pushes
 

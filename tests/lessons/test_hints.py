@@ -34,8 +34,8 @@ GENERAL = {
 # lesson -> hints that no answer is known to get, or not on every machine: what comes that far has
 # passed other conditions
 GUARDS = {
-    "03": {"pulls"}, "05": {"slips"}, "07": {"input_error"}, "08": {"input_error"},
-    "09": {"input_error", "falls", "in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
+    "03": {"pulls"}, "05": {"slips"},
+    "09": {"in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
 }  # fmt: skip
 
 
