@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -82,6 +83,7 @@ def _name_table(things: list[tuple[str, str, Any]]) -> str:
 def _autodoc_entry(name: str, address: str, value: Any) -> str:
     """Sphinx's order to print what a name says."""
     if isinstance(value, ModuleType):
+        package = import_module(address.rpartition(".")[0])
         head = (
             f"{address}\n{'-' * len(address)}\n\n.. automodule:: {value.__name__}\n   "
             f":no-members:\n   :no-index:\n\n"
@@ -89,6 +91,7 @@ def _autodoc_entry(name: str, address: str, value: Any) -> str:
         return head + "\n".join(
             _autodoc_entry(inner, f"{address}.{inner}", each)
             for inner, each in exported(value.__name__)
+            if inner not in package.__all__  # such a name has its entry there
         )
     if inspect.isclass(value):
         kind = "autoexception" if issubclass(value, BaseException) else "autoclass"
