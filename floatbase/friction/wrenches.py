@@ -2,10 +2,10 @@
 slices of it.
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre
-of mass, N·m, both
-world: τ_c = Σ (x_i - x_c) × f_i. Sources: [FBR], §3.1 and §4.2; Caron, Pham and Nakamura,
-    Leveraging cone double
-description for multi-contact stability of humanoids, RSS 2015.
+of mass, N·m, both in world axes: τ_c = Σ (x_i - x_c) × f_i.
+
+Sources: [FBR], §3.1 and §4.2; Caron, Pham and Nakamura, Leveraging cone double description for
+multi-contact stability of humanoids, RSS 2015.
 """
 
 from __future__ import annotations

@@ -216,16 +216,16 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     """The live picture with a handle to push the robot in any horizontal direction, for 0.1 s at a
     time.
 
-    run: as `live_run` returns it, paused at first. view: what it draws itself into; give it a
-        `Viewer` of its own, since the
-    picture stops when `view` is displayed again below. max_force: the hardest push, N.
+    run: as `live_run` returns it, paused at first.
+    view: the viewer that it draws into. Give it a `Viewer` of its own: the picture stops when
+        `view` is displayed again in a later cell.
+    max_force: the largest push, N.
 
-    The first slider says how hard, N, and pushes when it is let go; the second says where to, in
-    degrees: 0 forwards, 90 to the robot's left (+y, where it begins), 180 backwards; the button
-        *push* pushes once more. A push starts the run, as
-    *run* does, and either puts a fallen robot back on its feet first. *pause* stops it, *reset*
-    begins anew with both sliders where they began. The third slider slows time down. A line says
-    what happens, and what stopped the run.
+    The first slider sets the force, N, and pushes when it is released. The second sets the
+    direction in degrees: 0 is forwards, 90 to the robot's left (+y, where it begins), 180
+    backwards. The button *push* pushes again. A push starts the run, as *run* does; both first put
+    a fallen robot back on its feet. *pause* stops the run, *reset* restores the start and both
+    sliders. The third slider slows time down. A line shows the status and what stopped the run.
     """
     force = _slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
     towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)

@@ -1,5 +1,5 @@
 """Tasks: what a controller should bring about, each a weighted affine residual, actual - desired,
-    in q̈, τ or λ.
+in q̈, τ or λ.
 
 A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
 position and velocity. Its residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term
@@ -48,9 +48,8 @@ class Task(Protocol):
 
     name: in messages and tables. weight: of ½‖residual‖² in the objective.
 
-    A user-defined object of this form is a task too, on the compiled tick as on the reference
-    backend: this one keeps the height of the centre of mass, as far as its acceleration may be 100
-        (h - z) - 20 ż, m/s².
+    A user-defined object of this form is a task on both backends. This one controls the height of
+    the centre of mass; its desired acceleration is 100 (h - z) - 20 ż, m/s².
 
         class Height:
             name, weight, block = "height", 10.0, "qdd"

@@ -3,10 +3,9 @@
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
 The course text's g_i(x) = 0 are the rows of A x - b = 0; its h_j(x) < 0 are those of G x - h ≤ 0,
-with the ≤ that it
-means: an active row holds with equality. x is an optimum, for H positive semidefinite, exactly if
-    there are multipliers
-ν, one for each equality, and μ, one for each inequality, with (Karush, Kuhn, Tucker)
+with the ≤ that it means: an active row holds with equality. For positive semidefinite H, x is an
+optimum exactly if there are multipliers ν, one for each equality, and μ, one for each inequality,
+with (Karush, Kuhn, Tucker)
 
     H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the rows balance the objective's slope
     A x = b,  G x ≤ h             feasibility
