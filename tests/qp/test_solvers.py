@@ -339,7 +339,10 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         fb.TorqueTask(weight=1e-9),
     ]
     answered = set()
-    for share, seed in ((share, seed) for share in (0.4, 1.3) for seed in range(10)):
+    # ten states for each share, and more until DAQP has failed once
+    for seed, share in ((seed, share) for seed in range(60) for share in (0.4, 1.3)):
+        if seed >= 10 and "active_set" in answered:
+            break
         press = share * robot.weight  # at every foot
         controller = fb.WholeBodyController(
             robot, judges.stance(robot), tasks, min_normal_force=press, backend="reference"
