@@ -78,7 +78,7 @@ def same(a: Any, b: Any) -> bool:
     )
 
 
-def test_every_class_of_the_rooms_is_tested_here_or_no_value() -> None:
+def test_every_public_class_is_tested_here_or_no_value() -> None:
     classes = {
         name: found
         for package in packages()

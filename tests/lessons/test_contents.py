@@ -37,9 +37,7 @@ def test_a_test_counts_only_where_it_names_the_function(entries: list[equations.
     assert not any(test.startswith("qp/") for test in entry.tests)
 
 
-def test_the_page_of_conventions_shows_values_of_three_rooms_and_a_reason_for_every_tolerance() -> (
-    None
-):
+def test_the_page_of_conventions_has_a_value_and_a_reason_for_every_tolerance() -> None:
     shown = {(file, name): value for file, name, value, _ in conventions.tolerances()}
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
     assert float(shown["dynamics/constraint_rank", "CONSTRAINT_NOISE"]) == CONSTRAINT_NOISE
