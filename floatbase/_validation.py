@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Sequence
-from dataclasses import FrozenInstanceError
+from collections.abc import Callable, Sequence
+from dataclasses import FrozenInstanceError, fields
 from types import MappingProxyType
 from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 
@@ -49,6 +49,17 @@ class Value:
     What a value has computed for itself (`cached_property`) stays behind and is computed anew.
     """
 
+    def __post_init__(self) -> None:
+        """Check and convert each field that declares how (`checked`)."""
+        cls: Any = type(self)
+        for name, check in _field_checks(cls):
+            value = check(f"{name} of {self._label()}", getattr(self, name))
+            object.__setattr__(self, name, value)
+
+    def _label(self) -> str:
+        """What messages about a field call this value."""
+        return type(self).__name__
+
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(
             f"cannot assign to field {name!r}: a {type(self).__name__} does not change"
@@ -87,6 +98,27 @@ class Value:
             object.__setattr__(
                 self, name, MappingProxyType(value) if type(value) is dict else value
             )
+
+
+def checked(check: Callable[..., Any], *args: Any, **options: Any) -> dict[str, Any]:
+    """Metadata of a field that says how it is checked: `check(name, value, *args, **options)`.
+
+    As in `force: Array = field(metadata=checked(as_array, (3,), "N"))`. `Value.__post_init__` runs
+    the checks in the order of the fields, and each field becomes what its check returns.
+    """
+
+    def check_field(name: str, value: Any) -> Any:
+        return check(name, value, *args, **options)
+
+    return {"check": check_field}
+
+
+@functools.cache
+def _field_checks(cls: Any) -> tuple[tuple[str, Callable[[str, Any], Any]], ...]:
+    """Name and check of each field of a dataclass that declares one."""
+    return tuple(
+        (field.name, field.metadata["check"]) for field in fields(cls) if "check" in field.metadata
+    )
 
 
 def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:

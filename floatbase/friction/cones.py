@@ -7,7 +7,7 @@ Source: [FBR], §4.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -22,6 +22,7 @@ from floatbase._validation import (
     as_number,
     as_positive,
     cached_property,
+    checked,
     read_only,
     unit_vector,
 )
@@ -86,12 +87,8 @@ class FrictionCone(Value):
         ground only pushes: α_⊥ ≥ 0.
     """
 
-    normal: Array
-    mu: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        object.__setattr__(self, "mu", as_positive("friction coefficient mu", self.mu))
+    normal: Array = field(metadata=checked(unit_vector))
+    mu: float = field(metadata=checked(as_positive))
 
     @property
     def angle(self) -> float:
@@ -151,26 +148,13 @@ class FrictionPolyhedron(Value):
     """
 
     _example = "FrictionPolyhedron(normal, mu)"
-    normal: Array
-    mu: float
-    facets: int = 4
-    inner_approximation: bool = True
-    facet_rotation: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", unit_vector("normal", self.normal))
-        object.__setattr__(self, "mu", as_positive("friction coefficient mu", self.mu))
-        object.__setattr__(
-            self, "facet_rotation", as_number("facet_rotation", self.facet_rotation, "rad")
-        )
-        object.__setattr__(
-            self,
-            "facets",
-            as_integer("facets", self.facets, 3, MAX_FACETS, "μ is not known better"),
-        )
-        object.__setattr__(
-            self, "inner_approximation", as_bool("inner_approximation", self.inner_approximation)
-        )
+    normal: Array = field(metadata=checked(unit_vector))
+    mu: float = field(metadata=checked(as_positive))
+    facets: int = field(
+        default=4, metadata=checked(as_integer, 3, MAX_FACETS, "μ is not known better")
+    )
+    inner_approximation: bool = field(default=True, metadata=checked(as_bool))
+    facet_rotation: float = field(default=0.0, metadata=checked(as_number, "rad"))
 
     @property
     def mu_facet(self) -> float:

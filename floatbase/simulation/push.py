@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from floatbase._validation import (
     Array,
@@ -13,6 +13,7 @@ from floatbase._validation import (
     as_number,
     as_positive,
     as_string,
+    checked,
     short_repr,
 )
 from floatbase.errors import InputError
@@ -33,20 +34,10 @@ class Push(Value):
     frame: name of a frame of the robot; "base" is the base link.
     """
 
-    force: Array
-    start: float = 0.0
-    duration: float = 0.1
-    frame: str = "base"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "force", as_array("force of the push", self.force, (3,), "N"))
-        object.__setattr__(
-            self, "start", as_positive("start of the push", self.start, "s", allow_zero=True)
-        )
-        object.__setattr__(
-            self, "duration", as_positive("duration of the push", self.duration, "s")
-        )
-        as_string("frame of the push", self.frame)
+    force: Array = field(metadata=checked(as_array, (3,), "N"))
+    start: float = field(default=0.0, metadata=checked(as_positive, "s", allow_zero=True))
+    duration: float = field(default=0.1, metadata=checked(as_positive, "s"))
+    frame: str = field(default="base", metadata=checked(as_string))
 
     def acts_at(self, t: float) -> bool:
         """Whether the push acts at t, s."""
