@@ -4,12 +4,21 @@ without memory.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_positive,
+    checked,
+    read_only,
+)
 from floatbase.errors import InputError
 
 # Pa: below about this drop an orifice's flow grows with the drop rather than with its root
@@ -21,8 +30,13 @@ VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pu
 _CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
+def _positive(default: float, unit: str, allow_zero: bool = False) -> Any:
+    """Declare a field that holds a positive number."""
+    return field(default=default, metadata=checked(as_positive, unit, allow_zero=allow_zero))
+
+
 @dataclass(frozen=True)
-class Hydraulics:
+class Hydraulics(Value):
     """One joint of HyQ, the hydraulic quadruped: cylinder, lever, oil, valve and force loop.
 
     bore, rod: m, diameters.
@@ -45,40 +59,40 @@ class Hydraulics:
     """
 
     _example = "Hydraulics(loop_bandwidth=20.0)"
-    bore: float = 0.016
-    rod: float = 0.010
-    crank: float = 0.045
-    base: float = 0.32
-    dead_volume: float = 8e-6
-    supply_pressure: float = 160e5
-    tank_pressure: float = 2e5
-    bulk_modulus: float = 1.3e9
-    leakage: float = 2e-14
-    rated_flow: float = 1.25e-4
-    rated_pressure_drop: float = 70e5
-    valve_bandwidth: float = 250.0
-    loop_bandwidth: float = 50.0
+    bore: float = _positive(0.016, "m")
+    rod: float = _positive(0.010, "m")
+    crank: float = _positive(0.045, "m")
+    base: float = _positive(0.32, "m")
+    dead_volume: float = _positive(8e-6, "m³")
+    supply_pressure: float = _positive(160e5, "Pa")
+    tank_pressure: float = _positive(2e5, "Pa", allow_zero=True)
+    bulk_modulus: float = _positive(1.3e9, "Pa")
+    leakage: float = _positive(2e-14, "m³/(s Pa)", allow_zero=True)
+    rated_flow: float = _positive(1.25e-4, "m³/s")
+    rated_pressure_drop: float = _positive(70e5, "Pa")
+    valve_bandwidth: float = _positive(250.0, "Hz")
+    loop_bandwidth: float = _positive(50.0, "Hz")
 
     def __post_init__(self) -> None:
-        values = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
-        for name, value in values.items():
-            as_positive(
-                f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage")
-            )
+        super().__post_init__()
         for small, large in (
             ("rod", "bore"),
             ("crank", "base"),
-            ("tank pressure", "supply pressure"),
+            ("tank_pressure", "supply_pressure"),
         ):
-            if values[small] >= values[large]:
-                size, bound = values[small], values[large]
+            size, bound = getattr(self, small), getattr(self, large)
+            if size >= bound:
                 raise InputError(
-                    f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}."
+                    f"{small} of {self._label()} is {size:g}; it must be less than {large}, "
+                    f"{bound:g}."
                 )
         if self.weakest_torque <= 0.0:
             raise InputError(
                 "the tank pressure on the bore holds off the supply on the ring: it must be lower."
             )
+
+    def _label(self) -> str:
+        return "the cylinder"
 
     @property
     def areas(self) -> Array:

@@ -23,6 +23,7 @@ from floatbase._validation import (
     as_positive,
     as_string,
     cached_property,
+    checked,
     read_only,
 )
 from floatbase.errors import InputError, unknown_name
@@ -54,23 +55,20 @@ class Foot(Value):
     corners: of a flat foot, shape (n, 3), m, in the frame; None for a ball.
     """
 
-    frame: str
-    radius: float = 0.0
-    centre: Array = field(default_factory=lambda: np.zeros(3))
+    frame: str = field(metadata=checked(as_string))
+    radius: float = field(default=0.0, metadata=checked(as_positive, "m", allow_zero=True))
+    centre: Array = field(
+        default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
+    )
     corners: Array | None = None
 
     def __post_init__(self) -> None:
-        as_string("frame of a foot", self.frame)
-        object.__setattr__(
-            self,
-            "radius",
-            as_positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True),
-        )
-        object.__setattr__(
-            self, "centre", as_array(f"centre of foot {self.frame}", self.centre, (3,), "m")
-        )
+        super().__post_init__()
         if self.corners is not None:
             object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
+
+    def _label(self) -> str:
+        return f"foot {self.frame}" if isinstance(self.frame, str) else "a foot"
 
     @property
     def is_flat(self) -> bool:
