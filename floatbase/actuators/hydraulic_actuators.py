@@ -1,5 +1,6 @@
-"""App. B: the force loop that drives the cylinders, so that one layer up the torque can be taken
-for granted.
+"""Hydraulic actuators with a force loop that makes each joint follow a desired torque.
+
+[FBR]_, App. B.
 """
 
 from __future__ import annotations
@@ -30,11 +31,16 @@ _StateArrays = tuple[
 
 @dataclass(frozen=True, eq=False)
 class HydraulicState(Value):
-    """What d cylinders and their loops remember.
+    """State of d hydraulic cylinders and their force loops.
 
-    opening: (d,), of the valves, -1 to 1.
-    pressures: (2, d) Pa over the air outside, chambers A and B.
-    integral: (d,) N·s, the loops' sums of errors.
+    Parameters
+    ----------
+    opening : array_like, shape (d,)
+        Valve openings, -1 to 1, dimensionless.
+    pressures : array_like, shape (2, d)
+        Gauge pressures of the chambers A and B [Pa].
+    integral : array_like, shape (d,)
+        Integrals of the force errors in the loops [N·s].
     """
 
     opening: Array
@@ -47,27 +53,44 @@ class HydraulicState(Value):
 
 
 class HydraulicActuators:
-    """App. B: a hydraulic cylinder on every joint of a robot, each with a force loop. Usable as
-    `actuators` in `rollout`.
+    """A hydraulic cylinder with a force loop on every joint of a robot, for `actuators` of
+    `rollout`.
 
-    The loop desires Ḟ = ω (e + ω_i ∫e dt) with e = F_desired - F, ω = 2π times the loop's bandwidth
-    and ω_i a twentieth of it, and gives the valve the opening for it (`Cylinders.opening_for`); the
-    integral rests while the valve is all open. The torque follows up to the loop's bandwidth, as
-    long as that lies below the valve's.
+    Each loop commands Ḟ = ω (e + ω_i ∫e dt), where e = F_desired - F, ω is 2π times the bandwidth
+    of the loop, and ω_i is a twentieth of ω. It sets the valve to the opening that gives this Ḟ
+    (`Cylinders.opening_for`). The integral pauses while the valve is fully open. The torque follows
+    up to the bandwidth of the loop, as long as that is below the bandwidth of the valve.
 
-    Sizes: each cylinder is HyQ's, scaled until the supply pressure gives the robot's torque limit
-        at the lever's best angle
-    and in the weaker direction, rod going in. Friction of the pistons is left out. A load that
-    pulls the rod out fast starves chamber A: its oil boils, and torque is missing until the chamber
-    is full again.
+    Each cylinder is a scaled version of HyQ's. At the best angle of the lever and in the weaker
+    direction, with the rod retracting, the supply pressure gives the torque limit of the joint.
+    Friction of the pistons is neglected. A load that pulls the rod out quickly starves chamber A.
+    Its oil boils, and torque is missing until the chamber is full again.
 
-    robot: as from `fb.load`; hydraulics: the cylinder that is scaled, HyQ's by default;
-        max_lever_angle: (d,) rad, the angles at which
-    the levers are longest, those of `robot.standing()` by default. `state` is the present
-    `HydraulicState`, `cylinders` the equations.
-    Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic
-    robots, IEEE T-RO 31, 2015. Raises `InputError` for a joint without a torque limit and for
-    joints that slide.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as returned by `fb.load`.
+    hydraulics : Hydraulics, optional
+        Cylinder to scale; HyQ's by default.
+    max_lever_angle : array_like, shape (d,), optional
+        Joint angles at which the levers are longest [rad]; those of `robot.standing()` by default.
+
+    Attributes
+    ----------
+    state : HydraulicState
+        Present state.
+    cylinders : Cylinders
+        Equations of the cylinders.
+
+    Raises
+    ------
+    InputError
+        If a joint has no torque limit, or if a joint is prismatic.
+
+    Notes
+    -----
+    [FBR]_, App. B. HyQ: [Semini2011]_. The loop follows Boaventura et al., Model-based hydraulic
+    impedance control for dynamic robots, IEEE T-RO 31, 2015.
     """
 
     def __init__(
@@ -106,13 +129,18 @@ class HydraulicActuators:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far
-        as the supply goes.
+        """Close the valves and set the pressures so that the joints get the torques tau.
 
-        q_joints: (d,) rad, `Cylinders.max_lever_angle` by default. A robot that is to stand from
-            the start needs the torques it stands with.
-        The integrals begin empty: torques are off, by what leaks, until they have learned how much
-        that is.
+        The supply pressure limits the torques. The integrals start at zero, so the torques have an
+        error due to leakage until the integrals have compensated for it.
+
+        Parameters
+        ----------
+        tau : array_like, shape (d,), optional
+            Torques [N·m]; zero by default. A robot that should stand from the start needs the
+            torques of its stance.
+        q_joints : array_like, shape (d,), optional
+            Joint angles [rad]; `Cylinders.max_lever_angle` by default.
         """
         cylinders = self.cylinders
         tau = as_array("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
@@ -128,7 +156,18 @@ class HydraulicActuators:
         )
 
     def torques(self, q_joints: npt.ArrayLike) -> Array:
-        """The torques that the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
+        """Return the joint torques L F due to the oil.
+
+        Parameters
+        ----------
+        q_joints : array_like, shape (d,)
+            Joint angles [rad].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques [N·m].
+        """
         return self.cylinders.geometry(q_joints).lever * self.cylinders.force(self.state.pressures)
 
     def step(
@@ -138,14 +177,30 @@ class HydraulicActuators:
         v_joints: npt.ArrayLike,
         dt: float,
     ) -> Array:
-        """Let time pass; the joints' torques at its end, shape (d,), N·m.
+        """Advance the actuators by a time step and return the joint torques at its end.
 
-        tau_desired: (d,) N·m.
-        q_joints, v_joints: (d,) rad and rad/s at the start. The oil's spring answers to them and
-            acts on the next ones, which is stable (symplectic Euler) for √(L² k / inertia) dt < 2;
-            at 1 ms the catalogue's robots reach 1.7.
-        dt: s, integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by
-            linearly implicit Euler.
+        The step is integrated in equal substeps of at most 0.2 ms: the valve spool exactly, the
+        pressures by the linearly implicit Euler method.
+
+        The joints are constant during the step, and the resulting torques act on the next one. With
+        the spring of the oil, this is stable (symplectic Euler) for √(L² k / inertia) dt < 2. At 1
+        ms the robots of the catalogue reach 1.7.
+
+        Parameters
+        ----------
+        tau_desired : array_like, shape (d,)
+            Desired torques [N·m].
+        q_joints : array_like, shape (d,)
+            Joint angles at the start of the step [rad].
+        v_joints : array_like, shape (d,)
+            Joint velocities at the start of the step [rad/s].
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques at the end of the step [N·m].
         """
         cylinders = self.cylinders
         geometry = cylinders.geometry(q_joints)
@@ -168,7 +223,9 @@ class HydraulicActuators:
         return geometry.lever * cylinders.force(self.state.pressures)
 
     def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
-        """The piston forces for joint torques, shape (d,), N, within what supply and tank allow."""
+        """Return the piston forces for joint torques, shape (d,) [N], within the limits of supply
+        and tank.
+        """
         min_lever = _MIN_LEVER_FRACTION * self.cylinders.crank
         lever = np.where(np.abs(geometry.lever) < min_lever, min_lever, geometry.lever)
         return np.clip(tau / lever, *self.cylinders.force_limits())
@@ -176,9 +233,7 @@ class HydraulicActuators:
     def _advance(
         self, state: _StateArrays, force: Array, geometry: CylinderGeometry, v: Array, step: float
     ) -> _StateArrays:
-        """Opening, pressures and integral `step` s later when the loop desires `force`, (d,) N, at
-        joint velocities v.
-        """
+        """Return opening, pressures and integral after `step` [s], for desired piston forces [N]."""
         cylinders, (opening, pressures, integral) = self.cylinders, state
         rate = 2.0 * np.pi * cylinders.hydraulics.loop_bandwidth
         error = force - cylinders.force(pressures)
