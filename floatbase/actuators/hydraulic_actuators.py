@@ -15,18 +15,17 @@ from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydrauli
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
-_MAX_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
-# s in one call: torques and velocities that stay the same for longer are a slip of units
+# s, substep for the oil: at 0.2 ms, torques are accurate to 1 % of the torque limit
+_MAX_STEP = 2e-4
+# s, longest step: constant torques and velocities for longer indicate a wrong unit
 _MAX_DURATION = 10.0
-# of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
+# fraction of a substep: 1 ms is 5 substeps of 0.2 ms, even if the quotient is rounded
 _STEP_ROUNDING = 1e-9
-# of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
+# corner frequency of the integral, as a fraction of the loop bandwidth; it costs 3° of phase
 _INTEGRAL_FRACTION = 0.05
-# of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+# shortest lever, as a fraction of the crank: below it, any torque needs an impossible pressure
 _MIN_LEVER_FRACTION = 1e-9
-_StateArrays = tuple[
-    Array, Array, Array
-]  # the parts of a `HydraulicState`, between the steps of the integration
+_StateArrays = tuple[Array, Array, Array]  # the parts of a `HydraulicState`, between substeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +52,9 @@ class HydraulicState(Value):
 
 
 class HydraulicActuators:
-    """A hydraulic cylinder with a force loop on every joint of a robot, for `actuators` of
-    `rollout`.
+    """Hydraulic cylinders with force loops, one on every joint of a robot.
+
+    Use them as `actuators` in `rollout`.
 
     Each loop commands Ḟ = ω (e + ω_i ∫e dt), where e = F_desired - F, ω is 2π times the bandwidth
     of the loop, and ω_i is a twentieth of ω. It sets the valve to the opening that gives this Ḟ
@@ -109,16 +109,16 @@ class HydraulicActuators:
             kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
             if not kind.startswith("JointModelR"):
                 raise InputError(
-                    f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn "
-                    f"joints by a crank."
+                    f"{joint} of {robot.name} is prismatic ({kind}). Hydraulic actuators need a "
+                    f"revolute joint, since they act through a crank."
                 )
             if not np.isfinite(limit):
                 raise InputError(
-                    f"{joint} of {robot.name} has no torque limit, so its cylinder has no scale: "
-                    f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
+                    f"{joint} of {robot.name} has no torque limit, which is needed to scale its "
+                    f'cylinder. Use fb.load("{robot.name}", torque_limits=…).'
                 )
         if max_lever_angle is None:
-            # the difference to the neutral configuration holds the joints' angles, where q has cos
+            # the difference from the neutral configuration holds joint angles even if q holds cos
             # and sin
             max_lever_angle = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
         self.cylinders = Cylinders(
@@ -147,8 +147,8 @@ class HydraulicActuators:
         force = self._desired_forces(
             tau, cylinders.geometry(cylinders.max_lever_angle if q_joints is None else q_joints)
         )
-        # a valve with equal edges holds a force with as much pressure missing at A as there is too
-        # much at B
+        # a valve with equal edges maintains a force if the pressure missing at A equals the excess
+        # at B
         lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
         a = (force + cylinders.areas[1] * lines) / cylinders.areas.sum(axis=0)
         self.state = HydraulicState(
@@ -223,8 +223,9 @@ class HydraulicActuators:
         return geometry.lever * cylinders.force(self.state.pressures)
 
     def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
-        """Return the piston forces for joint torques, shape (d,) [N], within the limits of supply
-        and tank.
+        """Return the piston forces for joint torques, shape (d,) [N].
+
+        They are limited to what supply and tank allow.
         """
         min_lever = _MIN_LEVER_FRACTION * self.cylinders.crank
         lever = np.where(np.abs(geometry.lever) < min_lever, min_lever, geometry.lever)
@@ -233,7 +234,7 @@ class HydraulicActuators:
     def _advance(
         self, state: _StateArrays, force: Array, geometry: CylinderGeometry, v: Array, step: float
     ) -> _StateArrays:
-        """Return opening, pressures and integral after `step` [s], for desired piston forces [N]."""
+        """Return opening, pressures and integral after `step` [s] for desired forces [N]."""
         cylinders, (opening, pressures, integral) = self.cylinders, state
         rate = 2.0 * np.pi * cylinders.hydraulics.loop_bandwidth
         error = force - cylinders.force(pressures)

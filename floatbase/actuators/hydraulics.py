@@ -22,12 +22,12 @@ from floatbase._validation import (
 )
 from floatbase.errors import InputError
 
-# Pa: below about this drop an orifice's flow grows with the drop rather than with its root
+# Pa: below about this drop, the flow of an orifice is proportional to the drop, not to its root
 _LAMINAR_DROP = 1e5
-# N/s: least change of force by an open valve. Chambers at line pressure have none; they get the
-# valve's all
+# N/s: smallest rate of force of an open valve. At line pressure it would be zero; then the valve
+# opens fully
 _MIN_GAIN = 1e-9
-VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
+VACUUM = -101325.0  # Pa, gauge pressure: oil at this pressure boils and cannot pull harder
 _CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
@@ -38,8 +38,9 @@ def _positive(default: float, unit: str, allow_zero: bool = False) -> Any:
 
 @dataclass(frozen=True)
 class Hydraulics(Value):
-    """Parameters of one joint of the hydraulic quadruped HyQ: cylinder, lever, oil, valve, force
-    loop.
+    """Parameters of a hydraulic joint: cylinder, lever, oil, valve and force loop.
+
+    The default values describe one joint of the hydraulic quadruped HyQ.
 
     Parameters
     ----------
@@ -110,12 +111,13 @@ class Hydraulics(Value):
             size, bound = getattr(self, small), getattr(self, large)
             if size >= bound:
                 raise InputError(
-                    f"{small} of {self._label()} is {size:g}; it must be less than {large}, "
-                    f"{bound:g}."
+                    f"{small} of {self._label()} is {size:g}. It must be less than {large}, which "
+                    f"is {bound:g}."
                 )
         if self.weakest_torque <= 0.0:
             raise InputError(
-                "the tank pressure on the bore holds off the supply on the ring: it must be lower."
+                "tank_pressure on the area of the bore exceeds supply_pressure on the ring area. "
+                "Lower tank_pressure."
             )
 
     def _label(self) -> str:
@@ -254,7 +256,7 @@ class Cylinders(Value):
         as_instance("hydraulics", hydraulics, Hydraulics)
         scale = as_array("scale", scale, (None,))
         if np.any(scale <= 0.0):
-            raise InputError(f"scale of a cylinder is {scale.min():g}; it must be > 0.")
+            raise InputError(f"scale of a cylinder is {scale.min():g}. It must be > 0.")
         vars(self).update(
             hydraulics=hydraulics,
             max_lever_angle=as_array("max_lever_angle", max_lever_angle, scale.shape, "rad"),
@@ -266,7 +268,7 @@ class Cylinders(Value):
             _leakage=hydraulics.leakage * scale,
             _best_gamma=float(
                 np.arccos(hydraulics.crank / hydraulics.base)
-            ),  # γ with crank and cylinder square
+            ),  # γ with the crank perpendicular to the cylinder
         )
 
     @property
@@ -291,7 +293,7 @@ class Cylinders(Value):
         length = np.sqrt(
             self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma)
         )
-        extension = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
+        extension = length - (self.base - self.crank)  # of the rod, from 0 to 2 b
         volumes = self._dead_volume + self.areas * np.array(
             [extension, 2.0 * self.crank - extension]
         )

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
 from floatbase.robots import Robot
 
-# s: times are counted in whole nanoseconds, so that no rounding adds up from step to step
+# s: times are counted in whole nanoseconds, so that rounding errors do not accumulate
 _TIME_UNIT = 1e-9
-_MAX_TIME = 10.0  # s, of a delay and of a step: longer is a slip of units
+_MAX_TIME = 10.0  # s, longest delay and longest step: a longer one indicates a wrong unit
 
 
 class Delay:

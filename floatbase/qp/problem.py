@@ -36,9 +36,8 @@ from floatbase.qp.labels import constraint_labels
 
 # fraction of 1 + the largest |b| by which equalities of unit length may disagree: b is measured
 _CONSISTENCY_TOLERANCE = 1e-7
-_ROUNDING = (
-    1e-14  # fraction of the terms of a sum that may be rounding: about 50 units in the last place
-)
+# fraction of the terms of a sum that may be rounding: about 50 units in the last place
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)

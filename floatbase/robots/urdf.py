@@ -176,7 +176,7 @@ def _check_moments_of_inertia(name: str, root: ElementTree.Element, model: pin.M
     """Check that no link, including everything welded to it, has a negative moment of inertia."""
     for i, inertia in list(enumerate(model.inertias))[
         1:
-    ]:  # in a sum, a negative part may not matter
+    ]:  # the sum may be positive although a part is negative
         smallest = float(inertia.inertia.diagonal().min())
         if smallest < -_ROUNDING:
             where = (
