@@ -1,6 +1,4 @@
-"""Builds the site: runs lessons, writes all that Sphinx reads into one folder, and lets it write
-the pages.
-"""
+"""Build the site: run the lessons, collect all sources in one folder, and run Sphinx on it."""
 
 from __future__ import annotations
 
@@ -26,25 +24,29 @@ from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, a
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 SITE = Path("build/site")
-_SITE_SOURCE = Path(__file__).parent  # texts and static files of the site
 _ROOT = NOTEBOOKS.parent
+DOCS = _ROOT / "docs"  # the texts of the site's own pages
 RUN_FOLDER = _ROOT / "build" / "site-run"  # lessons that were run
+# addresses in the repository, as the pages of docs link to them -> addresses in the site
+_MOVED = {
+    "../notebooks/": "lessons/",
+    "../benchmarks/": "benchmarks/",
+    "../CHANGELOG.md": "changelog.md",
+}
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 _DESCRIPTIONS = {
-    "equations": "Every equation of the course, written out, with the functions, tests and lessons "
+    "equations": "Every equation of the course text, with the functions, tests and lessons "
     "that belong to it.",
-    "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of "
-    "floatbase.",
-    "how_to": "Where your work is kept, and what to do when something fails.",
-    "changelog": "What changed in floatbase, version by version.",
-    "peers": "The time of floatbase's control tick beside those of TSID and placo, which find the "
-    "same torques.",
-    "tick": "What a control tick of floatbase takes, part by part, and how it grows.",
-    "rollout": "What a simulated second takes in floatbase's rollout, beside a bare loop.",
-    "walking": "How well robots walk with floatbase, as measured and as required.",
+    "conventions": "Symbols, frames, signs, units and tolerances of every function of floatbase.",
+    "how_to": "Where the course keeps your work, and what to do when something fails.",
+    "changelog": "What changed in each version of floatbase.",
+    "peers": "The computing time of a control step of floatbase, TSID and placo for the same QP.",
+    "tick": "The computing time of each part of a control step, and how it grows with the robot.",
+    "rollout": "The computing time of a simulated second in a rollout and in a bare loop.",
+    "walking": "How well robots walk with floatbase: measurements and requirements.",
 }
 
 
@@ -68,7 +70,8 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         source = Path(place) / "source"
-        shutil.copytree(_SITE_SOURCE, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        shutil.copytree(DOCS, source)
+        (source / "benchmarks").mkdir()
         _write_lessons(
             source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures
         )
@@ -149,9 +152,7 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
-        "changelog.md": (_ROOT / "CHANGELOG.md")
-        .read_text(encoding="utf-8")
-        .replace("(notebooks/", "(lessons/"),
+        "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
         **{
             f"benchmarks/{path.name}": path.read_text(encoding="utf-8")
             for path in _ROOT.glob("benchmarks/*.md")
@@ -164,6 +165,9 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
         (source / name).write_text(about + text, encoding="utf-8")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
+        if path.parent == source:
+            for there, here in _MOVED.items():
+                text = text.replace(f"({there}", f"({here}")
         for name, part in {
             "scene": scene,
             "lessons": _lesson_table(lessons),
@@ -229,7 +233,7 @@ def _run_sphinx(source: Path, folder: Path) -> None:
         "-j",
         "2",
         "-c",
-        str(_SITE_SOURCE),
+        str(Path(__file__).parent),  # of conf.py
         "-d",
         str(source / ".doctrees"),
     ]

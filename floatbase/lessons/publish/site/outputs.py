@@ -20,7 +20,7 @@ import floatbase
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
 from floatbase.lessons.publish.site.references import add_links
 
-RUN_PAGE = "../run.md"
+RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
 _HIGH_RESOLUTION = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"

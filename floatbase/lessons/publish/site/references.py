@@ -37,6 +37,11 @@ def anchor_of(number: str) -> str:
     )
 
 
+def is_known(number: str) -> bool:
+    """Whether "(9)", "§2.1" or "App. A" has a place on the page of equations."""
+    return number in _NUMBERS | _SECTIONS
+
+
 def target_of(match: re.Match[str]) -> str:
     """The place in the map that a match of `REFERENCE` leads to; "" where it leads nowhere, or to a
     lesson.
@@ -44,7 +49,7 @@ def target_of(match: re.Match[str]) -> str:
     if match["note"]:
         return NOTES_ANCHOR
     named = match["equation"] or match["section"] or (match["appendix"] or "").replace("endix", ".")
-    return anchor_of(named) if named in _NUMBERS | _SECTIONS else ""
+    return anchor_of(named) if is_known(named) else ""
 
 
 def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
