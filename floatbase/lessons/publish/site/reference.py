@@ -8,6 +8,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from sphinx.ext.napoleon import NumpyDocstring
+from sphinx.util.docstrings import prepare_docstring
+
 import floatbase
 from floatbase.lessons.publish.site.addresses import PACKAGES, addresses, exported, members
 from floatbase.lessons.publish.site.references import anchor_of, is_known
@@ -94,7 +97,14 @@ def _entry(address: str, value: Any) -> str:
 def link_equations(
     app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
 ) -> None:
-    """Link equation numbers of a docstring (Sphinx's event autodoc-process-docstring)."""
+    """Link equation numbers of a docstring (Sphinx's event autodoc-process-docstring).
+
+    Napoleon reads "Inertia matrix: …" of a property as a type and a text, so a property is parsed
+    again as a method.
+    """
+    if what in ("property", "attribute"):
+        text = prepare_docstring(inspect.getdoc(value) or "")
+        lines[:] = NumpyDocstring(text, app.config, app, "method", name, value, options).lines()
 
     def link(match: re.Match[str]) -> str:
         return f":ref:`{match[0]} <{anchor_of(match[0])}>`" if is_known(match[0]) else match[0]
