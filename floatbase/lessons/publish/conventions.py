@@ -14,8 +14,8 @@ _SKIPPED_PACKAGES = (
     "lessons",
     "viewer",
 )  # their numbers choose what is drawn, not what is answered
-# NAME = 1e-9  # the reason; the value may be a tuple, a quotient, or a call of float() or int(), and
-# the reason may be in comment lines above
+# NAME = 1e-9  # the reason; the value may be a tuple, a quotient, or a call of float() or int().
+# The reason may be in comment lines above.
 _VALUE = r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]+)"
 _TOLERANCE = re.compile(rf"((?:^# [^\n]+\n)*){_VALUE}(?:  # ([^\n]+))?$", re.MULTILINE)
 
