@@ -6,8 +6,18 @@ Sphinx. The pages' texts are in the folder `docs`. This needs the extra `site`.
 """
 
 from floatbase.lessons.publish.site import mathml
+from floatbase.lessons.publish.site.addresses import PACKAGES, exported
 from floatbase.lessons.publish.site.build import SITE, build
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import add_links
 
-__all__ = ["SITE", "add_links", "build", "mathml", "prepare_lesson", "run_lessons"]
+__all__ = [
+    "PACKAGES",
+    "SITE",
+    "add_links",
+    "build",
+    "exported",
+    "mathml",
+    "prepare_lesson",
+    "run_lessons",
+]
