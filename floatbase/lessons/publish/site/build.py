@@ -51,11 +51,28 @@ _DESCRIPTIONS = {
 
 
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
-    """Write the site into `folder`; the path of its first page.
+    """Build the site.
 
-    lessons: those that it has, all by default. stored: run none of them, and show what their
-        notebooks hold. Raises
-    `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
+    Parameters
+    ----------
+    folder : Path
+        Where to write.
+    lessons : sequence of Path, optional
+        The lessons to include; the default is the whole course.
+    stored : bool
+        Whether to use the stored outputs of the notebooks instead of running them.
+
+    Returns
+    -------
+    Path
+        The first page.
+
+    Raises
+    ------
+    InputError
+        If a lesson does not exist.
+    FloatbaseError
+        If Sphinx reports a warning or an error.
     """
     known = sorted(NOTEBOOKS.glob("*.ipynb"))
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
@@ -85,7 +102,7 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
 
 
 def _front_page_notebook() -> Path:
-    """A notebook that draws the picture of the first page: the program of the README, played."""
+    """Write a notebook that runs the README's program and plays its run."""
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
     play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
@@ -99,7 +116,7 @@ def _front_page_notebook() -> Path:
 
 
 def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
-    """The page of each lesson."""
+    """Write the page of each lesson."""
     addresses = {path.name.split("_")[0]: path.name for path in notebooks}
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
@@ -109,7 +126,7 @@ def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures)
 
 
 def _first_picture(notebook: Any, pictures: Pictures) -> str:
-    """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
+    """Return the first picture of a notebook as Markdown, or as an image."""
     data = next(
         output.data for cell in notebook.cells for output in cell.outputs if "data" in output
     )
@@ -121,7 +138,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
 
 
 def _toctrees(lessons: Sequence[Path]) -> str:
-    """The lessons for the bar beside each page."""
+    """Write the list of lessons for the side bar."""
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
     return "\n\n".join(
@@ -147,7 +164,7 @@ def _lesson_table(known: Iterable[Path]) -> str:
 
 
 def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
-    """All texts that are no lessons, with their links; the figures of the benchmarks."""
+    """Write all pages that are not lessons, with their links, and copy the benchmark figures."""
     made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
@@ -196,7 +213,7 @@ def _write_reference(target: Path) -> None:
 
 
 def _with_anchors(page: str) -> str:
-    """The map with link targets, and its functions linked to the pages of the library."""
+    """Add link targets to the page of equations, and link its functions to the API reference."""
     known = addresses()
 
     def link(match: re.Match[str]) -> str:
@@ -222,7 +239,7 @@ def _with_anchors(page: str) -> str:
 
 
 def _run_sphinx(source: Path, folder: Path) -> None:
-    """Let Sphinx write the pages; a warning is a fault."""
+    """Run Sphinx; a warning is an error."""
     from sphinx.cmd.build import build_main
 
     options = [

@@ -1,6 +1,4 @@
-"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of
-what needs one.
-"""
+"""Prepare lessons for the site: run them, and replace what needs a kernel."""
 
 from __future__ import annotations
 
@@ -34,18 +32,22 @@ _LEARNER_CALLS = re.compile(
 
 
 class PicturePlacer(Protocol):
-    """What puts pictures into the site."""
+    """Protocol of an object that puts pictures into the site."""
 
     def place(self, data: Mapping[str, Any]) -> str | None:
-        """HTML for an output's data that hold a picture, None for others."""
+        """Return HTML for the data of an output that holds a picture, or None."""
 
 
 def run_lessons(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
-    """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran
-    last are taken from `kept`.
+    """Run lessons and return path -> notebook with outputs. Unchanged lessons are not run again.
 
-    kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the
-        package.
+    Parameters
+    ----------
+    lessons : iterable of Path
+        The lessons.
+    kept : Path
+        Folder of earlier runs, created if necessary. File names contain a digest of the lesson and
+        of the package.
     """
     kept.mkdir(parents=True, exist_ok=True)
     source = _digest_of_package()
@@ -89,9 +91,16 @@ def _digest(data: bytes) -> str:
 
 
 def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
-    """A lesson as Sphinx reads it. Changes it in place.
+    """Prepare a lesson for Sphinx, in place.
 
-    notebook: with outputs. pictures: takes the 3-D pictures. lessons: number -> address.
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The lesson with outputs.
+    pictures : PicturePlacer
+        Receives the 3-D pictures.
+    lessons : mapping
+        Number -> address of each lesson.
     """
     about, heading = _description(notebook), ""
     for i, cell in enumerate(notebook.cells):
@@ -106,7 +115,7 @@ def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str,
 
 
 def _description(notebook: Any) -> str:
-    """What search engines show of a lesson: its first paragraph."""
+    """Return the first paragraph of a lesson, which search engines show."""
     text = next(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
     paragraph = next(part for part in text.split("\n\n")[1:] if part.strip())
     return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
@@ -140,7 +149,7 @@ def _live_lesson_note(text: str) -> str:
 
 
 def _prediction_question(cell: Any) -> str:
-    """What a prediction asks for, in words."""
+    """Describe the prediction that a cell asks for."""
     call = next(
         node
         for node in ast.walk(ast.parse(cell.source))
@@ -162,7 +171,7 @@ def _prediction_question(cell: Any) -> str:
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
-    """An output as a page can show it, in a list; none where it is about the run alone."""
+    """Return an output as a list of what a page can show of it."""
     if output.output_type == "stream":
         output.text = _TERMINAL_CODES.sub("", output.text)
         return [output] if output.name == "stdout" else []
@@ -178,9 +187,7 @@ def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
 
 
 def _describe_figure(cell: Any, heading: str) -> None:
-    """Says what a figure shows, for those who cannot see it, and how wide it is, as it has two dots
-    for each pixel.
-    """
+    """Add alternative text and width to a figure, which has two dots per pixel."""
     figures = [
         output
         for output in cell.outputs
