@@ -150,7 +150,7 @@ NO_FILE = (
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
 def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
     (learner / "a.json").write_text(text)
-    with pytest.raises(InputError, match="is not a file that hand_in"):
+    with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
     with pytest.raises(InputError, match="cannot be read"):
         grades.grade_file(learner / "none.json")

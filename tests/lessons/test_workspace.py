@@ -104,7 +104,7 @@ def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
     write(folders[0] / LESSON, "first = 'my answer'")
     write(course / LESSON, "first = 2")
     assert prepare_workspace(course, folders[0]) == [
-        f"{LESSON}: yours is kept; the course's new text is in {NEW}"
+        f"{LESSON}: your copy is kept; the new text is in {NEW}"
     ]
     assert prepare_workspace(course, folders[1]) == [f"{LESSON}: updated"]
     assert not (course / MY_FOLDER).exists()
@@ -113,7 +113,7 @@ def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
 def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
-        match=r"there are no lessons in .*notebooks\. Install floatbase from its repository",
+        match=r"There are no lessons in .*notebooks\. Install floatbase from its repository",
     ):
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
@@ -134,7 +134,7 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
         update(mine.parent, n)
         if forget:
             (mine / ".from.json").unlink()
-        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare_workspace(
+        assert f"{LESSON}: your copy is kept; the new text is in {name}" in prepare_workspace(
             mine.parent
         )
         assert source(mine / name) == f"first = {n}"
@@ -317,7 +317,7 @@ def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) ->
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the record, none for the lesson
-        assert "not brought up to date: File too large" in prepare_workspace(mine.parent)[0]
+        assert "not updated: File too large" in prepare_workspace(mine.parent)[0]
     assert source(mine / LESSON) == "first = 1"
     assert files(mine) == {LESSON, "01_b.ipynb", "page.md"}
     write(mine / LESSON, "first = 'my answer'")

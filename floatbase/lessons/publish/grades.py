@@ -24,10 +24,12 @@ from floatbase.lessons.submission import FILE_FORMAT
 
 _LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.1 MB
 _REQUIRED_KEYS = {"name": str, "exercises": dict, "predictions": dict}
-_INDENT = "    "  # of code, so that no line of it passes for a heading
+_INDENT = "    "  # of code, so that no line of it looks like a heading
 _NOT_TRIED, _TO_BE_READ = "·", "to be read"
 _COLUMNS = ("file", "name", "time", "exercise", "result", "tries", "feedback")
-_FORMULA_STARTS = tuple("=+-@\t\r\n＝＋－＠")  # a spreadsheet may run a text that begins so
+_FORMULA_STARTS = tuple(
+    "=+-@\t\r\n＝＋－＠"
+)  # a spreadsheet may evaluate text that begins with one of these
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,8 @@ def _read(path: Path) -> dict[str, Any]:
         found = {}
     if found.get("form") != FILE_FORMAT:
         raise InputError(
-            f"{path} is not a file that hand_in(…) wrote, or it was cut short. Ask for it again."
+            f"{path} was not written by hand_in(…), or it is incomplete. Ask the learner to send "
+            f"it again."
         )
     return found
 
@@ -155,13 +158,15 @@ def grade_files(files: Sequence[Path]) -> list[Submission]:
         If no file is left.
     """
     submissions = []
-    for path in tqdm(files, desc="judging", unit="file", leave=False, disable=None):
+    for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
             submissions.append(grade_file(path))
         except InputError as error:
             print(error, file=sys.stderr)
     if not submissions:
-        raise InputError("No file is left to judge: give files that learners wrote by hand_in(…).")
+        raise InputError(
+            "There is no file to grade. Name files that learners wrote with hand_in(…)."
+        )
     return submissions
 
 

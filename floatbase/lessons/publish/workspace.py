@@ -16,9 +16,14 @@ from floatbase.errors import InputError
 
 NOTEBOOKS = Path(__file__).parents[3] / "notebooks"  # of the course
 MY_FOLDER = "my"
-_RECORD_FILE = ".from.json"  # file name -> digest of the course's text that the learner got last
-_NOT_A_NOTEBOOK = (ValueError, LookupError, TypeError, AttributeError)  # what such JSON raises
-# what JupyterLab writes when a notebook is only run and looked at: all else is the learner's
+_RECORD_FILE = ".from.json"  # file name -> digest of the text that the learner received last
+_NOT_A_NOTEBOOK = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+)  # exceptions that such JSON raises
+# what JupyterLab writes when a notebook is only run and viewed; all else is the learner's work
 _RUN_KEYS = {"kernelspec", "language_info", "orig_nbformat", "signature", "widgets"}
 _RUN_CELL_KEYS = {
     "collapsed", "execution", "jp-MarkdownHeadingCollapsed", "jupyter", "scrolled", "trusted",
@@ -51,7 +56,7 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
     """
     if not folder.is_dir():
         raise InputError(
-            f"there are no lessons in {folder}. Install floatbase from its repository, by `pip "
+            f"There are no lessons in {folder}. Install floatbase from its repository with `pip "
             f"install -e`."
         )
     mine = folder / MY_FOLDER if mine is None else mine
@@ -59,7 +64,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
         mine.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{mine} cannot be made: {error.strerror}. It must be a folder that you may write to."
+            f"The folder {mine} cannot be created: {error.strerror}. Choose one that you can write "
+            f"to."
         ) from None
     record, messages = _read_record(mine / _RECORD_FILE), []
     for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
@@ -69,8 +75,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
             messages.append(_failure(source.name, error))
         except _NOT_A_NOTEBOOK:
             messages.append(
-                f"{source.name}: not brought up to date: the course's own is no notebook. `git "
-                f"status` may say why."
+                f"{source.name}: not updated, because the course's file is not a notebook. `git "
+                f"status` may show why."
             )
     try:
         _write(mine / _RECORD_FILE, json.dumps(record, indent=1).encode())
@@ -81,7 +87,7 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
 
 def _failure(name: str, error: OSError) -> str:
     return (
-        f"{name}: not brought up to date: {error.strerror}. Check that you may read and write "
+        f"{name}: not updated: {error.strerror}. Check that you can read and write "
         f"{error.filename}, then start again."
     )
 
@@ -103,10 +109,10 @@ def _update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
         if found == present:
             record[copy.name] = present
             return []
-        if found == last and not target.is_symlink():  # a link may lead to anything of the learner
+        if found == last and not target.is_symlink():  # a link may point to any file of the learner
             break
         target = next(beside)
-        message = f"{copy.name}: yours is kept; the course's new text is in {target.name}"
+        message = f"{copy.name}: your copy is kept; the new text is in {target.name}"
     _write(target, text)
     record[copy.name] = present
     return [message]

@@ -78,12 +78,12 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
     for path in shown:
         if path not in known:
-            raise InputError(f"there is no lesson {path}; the course's lessons are in {NOTEBOOKS}.")
+            raise InputError(f"There is no lesson {path}. The lessons are in {NOTEBOOKS}.")
     *notebooks, scene = run_lessons(
         [*([] if stored else shown), _front_page_notebook()], RUN_FOLDER
     ).values()
     pictures = Pictures(folder / "_static")
-    if (folder / ".buildinfo").exists():  # an earlier site, and no other folder of somebody's
+    if (folder / ".buildinfo").exists():  # an earlier site, not another folder
         shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         source = Path(place) / "source"
@@ -105,7 +105,7 @@ def _front_page_notebook() -> Path:
     """Write a notebook that runs the README's program and plays its run."""
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
-    play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
+    play = 'fb.Viewer(robot, height=420).play(run, title="a 30 N push to the side")'
     notebook = new_notebook(
         cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")]
     )
@@ -255,4 +255,4 @@ def _run_sphinx(source: Path, folder: Path) -> None:
         str(source / ".doctrees"),
     ]
     if build_main([*options, str(source), str(folder)]):
-        raise FloatbaseError("Sphinx found faults, named above; the site is not whole.")
+        raise FloatbaseError("Sphinx reported the problems above; the site is incomplete.")

@@ -22,13 +22,13 @@ RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
 _HIGH_RESOLUTION = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"
-_CLAIMS_PROMPT = "claims of the text above, as code that fails if one is wrong"
+_CLAIMS_PROMPT = "claims of the text above, as code that fails if a claim is wrong"
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 _LEARNER_CALLS = re.compile(
     r"^(?:review|show_progress|reveal)\(", re.MULTILINE
-)  # what they print is about the learner
+)  # their output is about the learner
 
 
 class PicturePlacer(Protocol):
@@ -69,7 +69,7 @@ def _run_lesson(path: Path, file: Path) -> Path:
     notebook.cells.insert(0, new_code_cell(_HIGH_RESOLUTION))
     execute_notebook(notebook, path.parent, FLOATBASE_VIEWER="site", MPLBACKEND=_INLINE)
     notebook.cells.pop(0)
-    part = file.with_suffix(".part")  # a build that was interrupted leaves no half
+    part = file.with_suffix(".part")  # an interrupted build leaves no partial file
     nbformat.write(notebook, part)
     part.replace(file)
     return path
@@ -109,7 +109,7 @@ def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str,
             cell.source = add_links(cell.source, lessons)
         else:
             notebook.cells[i] = _prepare_code_cell(cell, heading, pictures)
-    notebook.metadata.pop("widgets", None)  # they live on no page without a kernel
+    notebook.metadata.pop("widgets", None)  # widgets need a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
 
@@ -126,12 +126,10 @@ def _prepare_code_cell(cell: Any, heading: str, pictures: PicturePlacer) -> Any:
     if "predict" in tags:
         return new_markdown_cell(_prediction_question(cell))
     if "check" in tags:
-        return new_markdown_cell(
-            _live_lesson_note("The check of your answer, and hints, are in the live lesson")
-        )
+        return new_markdown_cell(_live_lesson_note("Checks and hints are in the live lesson"))
     if _LEARNER_CALLS.search(cell.source):
         return new_markdown_cell(
-            _live_lesson_note("This is about what you said and solved, in the live lesson")
+            _live_lesson_note("Your predictions and solutions appear here in the live lesson")
         )
     if "claims" in tags:
         cell.metadata["tags"] = [*tags, "hide-input"]
@@ -165,8 +163,8 @@ def _prediction_question(cell: Any) -> str:
         )
     asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
     return (
-        f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({RUN_PAGE}); here, "
-        f"think first.\n:::"
+        f":::{{div}} live\n{asked} Make your prediction before you read on. You can type it in "
+        f"in [the live lesson]({RUN_PAGE}).\n:::"
     )
 
 
