@@ -179,7 +179,7 @@ def test_a_class_is_one_table(learner: Path) -> None:
     assert (
         said.stdout.count("1 of ") == 3
         and "Émilie du Châtelet" in said.stdout
-        and "holiday.json is not a file" in said.stderr
+        and "holiday.json was not written" in said.stderr
     )
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
     assert len(rows) == 3 * len(all_exercises())

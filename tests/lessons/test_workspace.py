@@ -260,14 +260,14 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(
+def test_what_stands_in_the_way_of_one_file_is_reported_and_the_others_are_updated(
     mine: Path, obstacle: str
 ) -> None:
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line]
+        (told,) = [line for line in prepare_workspace(mine.parent) if "not updated" in line]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -294,11 +294,11 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
 @pytest.mark.parametrize(
     "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
 )
-def test_a_folder_that_cannot_be_is_told_in_words(
+def test_a_folder_that_cannot_be_created_is_reported(
     course: Path, make: Callable[[Path], object]
 ) -> None:
     make(course / MY_FOLDER)
-    with pytest.raises(InputError, match="must be a folder"):
+    with pytest.raises(InputError, match="can write to"):
         prepare_workspace(course)
 
 
