@@ -185,7 +185,7 @@ def test_a_class_is_one_table(learner: Path) -> None:
     assert len(rows) == 3 * len(all_exercises())
     assert {row["file"] for row in rows} == {Path(file).name for file in files}
     assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
-    with pytest.raises(InputError, match="No file is left to judge"):
+    with pytest.raises(InputError, match="There is no file to grade"):
         grades.grade_files([learner / "holiday.json"])
 
 
