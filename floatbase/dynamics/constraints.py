@@ -19,11 +19,12 @@ from floatbase._validation import (
     as_integer,
     as_positive,
     as_string,
+    checked,
     cross,
     short_repr,
     unit_vector,
 )
-from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact, check_contact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -49,17 +50,15 @@ class LinearConstraint(Value):
     function: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,).
     """
 
-    name: str
-    m: int
-    function: Callable[[State, float], tuple[Array, Array]]
+    name: str = field(metadata=checked(as_string))
+    m: int = field(metadata=checked(as_integer, 1, _MAX_ROWS, "the number of rows"))
+    function: Callable[[State, float], tuple[Array, Array]] = field(
+        metadata=checked(as_callable, "function(state, t)")
+    )
     jacobian_is_constraint: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        as_string("name of a constraint", self.name)
-        object.__setattr__(
-            self, "m", as_integer(f"m of {self.name}, its number of rows,", self.m, 1, _MAX_ROWS)
-        )
-        as_callable(f"function of {self.name}", self.function, "function(state, t)")
+    def _label(self) -> str:
+        return f"constraint {short_repr(self.name)}"
 
     @property
     def k(self) -> int:
@@ -108,16 +107,11 @@ class RollingWheel(SinglePointContact):
     point.
     """
 
-    axis: Array
-    radius: float
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
+    axis: Array = field(metadata=checked(unit_vector))
+    radius: float = field(metadata=checked(as_positive, "m"))
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
     jacobian_is_constraint: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        check_contact(self)
-        object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
-        object.__setattr__(self, "radius", as_positive(f"radius of {self.frame}", self.radius, "m"))
 
     def slip(self, state: State) -> Array:
         """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel

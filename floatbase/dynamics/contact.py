@@ -14,8 +14,10 @@ from floatbase._validation import (
     as_array,
     as_positive,
     as_string,
+    checked,
     cross,
     read_only,
+    short_repr,
     unit_vector,
 )
 from floatbase.robots import State
@@ -80,9 +82,12 @@ class SinglePointContact(Value):
     moves on the body.
     """
 
-    frame: str
+    frame: str = field(metadata=checked(as_string))
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
+
+    def _label(self) -> str:
+        return f"contact {short_repr(self.frame)}"
 
     @property
     def name(self) -> str:
@@ -134,22 +139,13 @@ class PointContact(SinglePointContact):
     centre: of the ball, shape (3,), m, in the frame.
     """
 
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
-    radius: float = 0.0
-    centre: Array = field(default_factory=lambda: np.zeros(3))
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
+    radius: float = field(default=0.0, metadata=checked(as_positive, "m", allow_zero=True))
+    centre: Array = field(
+        default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
+    )
     jacobian_is_constraint: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        check_contact(self)
-        object.__setattr__(
-            self,
-            "radius",
-            as_positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True),
-        )
-        object.__setattr__(
-            self, "centre", as_array(f"centre of {self.frame}", self.centre, (3,), "m")
-        )
 
     def _arm(self, state: State) -> tuple[Array, Array]:
         """R c - r n. Only R c turns with the foot, the contact point stays below the centre."""
@@ -173,10 +169,10 @@ class FlatFootContact(Value):
     mu: coefficient of friction.
     """
 
-    frame: str
+    frame: str = field(metadata=checked(as_string))
     corners: Array
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
     row_names: ClassVar[tuple[str, ...]] = (
         "x",
         "y",
@@ -187,8 +183,11 @@ class FlatFootContact(Value):
     )  # world-aligned
 
     def __post_init__(self) -> None:
-        check_contact(self)
+        super().__post_init__()
         object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
+
+    def _label(self) -> str:
+        return f"contact {short_repr(self.frame)}"
 
     @property
     def name(self) -> str:
@@ -236,12 +235,3 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
     )
     blocks = [np.vstack([np.eye(3), pin.skew(point - reference_point)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
-
-
-def check_contact(contact: FrictionContact) -> None:
-    """Check a contact's friction coefficient and normal; scale the normal to unit length."""
-    as_string("frame of a contact", contact.name)
-    object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
-    object.__setattr__(
-        contact, "mu", as_positive(f"friction coefficient mu of {contact.name}", contact.mu)
-    )
