@@ -11,7 +11,7 @@ multi-contact stability of humanoids, RSS 2015.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from floatbase._validation import (
     as_integer,
     as_positive,
     cached_property,
+    checked,
     numeric_copy,
     read_only,
 )
@@ -57,15 +58,16 @@ class WrenchSet(Value):
         with a limit on every point it is bounded.
     """
 
-    points: Array
+    points: Array = field(metadata=checked(as_array, (None, 3), "m"))
     cones: tuple[FrictionPolyhedron, ...]
-    reference_point: Array
-    weight: float
+    reference_point: Array = field(metadata=checked(as_array, (3,), "m"))
+    weight: float = field(metadata=checked(as_positive, "N"))
     max_normal_force: Array
 
     def __post_init__(self) -> None:
-        points = as_array("points", self.points, (None, 3), "m")
-        cones = tuple(self.cones) if isinstance(self.cones, Sequence) else ()
+        super().__post_init__()
+        points, cones = self.points, self.cones
+        cones = tuple(cones) if isinstance(cones, Sequence) else ()
         if not len(points):
             raise InputError(
                 "a wrench set needs at least one contact point; a robot in the air can produce no "
@@ -77,12 +79,7 @@ class WrenchSet(Value):
             raise InputError(
                 f"cones must hold one FrictionPolyhedron for each of the {len(points)} points."
             )
-        object.__setattr__(self, "points", points)
         object.__setattr__(self, "cones", cones)
-        object.__setattr__(
-            self, "reference_point", as_array("reference_point", self.reference_point, (3,), "m")
-        )
-        object.__setattr__(self, "weight", as_positive("weight", self.weight, "N"))
         limits = numeric_copy(self.max_normal_force)  # +inf is allowed
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             count = f"one number > 0 or {len(points)} of them, one for each contact point (N)"
