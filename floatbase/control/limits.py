@@ -186,7 +186,7 @@ class Limits(Value):
     _example = "controller.limits"
     torque_limits: Array = field(metadata=checked(_as_limits))
     facets: int = field(
-        default=4, metadata=checked(as_integer, 3, MAX_FACETS, "μ is not known better")
+        default=4, metadata=checked(as_integer, 3, MAX_FACETS, "μ is never known more accurately")
     )
     inner_approximation: bool = field(default=True, metadata=checked(as_bool))
     min_normal_force: NormalForces = field(default=0.0, metadata=checked(_as_bounds))

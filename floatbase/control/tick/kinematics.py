@@ -89,7 +89,7 @@ def point_velocity(bodies: Bodies, joint, p):
 
 @jit
 def frame_pose(bodies: Bodies, joint, frames, i):
-    """Return rotation and position, world, of a frame; row i of `frames` is its pose in the joint."""
+    """Return rotation and position, world, of a frame; its pose in the joint is `frames[i]`."""
     R = rotation_in(bodies.poses, joint)
     x, y, z = rotation_in(frames, i)
     return (rotate(R, x), rotate(R, y), rotate(R, z)), plus(
