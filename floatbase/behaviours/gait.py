@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import floor, inf
 from types import MappingProxyType
 
 import numpy as np
 
-from floatbase._validation import Value, as_instance, as_integer, as_number, as_positive, as_string
+from floatbase._validation import (
+    Value,
+    as_instance,
+    as_integer,
+    as_number,
+    as_positive,
+    as_string,
+    checked,
+)
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
@@ -36,12 +44,13 @@ class Gait(Value):
     """
 
     offsets: Mapping[str, float]
-    period: float
-    swing: float
-    start: float = 0.0
+    period: float = field(metadata=checked(as_positive, "s", maximum=_MAX_PERIOD))
+    swing: float = field(metadata=checked(as_positive, "s", maximum=_MAX_PERIOD))
+    start: float = field(default=0.0, metadata=checked(as_number, "s"))
     stop: float | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.offsets, Mapping) or not self.offsets:
             raise InputError(
                 'offsets must be a mapping from feet to parts of the period, such as {"left": 0.0, '
@@ -57,11 +66,6 @@ class Gait(Value):
                     f"the offset of {foot} is {offset:g}; it must be from 0 to less than 1."
                 )
         object.__setattr__(self, "offsets", MappingProxyType(offsets))
-        for name in ("swing", "period"):
-            object.__setattr__(
-                self, name, as_positive(name, getattr(self, name), "s", maximum=_MAX_PERIOD)
-            )
-        object.__setattr__(self, "start", as_number("start", self.start, "s"))
         if self.stop is not None:
             object.__setattr__(self, "stop", as_number("stop", self.stop, "s"))
         if self.swing > self.period - TIME_TOLERANCE:

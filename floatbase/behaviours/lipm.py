@@ -5,7 +5,7 @@ planned ahead.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -17,6 +17,7 @@ from floatbase._validation import (
     as_number,
     as_positive,
     cached_property,
+    checked,
     read_only,
     short_repr,
 )
@@ -46,12 +47,11 @@ class LIPM(Value):
     """
 
     segments: Sequence[ZMPSegment]
-    com: Array
-    omega: float
+    com: Array = field(metadata=checked(as_array, (2,), "m"))
+    omega: float = field(metadata=checked(as_positive, "1/s"))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "com", as_array("com", self.com, (2,), "m"))
-        object.__setattr__(self, "omega", as_positive("omega", self.omega, "1/s"))
+        super().__post_init__()
         form = "a plan needs segments of the ZMP: [(begin, end, p at begin, p at end), …]"
         if not isinstance(self.segments, list | tuple) or not self.segments:
             raise InputError(f"{form}, not {short_repr(self.segments)}.")

@@ -4,32 +4,33 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from floatbase._validation import Value, as_array, as_instance, as_positive
+from floatbase._validation import Value, as_array, as_instance, as_positive, checked
 from floatbase.behaviours.gait import Gait
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 
 
+def _as_gains(name: str, value: Any) -> tuple[float, float]:
+    """Return a pair (kp in 1/s², weight), checked."""
+    kp, weight = as_array(name, value, (2,)).tolist()
+    return (
+        as_positive(f"kp in {name}", kp, "1/s²"),
+        as_positive(f"weight in {name}", weight, allow_zero=True),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Gains(Value):
     """(kp in 1/s², weight) of each kind of task of a `Walk`; all are critically damped."""
 
-    com: tuple[float, float] = (100.0, 10.0)
-    base: tuple[float, float] = (100.0, 10.0)
-    swing: tuple[float, float] = (900.0, 10.0)
-    posture: tuple[float, float] = (100.0, 1e-2)
-
-    def __post_init__(self) -> None:
-        for name in ("com", "base", "swing", "posture"):
-            kp, weight = as_array(f"gains of {name}", getattr(self, name), (2,)).tolist()
-            gains = (
-                as_positive(f"kp of {name}", kp, "1/s²"),
-                as_positive(f"weight of {name}", weight, allow_zero=True),
-            )
-            object.__setattr__(self, name, gains)
+    com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
+    base: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
+    swing: tuple[float, float] = field(default=(900.0, 10.0), metadata=checked(_as_gains))
+    posture: tuple[float, float] = field(default=(100.0, 1e-2), metadata=checked(_as_gains))
 
     @staticmethod
     def for_contacts(contacts: Contacts) -> Gains:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_number, as_positive, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_number,
+    as_positive,
+    checked,
+    read_only,
+)
 from floatbase.errors import InputError
 
 
@@ -24,18 +32,14 @@ class Swing(Value):
     not fit.
     """
 
-    start: Array
-    end: Array
-    lift_off: float
-    touchdown: float
-    height: float = 0.05
+    start: Array = field(metadata=checked(as_array, (3,), "m"))
+    end: Array = field(metadata=checked(as_array, (3,), "m"))
+    lift_off: float = field(metadata=checked(as_number, "s"))
+    touchdown: float = field(metadata=checked(as_number, "s"))
+    height: float = field(default=0.05, metadata=checked(as_positive, "m", allow_zero=True))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", as_array("start", self.start, (3,), "m"))
-        object.__setattr__(self, "end", as_array("end", self.end, (3,), "m"))
-        for name in ("lift_off", "touchdown"):
-            object.__setattr__(self, name, as_number(name, getattr(self, name), "s"))
-        object.__setattr__(self, "height", as_positive("height", self.height, "m", allow_zero=True))
+        super().__post_init__()
         if not self.touchdown > self.lift_off:
             raise InputError(
                 f"the foot lifts at {self.lift_off:g} s and lands at {self.touchdown:g} s; it must "

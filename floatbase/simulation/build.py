@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_half_spaces, as_positive, read_only
+from floatbase._validation import Array, Value, as_half_spaces, as_positive, checked, read_only
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
@@ -60,16 +60,14 @@ class Ground(Value):
         goes through the origin.
     """
 
-    mu: float = 1.0
+    mu: float = field(default=1.0, metadata=checked(as_positive))
     normal: Array = field(default_factory=lambda: UP)
     offset: float | Array = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
         single_plane = np.ndim(self.normal) == 1
-        object.__setattr__(
-            self, "mu", as_positive("friction coefficient mu of the ground", self.mu)
-        )
         object.__setattr__(self, "normal", normals[0] if single_plane else normals)
         object.__setattr__(self, "offset", float(offsets[0]) if single_plane else offsets)
 
