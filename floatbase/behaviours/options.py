@@ -1,4 +1,4 @@
-"""What a `Walk` is made with: its gains, and checks of the rest."""
+"""Gains of a `Walk`, and checks of its other options."""
 
 from __future__ import annotations
 
@@ -25,7 +25,19 @@ def _as_gains(name: str, value: Any) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Gains(Value):
-    """(kp in 1/s², weight) of each kind of task of a `Walk`; all are critically damped."""
+    """Gains (kp, weight) of each kind of task of a `Walk`; all tasks are critically damped.
+
+    Parameters
+    ----------
+    com : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the task on the centre of mass.
+    base : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the task on the base's orientation.
+    swing : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the tasks on swinging feet.
+    posture : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the posture task.
+    """
 
     com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
     base: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
@@ -34,7 +46,18 @@ class Gains(Value):
 
     @staticmethod
     def for_contacts(contacts: Contacts) -> Gains:
-        """Gains that go with point feet or with flat feet."""
+        """Return the default gains for point feet or for flat feet.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            The robot's contacts.
+
+        Returns
+        -------
+        Gains
+            Gains for flat feet if any contact is one, otherwise for point feet.
+        """
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return (
             Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
@@ -42,14 +65,12 @@ class Gains(Value):
 
 
 def flat_foot_names(contacts: Contacts) -> set[str]:
-    """Names of the flat feet."""
+    """Return the names of the flat feet."""
     return {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}
 
 
 def check_options(behaviour: str, options: Iterable[str]) -> None:
-    """Raise `InputError` for an option that `WholeBodyController` does not have. behaviour: name of
-    the class.
-    """
+    """Raise `InputError` for an option that `WholeBodyController` does not have."""
     known = [
         name
         for name in inspect.signature(WholeBodyController).parameters
@@ -58,17 +79,17 @@ def check_options(behaviour: str, options: Iterable[str]) -> None:
     for name in options:
         if name not in known:
             raise InputError(
-                f"{behaviour} has no option {name!r}; beside its own, it takes those of the "
-                f"controller: {', '.join(known)}."
+                f"{behaviour} has no option {name!r}. Besides its own options, it accepts those of "
+                f"WholeBodyController: {', '.join(known)}."
             )
 
 
 def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
-    """Raise `InputError` for a gait that lifts what is no contact."""
+    """Raise `InputError` for a gait with a foot that is not a contact."""
     for foot in gait.feet:
         if foot not in contacts.names:
-            names = ", ".join(contacts.names) or "there are none"
+            names = ", ".join(contacts.names) or "none"
             raise InputError(
-                f"the gait lifts {foot}, which is no contact ({names}); Contacts.feet(robot) gives "
-                f"a robot's feet."
+                f"The gait lifts {foot}, which is not among the contacts: {names}. "
+                f"Contacts.feet(robot) returns all feet of a robot."
             )
