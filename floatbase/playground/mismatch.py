@@ -5,16 +5,14 @@ term is for.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings
+from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings, checked
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import unknown_name
 from floatbase.qp import QP, ConstraintLabel
-
-_SWITCHES = ("gravity", "velocity_forces", "drift", "underactuated", "cones")
 
 
 @dataclass(frozen=True)
@@ -39,21 +37,13 @@ class ModelMismatch(Value):
     cones: whether forces lie in friction cones; else feet may pull, nᵀ λ < 0.
     """
 
-    mass: float = 1.0
-    gravity: bool = True
-    velocity_forces: bool = True
-    drift: bool = True
-    ignored_contacts: Iterable[str] = ()
-    underactuated: bool = True
-    cones: bool = True
-
-    def __post_init__(self) -> None:
-        mass = as_positive("mass of the model, as a multiple of the actual one,", self.mass)
-        object.__setattr__(self, "mass", mass)
-        ignored = as_strings("ignored_contacts", self.ignored_contacts)
-        object.__setattr__(self, "ignored_contacts", ignored)
-        for name in _SWITCHES:
-            as_bool(name, getattr(self, name))
+    mass: float = field(default=1.0, metadata=checked(as_positive))
+    gravity: bool = field(default=True, metadata=checked(as_bool))
+    velocity_forces: bool = field(default=True, metadata=checked(as_bool))
+    drift: bool = field(default=True, metadata=checked(as_bool))
+    ignored_contacts: Iterable[str] = field(default=(), metadata=checked(as_strings))
+    underactuated: bool = field(default=True, metadata=checked(as_bool))
+    cones: bool = field(default=True, metadata=checked(as_bool))
 
     @property
     def is_exact(self) -> bool:

@@ -5,7 +5,7 @@ of them does; and a controller that drives motors of the base there.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -19,6 +19,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     as_strings,
+    checked,
     cross,
 )
 from floatbase.control import Command
@@ -27,6 +28,11 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.playground.mismatch import ModelMismatch
 from floatbase.robots import Robot, State
 from floatbase.simulation import Controller, Ground, Push, Simulation
+
+
+def _as_friction(name: str, value: object) -> float | None:
+    """Check a friction coefficient; None is allowed."""
+    return None if value is None else as_positive(name, value)
 
 
 @dataclass(frozen=True)
@@ -44,35 +50,12 @@ class Perturbation(Value):
         may be negative.
     """
 
-    mass: float = 1.0
-    gravity: bool = True
-    velocity_forces: bool = True
-    friction: float | None = None
-    disabled_contacts: Iterable[str] = ()
-    adhesion_force: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "mass",
-            as_positive("mass of the perturbation, as a multiple of the robot's,", self.mass),
-        )
-        object.__setattr__(
-            self, "disabled_contacts", as_strings("disabled_contacts", self.disabled_contacts)
-        )
-        object.__setattr__(
-            self,
-            "adhesion_force",
-            as_positive("adhesion_force of the ground", self.adhesion_force, "N", allow_zero=True),
-        )
-        if self.friction is not None:
-            object.__setattr__(
-                self,
-                "friction",
-                as_positive("friction coefficient of the perturbation", self.friction),
-            )
-        for name in ("gravity", "velocity_forces"):
-            as_bool(name, getattr(self, name))
+    mass: float = field(default=1.0, metadata=checked(as_positive))
+    gravity: bool = field(default=True, metadata=checked(as_bool))
+    velocity_forces: bool = field(default=True, metadata=checked(as_bool))
+    friction: float | None = field(default=None, metadata=checked(_as_friction))
+    disabled_contacts: Iterable[str] = field(default=(), metadata=checked(as_strings))
+    adhesion_force: float = field(default=0.0, metadata=checked(as_positive, "N", allow_zero=True))
 
 
 class PerturbedSimulation(Simulation):
