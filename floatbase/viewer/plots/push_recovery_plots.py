@@ -16,7 +16,6 @@ from floatbase.errors import InputError
 from floatbase.friction import WrenchSet
 from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CALM, COM, LEGEND, LIMIT, MEASURED, RGB, WARNING
-from floatbase.viewer.scene.painter import round_1_2_5
 from floatbase.viewer.scene.shapes import Item, Picture, label, transform
 
 if TYPE_CHECKING:
@@ -170,7 +169,7 @@ def _picture(
     )
     items[f"{kind}/inside"] = Item(inside, transform(centre))
     circle = _unit_vectors(2.0 * np.pi * np.arange(_RING_SIDES) / _RING_SIDES)
-    step = round_1_2_5(largest / 3)
+    step = geometry.round_1_2_5(largest / 3)
     for force in step * np.arange(1, int(largest / step) + 1):
         items[f"{kind}/ring {force:g} N"] = _loop(
             centre, scale * force * circle, 0.006 * span, LIMIT

@@ -132,3 +132,9 @@ def torus_arc(radius: float, tube: float, start: float, end: float, sides: int =
     ]
     bands = [_band(10, True, True)[:, ::-1] + k * 10 for k in range(sides)]
     return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)
+
+
+def round_1_2_5(value: float) -> float:
+    """1, 2 or 5 times a power of ten, whichever has the ratio to `value` nearest to 1."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)

@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene import protocol, shapes
 from floatbase.viewer.scene.colours import LEGEND, LEGEND_SYMBOLS, RGB, hex_code
+from floatbase.viewer.scene.shapes import Picture
 
 Entry = tuple[str, RGB, str]  # kind of items, colour, meaning
+
+
+def kinds(picture: Picture) -> set[str]:
+    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a
+    force is an "idle cone".
+    """
+    idle = shapes.cone_colour("idle")
+    return {
+        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
+        for path, item in picture.items()
+    }
 
 
 @lru_cache(maxsize=64)  # most pictures show what the one before did

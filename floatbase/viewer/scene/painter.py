@@ -4,9 +4,7 @@ any page.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, Unpack
 
 import numpy as np
@@ -15,47 +13,25 @@ from scipy.spatial.distance import pdist
 
 from floatbase._validation import (
     Array,
-    as_array,
     as_instance,
     cached_property,
-    numeric_copy,
-    short_repr,
 )
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
-from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.robots import Robot, State
-from floatbase.viewer.scene import markers, shapes, threejs
-from floatbase.viewer.scene.colours import GHOST, MEASURED, PLANNED, RGB
+from floatbase.viewer.scene import geometry, markers, shapes, threejs
+from floatbase.viewer.scene.colours import GHOST, RGB
+from floatbase.viewer.scene.cone_picture import ConeShape, cone_picture
+from floatbase.viewer.scene.contact_forces import Forces, as_point_forces
 from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
-from floatbase.viewer.scene.shapes import Item, Picture
+from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
 
 # radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not
 # meet
 CORNER_RADIUS = 0.48
 MIN_FORCE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor judged
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3)
-    each, N, world, or None.
-    """
-
-    measured: Array | None
-    planned: Array | None
-
-    @property
-    def kinds(self) -> list[tuple[str, Array | None, RGB]]:
-        """Name, forces and colour of the measured and of the planned forces."""
-        return [("measured", self.measured, MEASURED), ("planned", self.planned, PLANNED)]
-
-    @property
-    def cone_forces(self) -> Array | None:
-        """The forces that colour the cones: the measured ones if there are any."""
-        return self.planned if self.measured is None else self.measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +73,10 @@ class Painter:
         self._check_state(state)
         if contacts is not None:
             as_instance("contacts", contacts, Contacts)
-        both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
+        both = Forces(
+            as_point_forces("forces", forces, contacts),
+            as_point_forces("planned", planned, contacts),
+        )
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
         picture = {"ground": ground.lines(self.line_colour, state.com)} | self._robot(
@@ -212,7 +191,7 @@ class Painter:
         """
         if self.requested_scale is not None:
             return self.requested_scale
-        return round_1_2_5(
+        return geometry.round_1_2_5(
             2.0
             * max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size)
             / self.robot.weight
@@ -277,6 +256,7 @@ class Painter:
         """Forces at every point, and patches and cones at the points that stand on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
+        shape = ConeShape(self.facets, self.inner_approximation, self.facet_rotation)
         rows = zip(contacts.point_names, positions, contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = path_part(name)
@@ -284,9 +264,10 @@ class Painter:
                 picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
             if cones and stands[i]:
                 force = None if forces.cone_forces is None else forces.cone_forces[i]
-                picture |= prefixed(
-                    f"cone/{at}", self._cone(position, normal, float(mu), height, force)
-                )
+                if force is not None and self._is_negligible(force):
+                    force = None
+                cone = cone_picture(shape, position, normal, float(mu), height, force)
+                picture |= prefixed(f"cone/{at}", cone)
             for kind, vectors, colour in forces.kinds if arrows else ():
                 if vectors is not None and not self._is_negligible(vectors[i]):
                     vector = self.scale * vectors[i]
@@ -294,42 +275,6 @@ class Painter:
                         position, vector, colour, self.size, halo=kind == "planned"
                     )
         return picture
-
-    def _cone(
-        self, position: Array, normal: Array, mu: float, height: float, force: Array | None
-    ) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it; without a force it is grey
-        and faint.
-        """
-        judged_force = None if force is None or self._is_negligible(force) else force
-        if self.facets is None:
-            status = (
-                "idle"
-                if judged_force is None
-                else _friction_cone(tuple(normal.tolist()), mu).status(judged_force)
-            )
-            made = {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-            return made | self._outside_rim(
-                position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status
-            )
-        polyhedron = _polyhedron(
-            tuple(normal.tolist()), mu, self.facets, self.inner_approximation, self.facet_rotation
-        )
-        status = "idle" if judged_force is None else polyhedron.status(judged_force)
-        status = (
-            "inside" if status == "active" else status
-        )  # an active facet has a colour of its own
-        active = () if judged_force is None else polyhedron.active_facets(judged_force)
-        made = shapes.friction_polyhedron(position, polyhedron, height, status, active)
-        return made | self._outside_rim(position, polyhedron, height, status)
-
-    def _outside_rim(
-        self, position: Array, polyhedron: FrictionPolyhedron, height: float, status: str
-    ) -> Picture:
-        """What tells a force outside its cone from others by more than a hue."""
-        if status != "outside":
-            return {}
-        return {"/rim": shapes.cone_rim(position, polyhedron, height, is_round=self.facets is None)}
 
     def _is_negligible(self, force: Array) -> bool:
         """Whether a force is too small to be drawn or judged."""
@@ -397,7 +342,7 @@ class Painter:
 
         It starts behind a tall robot, because the picture of one shows little ground in front.
         """
-        force = round_1_2_5(self.robot.weight / 4)
+        force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
         start = min(low[0], 0.5 * (low[0] + high[0] - length) - 0.5 * self.size)
@@ -423,74 +368,3 @@ class Painter:
                 f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer "
                 f"for that robot."
             )
-
-
-def legend_kinds(picture: Picture) -> set[str]:
-    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a
-    force is an "idle cone".
-    """
-    idle = shapes.cone_colour("idle")
-    return {
-        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
-        for path, item in picture.items()
-    }
-
-
-@lru_cache(maxsize=256)
-def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
-    """A cone, once: a ground has few."""
-    return FrictionCone(np.array(normal), mu)
-
-
-@lru_cache(maxsize=256)
-def _polyhedron(
-    normal: tuple[float, ...],
-    mu: float,
-    facets: int,
-    inner_approximation: bool,
-    facet_rotation: float,
-) -> FrictionPolyhedron:
-    """The polyhedron with these values. There are few different ones, so each is made once."""
-    return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)
-
-
-def round_1_2_5(value: float) -> float:
-    """1, 2 or 5 times a power of ten, whichever has the ratio to `value` nearest to 1."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
-
-
-def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
-    """The same items, each path prefixed by `path`."""
-    return {path + name: item for name, item in items.items()}
-
-
-def path_part(name: str) -> str:
-    """The name as one part of a path: without slashes."""
-    return name.replace("/", "_")
-
-
-def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
-    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any
-    other number of forces.
-    """
-    if value is None:
-        return None
-    if contacts is None:
-        raise InputError(
-            f"{name} were given without contacts, so it is not known where they act; pass "
-            f"contacts=… too."
-        )
-    array = numeric_copy(value)
-    n = contacts.n_points
-    if array is None:
-        raise InputError(
-            f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}."
-        )
-    if array.shape not in ((3 * n,), (n, 3)):
-        raise InputError(
-            f"{name} has shape {array.shape}; {n} contact points "
-            f"({', '.join(contacts.point_names)}) need shape "
-            f"({3 * n},) or ({n}, 3)."
-        )
-    return as_array(name, array.reshape(n, 3), (n, 3), "N")

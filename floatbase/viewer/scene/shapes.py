@@ -73,6 +73,16 @@ def _normal_path(path: str) -> str:
     return normal
 
 
+def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
+    """The same items, each path prefixed by `path`."""
+    return {path + name: item for name, item in items.items()}
+
+
+def path_part(name: str) -> str:
+    """The name as one part of a path: without slashes."""
+    return name.replace("/", "_")
+
+
 def transform(
     position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0
 ) -> Array:
