@@ -25,7 +25,7 @@ from floatbase.viewer import PUSH_DISPLAY_TIME, Picture, status_message
 from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
-_SITE_NOTE = "The playground needs the live lesson: here its robot stands still."
+_SITE_NOTE = "The playground runs only in a live notebook. Here the robot stands still."
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn at first
 
 
@@ -235,7 +235,9 @@ class Playground:
                 self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
-            self.view.add_text("code", self.session.code(self._last_push), "as Python", code=True)
+            self.view.add_text(
+                "code", self.session.code(self._last_push), "Python program", code=True
+            )
 
     def _on_status(self, status: str) -> None:
         """Show what stopped the run, if anything did, over the last picture."""
@@ -266,7 +268,7 @@ class Playground:
             self.run.pause()
         if self.robot.is_floating:
             self.view.add_plot_point(
-                "planned and measured forces differ by",
+                "difference of planned and measured forces",
                 float(record.time[-1]),
                 mean_force_error(record),
                 "N",
@@ -282,7 +284,7 @@ class Playground:
             rate = "" if factor is None else f", {factor:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
             headline = (
-                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control every {1e3 * PERIOD:g} ms"
+                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control step {1e3 * PERIOD:g} ms"
             )
             self.view.show(
                 record.final, record.contacts, record.measured[-1], _last_planned_forces(record),

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from floatbase.playground.page import Playground
 
 _MAX_PUSH = 2.5  # times the weight: a push that asks for steps
-_PAIRED = "believed and true"  # section of sliders with a column each for what is believed and true
-_QP = "its quadratic program"
+_PAIRED = "model and reality"  # section of sliders with one column for each
+_STANCE = "stance"
+_WALKING = "walking"
+_QP = "quadratic program"
 
 
 class _Slider(NamedTuple):
@@ -51,29 +53,29 @@ _PAIRED_SLIDERS = tuple(
         ("mass [×]", "mass", 0.5, 2.0, 0.05),
         ("motors [Hz]", "bandwidth", 1.0, IDEAL_BANDWIDTH, 1.0),
     )
-    for index, column in enumerate(("believed", "true"))
+    for index, column in enumerate(("model", "reality"))
 )
 _STANCE_SLIDERS = tuple(
-    _Slider(f"CoM {axis} [m]", "com_shift", index, -0.08, 0.08, 0.005, "its stance")
+    _Slider(f"CoM {axis} [m]", "com_shift", index, -0.08, 0.08, 0.005, _STANCE)
     for index, axis in enumerate("xyz")
 )
-_NOD_SLIDER = _Slider("nod and turn", "nod", None, 0.0, 0.35, 0.01, "its stance")
+_NOD_SLIDER = _Slider("nodding [rad]", "nod", None, 0.0, 0.35, 0.01, _STANCE)
 _STEP_SLIDERS = (
-    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, "its steps"),
-    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, "its steps"),
-    _Slider("turn [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, "its steps"),
+    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, _WALKING),
+    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, _WALKING),
+    _Slider("turn left [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, _WALKING),
 )
 _QP_SLIDERS = (
     _Slider("facets", "facets", None, 3, 16, 1, _QP),
     _Slider("torque limits [×]", "torque_fraction", None, 0.05, 1.0, 0.05, _QP),
-    _Slider("least force [N]", "min_normal_force", None, 0.0, 100.0, 5.0, _QP),
+    _Slider("min. force [N]", "min_normal_force", None, 0.0, 100.0, 5.0, _QP),
     *(
         _Slider(f"{name} ×10^", "weights", index, -3.0, 3.0, 0.5, _QP, exponent=True)
         for index, name in enumerate(("motion", "posture", "effort"))
     ),
 )
-_SWITCH_WORDS = {"assumed_off": "believed", "actual_off": "world"}  # what is written on a switch
-_FREE_PLAY = "play freely"
+_SWITCH_WORDS = {"assumed_off": "model", "actual_off": "reality"}  # what is written on a switch
+_FREE_PLAY = "free play"
 
 
 class Panel:
@@ -89,7 +91,7 @@ class Panel:
         view.add_button("pause", play.run.pause)
         view.add_button("reset", play.run.reset)
         view.add_button("push", play.push)
-        view.add_button("all as at first", play.reset_all)
+        view.add_button("reset everything", play.reset_all)
         view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
         most = _MAX_PUSH * play.robot.weight
         view.add_slider("push [N]", partial(setattr, play, "force"), play.force, 0.0, most, 1.0)
@@ -103,13 +105,13 @@ class Panel:
         for foot in play.robot.feet:
             changed = partial(self._set_foot_contact, foot.frame)
             stands = foot.frame not in settings.lifted_feet
-            view.add_checkbox(f"on {foot.frame}", changed, stands, "its stance")
+            view.add_checkbox(f"stand on {foot.frame}", changed, stands, _STANCE)
         self._add_sliders(_STANCE_SLIDERS)
         self._add_slider(_NOD_SLIDER, play.set_nodding)
         if self._gait_names:
             choices = ["stand", "step when pushed", *self._gait_names]
             number = self._gait_number(settings)
-            view.add_dropdown("gait", self._set_gait, choices, number, "its steps")
+            view.add_dropdown("gait", self._set_gait, choices, number, _WALKING)
             self._add_sliders(_STEP_SLIDERS)
         self._add_sliders(_QP_SLIDERS)
         self._add_terms()
@@ -121,7 +123,7 @@ class Panel:
     def _add_slider(self, slider: _Slider, changed: Callable[[float], None]) -> None:
         name, _, _, low, high, step, section, column, _ = slider
         value = slider.shown(self._playground.session.settings)
-        at_most = "perfect" if slider.field == "bandwidth" else ""
+        at_most = "ideal" if slider.field == "bandwidth" else ""
         self._playground.view.add_slider(
             name, changed, value, low, high, step, section, column, at_most
         )
@@ -213,7 +215,7 @@ class Panel:
             values["gait"] = self._gait_number(settings)
         values |= {slider.name: slider.shown(settings) for slider in sliders}
         for foot in self._playground.robot.feet:
-            values[f"on {foot.frame}"] = foot.frame not in settings.lifted_feet
+            values[f"stand on {foot.frame}"] = foot.frame not in settings.lifted_feet
         for term in EQUATION:
             for field, switch in term.switches.items():
                 values[switch] = term.name not in getattr(settings, field)

@@ -19,8 +19,8 @@ TERM_LEGEND = {  # term: (colour of its arrows, what they are)
     "inertia": (COM, "m a, mass times acceleration"),
     "velocity": (COM, "C q̇, Coriolis and centrifugal force"),
     "gravity": (COM, "m g, weight"),
-    "zeros": (MEASURED, "τ, torques of the joints"),
-    "drift": (COM, "J̇ q̇, drift of the feet"),
+    "zeros": (MEASURED, "τ, joint torques"),
+    "drift": (COM, "J̇ q̇, drift acceleration of the feet"),
 }
 _WORD_HEIGHTS = {
     "inertia": 0.25,
@@ -91,7 +91,7 @@ def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
         return {}
     first = record.state(0)
     rate = (state.com_velocity - first.com_velocity) / float(record.time[-1] - record.time[0])
-    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a", size)
+    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "actual m a", size)
 
 
 def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
@@ -99,7 +99,7 @@ def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
     words = shapes.label(
         at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))],
-        "true m g",
+        "actual m g",
         _TEXT_SIZE * size,
     )
     return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
@@ -111,7 +111,7 @@ def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
     return _arrow(
-        "C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size
+        "C v", np.array(pose.translation), scale * pose.rotation @ force, "actual C q̇", size
     )
 
 

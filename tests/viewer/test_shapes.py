@@ -198,7 +198,7 @@ def test_the_compass_is_plotted_and_drawn_to_scale(
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
     np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "reachable horizontal force"
+        "maximum horizontal force"
     ]
     plt.close(axis.figure)
     near, far = (
@@ -268,7 +268,7 @@ def test_prices_stand_at_the_middle_of_their_facets(
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
     assert [
         hex_code(viewer.painter.text_colour),
-        "price of a limit: its multiplier",
+        "multiplier (shadow price)",
         "patch",
     ] in legend
     with raises(InputError, "contacts", "solution"):
