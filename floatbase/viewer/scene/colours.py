@@ -1,10 +1,10 @@
-"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and
-Ito).
+"""Colours of all 3-D pictures and plots, RGB from 0 to 1, safe for colour-blind readers.
 
-Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is
-inside, orange when the force reaches a facet or the surface, vermilion when it is outside, and a
-faint grey when there is no force. What is neither a force nor a cone, as a curve, a place or an
-entry of a matrix, is grey: greys differ in lightness, which everybody sees.
+They are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces light
+blue. A friction cone is green when its force is inside, orange when the force reaches a facet or
+the surface, vermilion when it is outside, and a faint grey when there is no force. Everything that
+is neither a force nor a cone is grey, such as a curve, a position or a matrix entry, because all
+readers can tell greys apart by their lightness.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ RGBA = tuple[float, float, float, float]
 
 
 def _rgb(code: str) -> RGB:
+    """Convert "#rrggbb" to RGB from 0 to 1."""
     red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue
 
@@ -98,10 +99,34 @@ DARK_SHADES = {
 
 
 def hex_code(colour: RGB) -> str:
-    """The colour as "#rrggbb"."""
+    """Convert a colour to "#rrggbb".
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB, from 0 to 1.
+
+    Returns
+    -------
+    str
+        The colour as "#rrggbb".
+    """
     return "#" + "".join(f"{round(255 * part):02X}" for part in colour)
 
 
 def with_alpha(colour: RGB, alpha: float) -> RGBA:
-    """The colour with an opacity: 0 is invisible, 1 hides what is behind."""
+    """Add an opacity to a colour.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB, from 0 to 1.
+    alpha : float
+        Opacity: 0 is invisible, 1 is opaque.
+
+    Returns
+    -------
+    tuple of float
+        RGBA, from 0 to 1.
+    """
     return (*colour, alpha)

@@ -14,10 +14,16 @@ from floatbase.viewer.scene.shapes import Picture
 
 
 class ConeShape(NamedTuple):
-    """Whether cones are drawn round, or as which polyhedron.
+    """Shape of friction cones: round or polyhedral.
 
-    facets: number of facets of the friction polyhedra; None draws round cones.
-    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
+    Parameters
+    ----------
+    facets : int or None
+        Number of facets of the friction polyhedra; None draws round cones.
+    inner_approximation : bool
+        Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
+    facet_rotation : float
+        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
     """
 
     facets: int | None
@@ -28,8 +34,27 @@ class ConeShape(NamedTuple):
 def cone_picture(
     shape: ConeShape, position: Array, normal: Array, mu: float, height: float, force: Array | None
 ) -> Picture:
-    """A cone or polyhedron in the colour that the force gives it; without a force it is grey and
-    faint.
+    """Draw a cone or polyhedron in a colour that shows whether the force is inside.
+
+    Parameters
+    ----------
+    shape : ConeShape
+        Shape of the cone.
+    position : ndarray, shape (3,)
+        Contact point in the world frame [m].
+    normal : ndarray, shape (3,)
+        Unit normal of the ground in the world frame.
+    mu : float
+        Friction coefficient [-].
+    height : float
+        Height of the drawn cone [m].
+    force : ndarray, shape (3,), or None
+        Contact force in the world frame [N]. Without one, the cone is faint and grey.
+
+    Returns
+    -------
+    Picture
+        The cone, with a rim if the force is outside.
     """
     key = (tuple(normal.tolist()), mu)
     status: str
@@ -54,7 +79,7 @@ def cone_picture(
 
 @lru_cache(maxsize=256)
 def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
-    """A cone, once: a ground has few."""
+    """Return the cone with these values; each is made once, since there are few."""
     return FrictionCone(np.array(normal), mu)
 
 
@@ -66,5 +91,5 @@ def _polyhedron(
     inner_approximation: bool,
     facet_rotation: float,
 ) -> FrictionPolyhedron:
-    """The polyhedron with these values. There are few different ones, so each is made once."""
+    """Return the polyhedron with these values; each is made once, since there are few."""
     return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)

@@ -1,4 +1,4 @@
-"""Contact forces, measured and planned, as a picture shows them."""
+"""Contact forces, measured and planned, as pictures show them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,14 @@ from floatbase.viewer.scene.colours import MEASURED, PLANNED, RGB
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3)
-    each, N, world, or None.
+    """Contact forces at n points in the world frame [N].
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n, 3), or None
+        Measured forces.
+    planned : ndarray, shape (n, 3), or None
+        Planned forces.
     """
 
     measured: Array | None
@@ -28,15 +34,33 @@ class Forces:
 
     @property
     def cone_forces(self) -> Array | None:
-        """The forces that colour the cones: the measured ones if there are any."""
+        """Forces that colour the cones: the measured ones, or else the planned ones."""
         return self.planned if self.measured is None else self.measured
 
 
 def as_point_forces(
     name: str, value: npt.ArrayLike | None, contacts: Contacts | None
 ) -> Array | None:
-    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any
-    other number of forces.
+    """Check forces, and arrange them as one row per contact point.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for error messages.
+    value : array_like, shape (3 n,) or (n, 3), or None
+        Forces in the world frame [N].
+    contacts : Contacts or None
+        Contacts with n points.
+
+    Returns
+    -------
+    ndarray, shape (n, 3), or None
+        The forces [N].
+
+    Raises
+    ------
+    InputError
+        If forces are given without contacts, or if their number does not match the contact points.
     """
     if value is None:
         return None

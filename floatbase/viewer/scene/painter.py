@@ -1,6 +1,4 @@
-"""The painter: makes a picture of a robot from its state, contacts and forces. It has no effect on
-any page.
-"""
+"""Painter: makes a picture of a robot from its state, contacts and forces."""
 
 from __future__ import annotations
 
@@ -36,15 +34,28 @@ MIN_FORCE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor 
 
 @dataclass(frozen=True, eq=False)
 class Painter:
-    """Draws a robot.
+    """Makes pictures of a robot, without drawing them on a page.
 
-    robot: the robot.
-    requested_scale: length of a drawn force, m/N; None for one that fits the robot.
-    facets: number of facets of the friction polyhedra; None draws round cones.
-    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
-    ground: the ground; None for the plane that the contacts stand on.
-    line_colour, text_colour, background_colour: of the ground's lines, of text, and of the
-        background.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    requested_scale : float or None
+        Length of a drawn force [m/N]; None for a length that suits the robot.
+    facets : int or None
+        Number of facets of the friction polyhedra; None draws round cones.
+    inner_approximation : bool
+        Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
+    facet_rotation : float
+        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
+    ground : Plane, Planes or None
+        Ground; None for the plane on which the contacts stand.
+    line_colour : tuple of float
+        RGB of the lines on the ground.
+    text_colour : tuple of float
+        RGB of text.
+    background_colour : tuple of float
+        RGB of the background.
     """
 
     robot: Robot
@@ -65,9 +76,30 @@ class Painter:
         planned: npt.ArrayLike | None = None,
         **options: Unpack[PictureKeywords],
     ) -> Picture:
-        """The picture, path -> item, of everything that the arguments ask for.
+        """Make the picture of a state.
 
-        state, contacts, forces, planned: as for `Viewer.show`. options: see `PictureOptions`.
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        contacts : Contacts, optional
+            Contacts to draw.
+        forces : array_like, shape (3 n,) or (n, 3), optional
+            Measured forces at the n contact points, in the world frame [N].
+        planned : array_like, shape (3 n,) or (n, 3), optional
+            Planned forces at the n contact points, in the world frame [N].
+        **options
+            Fields of `PictureOptions`.
+
+        Returns
+        -------
+        Picture
+            Items to draw, path -> item.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot, or if the forces do not match the contacts.
         """
         chosen = PictureOptions(**options)
         self._check_state(state)
@@ -122,8 +154,19 @@ class Painter:
         return picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
-        """A painter with other facets or another ground. It shares what this one has computed for
-        the robot.
+        """Return a painter with other facets or another ground.
+
+        It shares what this one has computed for the robot.
+
+        Parameters
+        ----------
+        **changes
+            Fields of `Painter` to replace.
+
+        Returns
+        -------
+        Painter
+            The new painter.
         """
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
@@ -132,22 +175,28 @@ class Painter:
         return other
 
     def ground_only(self) -> Picture:
-        """A picture of the ground alone."""
+        """Make a picture of the ground alone.
+
+        Returns
+        -------
+        Picture
+            The ground.
+        """
         return {"ground": self.drawn_ground.lines(self.line_colour)}
 
     @property
     def drawn_ground(self) -> Plane | Planes:
-        """The ground that was given, or level ground."""
+        """Given ground, or level ground if none was given."""
         return self.ground or LEVEL
 
     @cached_property
     def standing(self) -> State:
-        """The robot's standing state."""
+        """Standing state of the robot."""
         return self.robot.standing()
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of the standing robot's bounding box, m, world."""
+        """Lowest and highest corner of the standing robot's bounding box, world frame [m]."""
         poses = self.standing.joint_transforms
         points = [
             mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3]
@@ -158,10 +207,9 @@ class Painter:
 
     @cached_property
     def feet_box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of a box around the standing robot's feet and their cones, m,
-        world.
+        """Lowest and highest corner of a box around the standing robot's feet, world frame [m].
 
-        A robot without feet has the box of the whole robot.
+        The box includes the cones. For a robot without feet, it is the box of the whole robot.
         """
         feet = [(foot, self.standing.frame_pose(foot.frame)) for foot in self.robot.feet]
         points = [
@@ -180,14 +228,16 @@ class Painter:
 
     @cached_property
     def size(self) -> float:
-        """Size of the standing robot, m: half the diagonal of its bounding box."""
+        """Size of the standing robot: half the diagonal of its bounding box [m]."""
         low, high = self.box
         return 0.5 * float(np.linalg.norm(high - low))
 
     @cached_property
     def scale(self) -> float:
-        """Length of a drawn force, m/N: as requested, else 1, 2 or 5 times a power of ten that
-        makes the weight about twice as long as the centre of mass is high.
+        """Length of a drawn force [m/N].
+
+        Unless it was requested, it is 1, 2 or 5 times a power of ten, such that the weight is drawn
+        about twice as long as the height of the centre of mass.
         """
         if self.requested_scale is not None:
             return self.requested_scale
@@ -198,8 +248,20 @@ class Painter:
         )
 
     def cone_height(self, contacts: Contacts) -> float:
-        """Height of the friction cones, m: that of 1.5 times the normal force at rest, but not so
-        high that the cones hide the robot, or that cones at the corners of one foot meet.
+        """Return the height of the friction cones.
+
+        It is that of 1.5 times the normal force at rest. It is reduced where the cones would hide
+        the robot, or where cones at the corners of one foot would meet.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts of the robot.
+
+        Returns
+        -------
+        float
+            Height [m].
         """
         height = min(
             self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size
@@ -215,16 +277,19 @@ class Painter:
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
+        """Meshes of the robot."""
         return robot_meshes(self.robot)
 
     @cached_property
     def _shapes(self) -> list[threejs.Shape]:
+        """Shape of each mesh."""
         return [
             threejs.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes
         ]
 
     @cached_property
     def _ghost_shapes(self) -> list[threejs.Shape]:
+        """Translucent shape of each mesh."""
         return [
             threejs.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, hide_back=True)
             for mesh in self._meshes
@@ -232,12 +297,13 @@ class Painter:
 
     @cached_property
     def _paths(self) -> list[tuple[int, str]]:
-        """For every mesh, the number of its joint, and the joint's name as part of a path."""
+        """Joint index and joint name, as part of a path, of each mesh."""
         return [
             (mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes
         ]
 
     def _robot(self, state: State, root: str, shapes_of_joints: list[threejs.Shape]) -> Picture:
+        """Draw the robot below the path `root`."""
         poses = state.joint_transforms
         return {
             f"{root}/{name}": Item(shape, poses[joint])
@@ -253,7 +319,7 @@ class Painter:
         stands: list[bool],
         arrows: bool,
     ) -> Picture:
-        """Forces at every point, and patches and cones at the points that stand on the ground."""
+        """Draw forces at all points, and patches and cones at those on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
         shape = ConeShape(self.facets, self.inner_approximation, self.facet_rotation)
@@ -277,16 +343,18 @@ class Painter:
         return picture
 
     def _is_negligible(self, force: Array) -> bool:
-        """Whether a force is too small to be drawn or judged."""
+        """Return whether a force is too small to be drawn or judged."""
         return float(force @ force) < self._negligible_force
 
     @cached_property
     def _negligible_force(self) -> float:
+        """Square of the largest negligible force [N²]."""
         return (MIN_FORCE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every contact, beside it and away from the robot; of a flat foot also the
-        numbers of its corners.
+        """Draw the name of each contact, on the side away from the robot.
+
+        The corners of a flat foot are numbered as well.
         """
         picture: Picture = {}
         for contact in contacts.friction_contacts:
@@ -308,12 +376,14 @@ class Painter:
         return picture
 
     def _wrench(self, state: State, six: Array) -> Picture:
+        """Draw a wrench at the centre of mass."""
         drawn = markers.wrench(
             state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size
         )
         return prefixed("wrench", drawn)
 
     def _push(self, state: State, frame: str, force: Array) -> Picture:
+        """Draw a push at a frame, unless it is negligible."""
         if self._is_negligible(force):
             return {}
         at = state.frame_pose(frame).translation
@@ -325,22 +395,25 @@ class Painter:
 
     @cached_property
     def _patch_radius(self) -> float:
+        """Radius of the contact patches [m]."""
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 
     def _scale_bar(self, ground: Plane | Planes) -> Picture:
+        """Draw the scale bar; it is computed once for each ground."""
         if ground not in self._scale_bars:
             self._scale_bars[ground] = self._scale_bar_on(ground)
         return self._scale_bars[ground]
 
     @cached_property
     def _scale_bars(self) -> dict[Plane | Planes, Picture]:
+        """Scale bars by ground."""
         return {}
 
     def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
-        """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the
-        left of the feet.
+        """Draw a bar on the ground that shows the length of about a quarter of the weight.
 
-        It starts behind a tall robot, because the picture of one shows little ground in front.
+        The bar is to the left of the feet. It starts behind a tall robot, because its picture shows
+        little ground in front.
         """
         force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box
@@ -351,16 +424,29 @@ class Painter:
         return prefixed("scale", shapes.scale_bar(at, force, length, self.size, self.text_colour))
 
     def _ground(self, contacts: Contacts | None, positions: Array) -> Plane | Planes:
+        """Return the ground to draw."""
         if self.ground is not None or contacts is None:
             return self.drawn_ground
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
+        """Check that a state belongs to this robot."""
         self.check_robot("state", as_instance("state", state, State).robot)
 
     def check_robot(self, what: str, robot: Robot) -> None:
-        """Raise `InputError` where `what` belongs to a robot of another name or, as with joints
-        locked, with other joints.
+        """Check that something belongs to this robot.
+
+        Parameters
+        ----------
+        what : str
+            Name of the thing that is checked, for the message.
+        robot : Robot
+            Robot to which it belongs.
+
+        Raises
+        ------
+        InputError
+            If the robot has another name or, as with joints locked, other joints.
         """
         identities = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
         if identities[0] != identities[1]:
