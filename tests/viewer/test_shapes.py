@@ -83,7 +83,7 @@ NAN = float("nan")
         (lambda: shapes.label([0, 0, 0], "x", 0.0), "height", 0),
         (lambda: shapes.label([0, 0, NAN], "x", 0.1), "position", NAN),
         (lambda: shapes.rod([0, 0, 0], np.eye(3), 0.0, 0.1, MEASURED), "length", 0),
-        (lambda: shapes.transform([0, 0, 0], np.eye(3) * NAN), "axes", NAN),
+        (lambda: shapes.transform([0, 0, 0], np.eye(3) * NAN), "rotation", NAN),
         (lambda: shapes.flat_polygon([[0, 0, 0], [1, 0, 0]], MEASURED, 0.5), "corners", 2),
         (lambda: markers.curled_arrow([0, 0, 0], [0, 0, 0]), "arrow"),
         (lambda: markers.frame_axes(np.eye(3), 0.1), "pose", 3, 4),

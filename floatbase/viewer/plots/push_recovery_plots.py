@@ -19,9 +19,9 @@ from floatbase.viewer.scene.shapes import Item, Picture, label, transform
 if TYPE_CHECKING:
     from floatbase.simulation import PushRecovery
 
-_FILL = 0.15  # opacity of what lies inside the measured curve
-_HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no gap to be seen
-_RING_SIDES = 72  # of a ring
+_FILL = 0.15  # opacity of the area inside the measured curve
+_HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no visible gap
+_RING_SIDES = 72  # number of sides of a ring
 
 _Curve: TypeAlias = tuple[
     str, Array, RGB, str
@@ -128,7 +128,7 @@ def plot_horizontal_force_limits(
     """
     return _plot(
         *_horizontal_force_curve(wrenches, n),
-        "horizontal force at full weight without moment [N]",
+        "maximum horizontal force at full weight without moment [N]",
         axis,
     )
 
@@ -170,7 +170,7 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
         axis = plt.subplots(figsize=(6, 6.6), subplot_kw={"projection": "polar"})[1]
     if not isinstance(axis, PolarAxes):
         raise InputError(
-            'a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).'
+            'axis must be polar axes, as from plt.subplots(subplot_kw={"projection": "polar"}).'
         )
     axis.set_theta_zero_location("N")
     for kind, values, colour, style in curves:
@@ -186,7 +186,7 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
     _, first, colour, _ = curves[0]
     axis.fill(directions, first, color=colour, alpha=_FILL)
     axis.set_rlim(0.0, 1.1 * max(values.max() for _, values, _, _ in curves))
-    axis.set_rlabel_position(34.0)  # beside the ticks, and beside the directions of 8 and 16
+    axis.set_rlabel_position(34.0)  # between the ticks, and between 8 or 16 directions
     axis.tick_params(axis="y", labelsize="small", labelcolor=LIMIT)
     axis.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
     axis.grid(alpha=0.35)
@@ -212,7 +212,7 @@ def _picture(
         items[f"{kind}/line"] = _loop(
             centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2], tips, 0.015 * span, colour
         )
-    # a fan from the middle, for a rose is not convex; kind, tips and colour are those of the first
+    # a fan from the middle, as the area is not convex; kind, tips and colour are those of the first
     # curve
     inside = threejs.mesh(
         *geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]])),
@@ -238,8 +238,8 @@ def _curves(result: PushRecovery, theory: bool, previous: PushRecovery | None) -
     if previous is not None:
         if not np.array_equal(previous.directions, result.directions):
             raise InputError(
-                f"roses of {len(result.directions)} and {len(previous.directions)} directions "
-                f"cannot be compared."
+                f"result has {len(result.directions)} directions and previous has "
+                f"{len(previous.directions)}. Both must have the same directions."
             )
         curves.append(("previous", previous.pushes, LIMIT, "o-"))
     if theory:
@@ -255,8 +255,8 @@ def _horizontal_force_curve(wrenches: WrenchSet, n: int) -> tuple[Array, list[_C
     angles, forces = as_instance("wrenches", wrenches, WrenchSet).max_horizontal_forces(n)
     if not np.isfinite(forces).all():
         raise InputError(
-            "the forces of this stance have no end in some direction: give its wrench_set "
-            "max_normal_force."
+            "The horizontal force of this stance is unbounded in some direction. Pass "
+            "max_normal_force to wrench_set."
         )
     return angles, [("horizontal_force", forces, COM, "-")]
 

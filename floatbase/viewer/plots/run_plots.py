@@ -31,8 +31,10 @@ from floatbase.viewer.scene.colours import (
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-MIN_LOAD = 0.01  # of the weight: the direction of a smaller force says nothing about friction
-_INSIDE: dict[str, Any] = {"loc": "upper right"}  # where the legend is
+MIN_LOAD = (
+    0.01  # fraction of the weight: the direction of a smaller force says nothing about friction
+)
+_INSIDE: dict[str, Any] = {"loc": "upper right"}  # position of the legend
 _ABOVE: dict[str, Any] = {
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 1.0),
@@ -86,7 +88,7 @@ def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
     moved = 1000.0 * (rollout.com - rollout.com[0])
     for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
         axis.plot(rollout.time, column, color=colour, label=name)
-    return _finished(axis, rollout, "centre of mass moved [mm]")
+    return _finished(axis, rollout, "displacement of the CoM [mm]")
 
 
 def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
@@ -216,7 +218,7 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
     ]
     if len(made) != len(names):
         raise InputError(
-            f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}."
+            f"Got {len(made)} axes. The record has {len(names)} contacts: {', '.join(names)}."
         )
     planned, measured = (
         _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
@@ -271,7 +273,7 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
                 label="" if i else name,
             )
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
-    return _finished(axis, rollout, "friction used, of μ · normal force")
+    return _finished(axis, rollout, "friction / (μ · normal force)")
 
 
 def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
@@ -298,7 +300,7 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
         axis.axhline(
             limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
         )
-    return _finished(axis, rollout, "torques, of their limits")
+    return _finished(axis, rollout, "torque / limit")
 
 
 def friction_used(rollout: Rollout, forces: Array) -> Array:
@@ -323,10 +325,10 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
         If the forces have another shape than `rollout.measured`.
     """
     as_rollout(rollout)
-    found = numeric_copy(forces)  # NaN stands for none planned
+    found = numeric_copy(forces)  # NaN where no forces were planned
     if found is None or found.shape != rollout.measured.shape:
         raise InputError(
-            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got "
+            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured, not "
             f"{short_repr(forces)}."
         )
     f = np.reshape(found, (len(rollout.time), -1, 3))
@@ -349,7 +351,7 @@ def _contact_names(rollout: Rollout) -> tuple[str, ...]:
     """Return the names of the record's contacts; raise `InputError` if there are none."""
     names = as_rollout(rollout).contacts.names
     if not names:
-        raise InputError("the record has no contacts, so there is no gait to plot.")
+        raise InputError("The record has no contacts, so there is nothing to plot.")
     return names
 
 

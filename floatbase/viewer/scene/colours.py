@@ -36,15 +36,15 @@ GREYS = (
     _rgb("#2B3440"),
     _rgb("#6F7885"),
     _rgb("#959EAA"),
-)  # dark, middle, light; the middle one shows on any background
+)  # dark, middle, light; the middle one is visible on any background
 
 X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
 Z_AXIS = _rgb("#0072B2")
 
-GHOST_NAME = "desired posture"  # in the legend, unless `show` gets another name
+GHOST_NAME = "desired posture"  # in the legend, unless `show` is given another name
 
-# the legend, in this order: first part of the item's path, colour, meaning
+# entries of the legend, in order: first part of the item's path, colour, meaning
 LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("measured", MEASURED, "measured force"),
     ("planned", PLANNED, "planned force"),
@@ -69,8 +69,8 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("ghost", GHOST, GHOST_NAME),
 )
 
-# how the legend marks what is not a patch of its colour: first part of the item's path -> a class
-# of the page's style
+# symbols in the legend other than a patch of colour: first part of the item's path -> class of the
+# page's style
 LEGEND_SYMBOLS = {
     "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
     "cone": "cone", "idle cone": "cone",
@@ -88,7 +88,7 @@ BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "dark": (_rgb("#1E2227"), _rgb("#282C32"), _rgb("#4B525A"), _rgb("#F2F2F2")),
 }
 
-# colour -> its shade on a dark background, for those that would hide there
+# colour -> its shade on a dark background, for colours with too little contrast there
 DARK_SHADES = {
     MEASURED: _rgb("#1C80C0"),
     PLANNED: _rgb("#8CCBF2"),

@@ -72,7 +72,7 @@ def cone_picture(
             status = "inside"  # an active facet has a colour of its own
         active = () if force is None else polyhedron.active_facets(force)
         made = shapes.friction_polyhedron(position, polyhedron, height, status, active)
-    if status == "outside":  # told from others by more than a hue
+    if status == "outside":  # marked by more than a colour
         made["/rim"] = shapes.cone_rim(position, polyhedron, height, is_round=shape.facets is None)
     return made
 

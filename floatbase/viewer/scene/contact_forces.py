@@ -66,8 +66,8 @@ def as_point_forces(
         return None
     if contacts is None:
         raise InputError(
-            f"{name} were given without contacts, so it is not known where they act; pass "
-            f"contacts=… too."
+            f"{name} were given without contacts, so their points are unknown. Pass contacts=… "
+            f"as well."
         )
     array = numeric_copy(value)
     n = contacts.n_points
@@ -77,7 +77,7 @@ def as_point_forces(
         )
     if array.shape not in ((3 * n,), (n, 3)):
         raise InputError(
-            f"{name} has shape {array.shape}; {n} contact points "
+            f"{name} has shape {array.shape}. {n} contact points "
             f"({', '.join(contacts.point_names)}) need shape "
             f"({3 * n},) or ({n}, 3)."
         )

@@ -57,7 +57,7 @@ class DiffRenderer:
         new_settings = self._unsent(settings)
         updates += new_settings
         if updates:
-            # stays so when an interrupt comes before the end: the next picture is drawn anew
+            # remains True if an interrupt comes before the end; the next picture is then drawn anew
             self._interrupted = True
             self.window.put(updates)
         self.picture = picture

@@ -20,17 +20,16 @@ from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
 from floatbase.viewer.scene.shapes import Item, Picture, transform
 from floatbase.viewer.scene.threejs import Shape
 
-COLOUR = GREYS[
-    1
-]  # of all that is neither a force nor the centre of mass; it shows on any background
-# of the robot's size, above the ground: no flicker with its lines and the support region
+COLOUR = GREYS[1]  # of all marks except the centre of mass; it is visible on any background
+# fraction of the robot's size, above the ground: avoids flicker with its lines and the support
+# polygon
 _HEIGHT_ABOVE_GROUND = 0.005
 _RING_RADIUS, _DIAMOND_SIZE = (
     0.07,
     0.05,
-)  # radius of the capture point's mark and half the height of the ZMP's, of the robot's size
-_OUTLINE_WIDTH = 0.012  # of a foothold's outline, of the robot's size
-_MIN_LENGTH = 1e-6  # m: a path of no length still has a matrix
+)  # radius of the capture point's mark, half the height of the ZMP's: fractions of the robot's size
+_OUTLINE_WIDTH = 0.012  # of a foothold's outline, as a fraction of the robot's size
+_MIN_LENGTH = 1e-6  # m: avoids a singular matrix for a path of zero length
 _SEGMENTS = 24  # of a swing path
 
 
@@ -146,7 +145,7 @@ def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
     """
     if not isinstance(steps, Iterable):
         raise InputError(
-            f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}."
+            f"steps must be the steps of a Walk, such as walk.history, not {short_repr(steps)}."
         )
     return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 

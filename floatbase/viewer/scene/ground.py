@@ -13,12 +13,12 @@ from floatbase.viewer.scene import threejs
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.shapes import Item, grid_lines, ground_grid, transform
 
-# least vertical part of a normal of the ground: contacts with less stand on walls
+# smallest vertical component of a normal of the ground: with less, a contact is on a wall
 MIN_VERTICAL = 0.2
-# m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody
-# sees it
+# m by which the grid jumps to stay below a robot: a whole number of its squares, so that jumps are
+# invisible
 GRID_JUMP = 2.5
-# m; the height of the ground is rounded to this, so that it does not tremble with the feet
+# m; the height of the ground is rounded to this, so that it does not shake with the feet
 HEIGHT_STEP = 0.01
 
 
@@ -215,7 +215,7 @@ def _parts_above(plane: Plane, ends: Array) -> Array:
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
     fraction = low / np.where(
         low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0
-    )  # part of the line, at each end
+    )  # fraction of the line, at each end
     return np.asarray(lines + fraction[:, :, None] * (lines[:, ::-1] - lines))
 
 

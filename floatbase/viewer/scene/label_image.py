@@ -13,8 +13,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from floatbase.viewer.scene.colours import RGB
 
-FONT_SIZE = 28  # height of a letter, pixels
-_SUBSCRIPT_SCALE = 0.68  # size of a subscript, over that of the text
+FONT_SIZE = 28  # pixels, height of a letter
+_SUBSCRIPT_SCALE = 0.68  # size of a subscript, as a fraction of that of the text
 
 
 def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
@@ -34,7 +34,7 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
     ndarray, shape (height, width, 2)
         Grey value and opacity of each pixel, 0 to 255.
     """
-    # re.split with a group returns text and subscripts in turn
+    # re.split with a group returns text and subscripts alternately
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
     widths = [font(is_subscript).getlength(part) for part, is_subscript in parts]
     margin = FONT_SIZE // 3

@@ -33,7 +33,7 @@ def kinds(picture: Picture) -> set[str]:
     }
 
 
-@lru_cache(maxsize=64)  # most pictures show what the one before did
+@lru_cache(maxsize=64)  # most pictures show the same kinds as the previous one
 def command(
     shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tuple[Entry, ...] = ()
 ) -> protocol.Update:

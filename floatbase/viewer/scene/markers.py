@@ -33,9 +33,10 @@ _CONE_CONSTRAINTS = (
     "friction",
     "normal force",
     "largest normal force",
-)  # kinds of the rows whose prices are shown
-_LEAST_SHOWN = 1e-3  # part of the dearest row's price below which a label would only hide others
-OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
+)  # kinds of the constraints whose multipliers are shown
+# fraction of the largest multiplier: labels of smaller ones would only hide others
+_LEAST_SHOWN = 1e-3
+OUTLINE = 0.6  # width of the outline of a push, as a fraction of the radius of its shaft
 
 
 def wrench(
@@ -219,7 +220,7 @@ def multiplier_labels(
         contacts.point_names
     ):
         raise InputError(
-            "the solution is not one of these contacts: give contacts and solution of the same "
+            "The solution is not for these contacts. Give contacts and solution of the same "
             "command."
         )
     picture: Picture = {}
@@ -239,7 +240,7 @@ def multiplier_labels(
         )
         at = (
             np.asarray(positions)[i] + height / 1.5 * to_facet
-        )  # the centroid of a triangle with its tip in the point
+        )  # the centroid of a triangle with its tip at the point
         picture[f"/{name.replace('/', '_')}"] = label(
             at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size
         )

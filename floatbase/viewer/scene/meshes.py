@@ -70,7 +70,7 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
         ImportError,
         ValueError,
         OSError,
-    ):  # no trimesh, or files that it or Pinocchio cannot read
+    ):  # no trimesh, or files that trimesh or Pinocchio cannot read
         meshes = []
     return meshes or _from_tree(robot)
 

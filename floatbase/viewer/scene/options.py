@@ -89,7 +89,7 @@ class PictureOptions:
         if self.push is not None:
             if not isinstance(self.push, tuple | list) or len(self.push) != 2:
                 raise InputError(
-                    f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not '
+                    f'push must be a frame and a force, such as ("base", [0.0, 30.0, 0.0]), not '
                     f"{short_repr(self.push)}."
                 )
             as_array("force of the push", self.push[1], (3,), "N")
@@ -101,6 +101,6 @@ class PictureOptions:
             isinstance(item, Item) for item in (self.extra or {}).values()
         ):
             raise InputError(
-                f"extra must be a picture, path -> item, as shapes and markers make them, not "
+                f"extra must be a picture, path -> item, as made by shapes and markers, not "
                 f"{short_repr(self.extra)}."
             )

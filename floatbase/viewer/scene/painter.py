@@ -26,10 +26,10 @@ from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
 from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
 
-# radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not
-# meet
+# radius of a cone at a corner of a flat foot, as a fraction of the distance to the next corner: the
+# cones do not meet
 CORNER_RADIUS = 0.48
-MIN_FORCE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor judged
+MIN_FORCE = 1e-3  # fraction of the robot's weight: a smaller force is neither drawn nor judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -451,6 +451,6 @@ class Painter:
         identities = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
         if identities[0] != identities[1]:
             raise InputError(
-                f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer "
+                f"This viewer shows {self.robot}, but the {what} belongs to {robot}. Make a Viewer "
                 f"for that robot."
             )

@@ -31,7 +31,7 @@ TYPES = (
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
-_MAX_CONTROL_VALUE = 1e18  # of what a slider may report: MessagePack's whole numbers end at 1.8e19
+_MAX_CONTROL_VALUE = 1e18  # of a slider: MessagePack's integers end at 1.8e19
 _FLOAT32 = np.dtype(
     [("code", "u1"), ("value", ">f4")]
 )  # MessagePack: the byte 0xca, then a big-endian float
@@ -57,7 +57,7 @@ def encode(command: Mapping[str, Any]) -> Update:
     """
     kind = command.get("type")
     if kind not in TYPES:
-        raise ViewerError(f"unknown viewer command {kind!r}; known: {', '.join(TYPES)}.")
+        raise ViewerError(f"Unknown viewer command {kind!r}. Known commands: {', '.join(TYPES)}.")
     path = normal_path(command.get("path", ""))
     return (path, kind, str(command.get("property", command.get("name", "")))), umsgpack.packb(
         dict(command)
@@ -88,7 +88,7 @@ def set_transform(path: str, matrix: Array) -> Update:
     return key, head + numbers.tobytes()
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _transform_head(path: str) -> tuple[Key, bytes]:
     """Return the key of the transforms at a path, and the first part of their bytes."""
     path = normal_path(path)
@@ -350,7 +350,7 @@ def checked_control_value(command: dict[str, Any], value: Any) -> Any:
         or not isinstance(value, int | float)
         or not abs(value) < _MAX_CONTROL_VALUE
     ):
-        raise ViewerError(f"the control {command['name']!r} cannot be {value!r}.")
+        raise ViewerError(f"The control {command['name']!r} cannot have the value {value!r}.")
     if "choices" in command:
         return min(max(round(value), 0), len(command["choices"]) - 1)
     return (
@@ -366,7 +366,7 @@ def _to_threejs(point: npt.ArrayLike) -> list[float]:
     return [x, z, -y]
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def normal_path(path: str) -> str:
     """Return the path with one leading slash and no empty parts.
 

@@ -30,7 +30,7 @@ from floatbase.viewer.scene.colours import (
 )
 from floatbase.viewer.scene.threejs import Shape
 
-# width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+# width of an arrow's shaft divided by its length, for an arrow of length `ARROW_LENGTH`
 ARROW_SLENDERNESS = 0.085
 ARROW_LENGTH = 0.2  # m
 
@@ -80,14 +80,14 @@ def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
     return {_normal_path(path): item for path, item in picture.items()}
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _normal_path(path: str) -> str:
     """Return a path without empty parts; raise `InputError` if nothing remains."""
     normal = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
     if not normal:
         raise InputError(
-            f"the path {path!r} in a picture has no name; give it one, as prefixed('a name', "
-            f"items) does."
+            f"The path {path!r} in a picture has no name. Give it one, as in "
+            f"prefixed('name', items)."
         )
     return normal
 
@@ -161,7 +161,7 @@ def transform(
     if not math.isfinite(matrix.sum()):
         as_array("position in the picture", position, (3,), "m")
         raise InputError(
-            f"axes or size of a shape at {position!r} are not finite numbers: "
+            f"The rotation or scale of a shape at {position!r} is not finite: "
             f"{matrix[:3, :3].tolist()}."
         )
     return matrix
@@ -193,7 +193,9 @@ def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
     if not 1e-12 < length < math.inf:
         as_array(f"the vector of {what}", vector, (3,), "m")
-        raise InputError(f"{what} of no length points nowhere: leave it out of the picture.")
+        raise InputError(
+            f"The vector of {what} is zero, so it has no direction. Leave it out of the picture."
+        )
     return array, length
 
 
@@ -497,7 +499,7 @@ def scale_bar(
     thick = 0.012 * size
     text_at = start + np.array(
         [length / 2, 0.17 * size, 0.03 * size]
-    )  # beside it: from its end the bar is short
+    )  # beside the bar, which looks short when seen from its end
     picture = {
         "/bar": Item(
             unit_shapes.cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
@@ -511,7 +513,7 @@ def scale_bar(
         )
     words = unit_shapes.label(
         f"{force:g} N", 0.055 * size, True, colour, False
-    )  # behind the robot where the bar is
+    )  # hidden by the robot, as the bar is
     return picture | {"/label": Item(words, transform(text_at))}
 
 
@@ -564,7 +566,7 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     """
     points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
-        raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
+        raise InputError(f"A polygon needs at least three corners, not {len(points)}.")
     return unit_shapes.polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
 
 
@@ -620,7 +622,7 @@ def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
         Start and end of each segment [m].
     """
     at = np.arange(-half, half + step / 2, step)
-    # each line in pieces of one step: software renderers lose lines that begin far behind the
+    # each line in pieces of one step: software renderers drop lines that begin far behind the
     # camera
     start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)

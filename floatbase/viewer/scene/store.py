@@ -67,7 +67,7 @@ class Scene:
         """
         control = self.command(("/", "set_control", name)) if isinstance(name, str) else None
         if control is None:
-            raise ViewerError(f"there is no control {name!r}.")
+            raise ViewerError(f"There is no control {name!r}.")
         value = checked_control_value(control, value)
         if value is not None:
             self.put(

@@ -240,7 +240,7 @@ def label(
     }
     data = _object("Sprite", None, material)
     data["images"] = [{"uuid": "image", "url": image}]
-    # 1025: two bytes a pixel, grey and alpha; 1006: smooth when scaled
+    # 1025: two bytes per pixel, grey and alpha; 1006: smooth scaling
     texture = {
         "uuid": "texture",
         "image": "image",

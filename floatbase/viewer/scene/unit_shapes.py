@@ -15,7 +15,7 @@ from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CONE_ALPHA, PATCH, RGB, WARNING
 from floatbase.viewer.scene.threejs import Shape
 
-_RIM = 0.025  # thickness of a rim, over the radius of the mouth
+_RIM = 0.025  # thickness of a rim, as a fraction of the radius of the mouth
 FACET_ALPHA = 0.75
 ARROW = (
     (0.0, 0.0),
@@ -23,7 +23,7 @@ ARROW = (
     (1.0, 0.78),
     (2.1, 0.78),
     (0.0, 1.0),
-)  # (radius, height), 1 long, its shaft of radius 1
+)  # (radius, height) of the corners; length 1, shaft of radius 1
 
 
 @lru_cache(maxsize=64)
