@@ -22,7 +22,6 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
 from floatbase.lessons.publish.site import (
     add_links,
-    docstrings,
     mathml,
     prepare_lesson,
     run_lessons,
@@ -231,9 +230,11 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
     assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
     assert list(image.data) == ["image/png"]
     assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
-    assert "*a* or *b*" in asked.source and "(../run.md)" in asked.source
+    assert "*a* or *b*" in asked.source and "(../installation.md)" in asked.source
     assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
-    assert {check.cell_type, said.cell_type} == {"markdown"} and "(../run.md)" in check.source
+    assert {check.cell_type, said.cell_type} == {
+        "markdown"
+    } and "(../installation.md)" in check.source
     assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")
 
 
@@ -264,18 +265,6 @@ def test_links_leave_code_formulas_and_links_as_they_are() -> None:
         "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note "
         "12](#notes-of-the-document)"
     )
-
-
-def test_a_docstring_becomes_text_lists_and_links() -> None:
-    text = (
-        "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no "
-        "parameter.\n\n    code = 1\n"
-    )
-    made = docstrings.to_restructured_text(text, ["mu", "a", "b"])
-    assert ":ref:`(9) <eq-9>`" in made
-    assert r"A \* b\_i" in made and ":py:obj:`Contacts <floatbase.dynamics.Contacts>`" in made
-    assert "* ``mu``: of friction.\n* ``a``, ``b``: two lines." in made
-    assert "\n\nx: no parameter." in made and "::\n\n    code = 1" in made
 
 
 def test_every_formula_of_the_course_becomes_mathml() -> None:

@@ -217,15 +217,15 @@ class PerturbedSimulation(Simulation):
 
         Parameters
         ----------
-        geoms : ndarray
-            Numbers of the two geoms of each contact that MuJoCo has found.
-        contact_frame_forces : ndarray
+        geoms : ndarray, shape (N, n, 2)
+            Ground and foot geom of up to n contacts at N instants.
+        contact_frame_forces : ndarray, shape (N, 3 n)
             Forces in MuJoCo's contact frames [N].
 
         Returns
         -------
-        ndarray
-            Forces between ground and feet in the world frame [N].
+        ndarray, shape (N, n_points, 3)
+            Forces of the ground on the contact points in the world frame [N].
         """
         forces = super().contact_forces_of(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:

@@ -168,7 +168,7 @@ def six_digits(x: float) -> float:
     Parameters
     ----------
     x : float
-        Number to round.
+        Number to round [-].
 
     Returns
     -------

@@ -150,7 +150,7 @@ NO_FILE = (
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
 def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
     (learner / "a.json").write_text(text)
-    with pytest.raises(InputError, match="is not a file that hand_in"):
+    with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
     with pytest.raises(InputError, match="cannot be read"):
         grades.grade_file(learner / "none.json")
@@ -179,13 +179,13 @@ def test_a_class_is_one_table(learner: Path) -> None:
     assert (
         said.stdout.count("1 of ") == 3
         and "Émilie du Châtelet" in said.stdout
-        and "holiday.json is not a file" in said.stderr
+        and "holiday.json was not written" in said.stderr
     )
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
     assert len(rows) == 3 * len(all_exercises())
     assert {row["file"] for row in rows} == {Path(file).name for file in files}
     assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
-    with pytest.raises(InputError, match="No file is left to judge"):
+    with pytest.raises(InputError, match="There is no file to grade"):
         grades.grade_files([learner / "holiday.json"])
 
 

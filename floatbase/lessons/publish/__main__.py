@@ -1,6 +1,4 @@
-"""`python -m floatbase.lessons.publish`: run, map and publish the lessons, and prepare a learner's
-copy of them.
-"""
+"""Command line of the course: run, map and publish lessons, grade answers, copy lessons."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ SOLUTIONS = Path("build/solutions")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command. arguments: those of the command line by default."""
+    """Run the command of the command line, or of `arguments`."""
     parser = argparse.ArgumentParser(
         prog="python -m floatbase.lessons.publish", description=__doc__
     )
@@ -30,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     stored = commands.add_parser("run", help="run lessons and store what they print")
     stored.add_argument(
-        "lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default"
+        "lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="the whole course by default"
     )
     commands.add_parser(
         "map", help="write equations.md, conventions.md and the README's table of lessons"
@@ -41,16 +39,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         nargs="*",
         type=Path,
         metavar="NOTEBOOK",
-        help="those that it has; all by default",
+        help="lessons to include; all by default",
     )
     shown.add_argument(
-        "--stored", action="store_true", help="run none; show what the notebooks hold"
+        "--stored", action="store_true", help="run no lessons; use the stored outputs"
     )
     shown.add_argument(
         "--to", type=Path, metavar="FOLDER", help="where to write, build/site by default"
     )
     measured = commands.add_parser(
-        "push-recovery", help="measure the push roses of lessons, such as 05, anew"
+        "push-recovery", help="measure the push-recovery maps of lessons, such as 05, again"
     )
     measured.add_argument("lessons", nargs="+", metavar="LESSON")
     keys = commands.add_parser(
@@ -64,24 +62,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         help=f"where to write, {SOLUTIONS} by default",
     )
     graded = commands.add_parser(
-        "grade", help="judge the answers in files that learners wrote by hand_in(…)"
+        "grade", help="grade the files that learners wrote with hand_in(…)"
     )
     graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
     graded.add_argument(
-        "--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too"
+        "--table", type=Path, metavar="CSV", help="also write a row per learner and exercise"
     )
-    graded.add_argument(
-        "--code", action="store_true", help="print code that was handed in, to be read"
-    )
-    laid = commands.add_parser(
-        "workspace", help="bring the learner's copy of the course up to date"
-    )
+    graded.add_argument("--code", action="store_true", help="print the code that was handed in")
+    laid = commands.add_parser("workspace", help="update the learner's copy of the course")
     laid.add_argument(
         "--to",
         type=Path,
         default=None,
         metavar="FOLDER",
-        help="where that is, notebooks/my by default",
+        help="folder of the copy, notebooks/my by default",
     )
 
     given = parser.parse_args(arguments)

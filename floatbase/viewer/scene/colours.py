@@ -122,7 +122,7 @@ def with_alpha(colour: RGB, alpha: float) -> RGBA:
     colour : tuple of float
         RGB, from 0 to 1.
     alpha : float
-        Opacity: 0 is invisible, 1 is opaque.
+        Opacity [-]: 0 is invisible, 1 is opaque.
 
     Returns
     -------

@@ -19,9 +19,9 @@ class Forces:
     Parameters
     ----------
     measured : ndarray, shape (n, 3), or None
-        Measured forces.
+        Measured forces [N].
     planned : ndarray, shape (n, 3), or None
-        Planned forces.
+        Planned forces [N].
     """
 
     measured: Array | None

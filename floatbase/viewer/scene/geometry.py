@@ -227,7 +227,7 @@ def round_1_2_5(value: float) -> float:
     Parameters
     ----------
     value : float
-        Positive number.
+        Positive number [-].
 
     Returns
     -------

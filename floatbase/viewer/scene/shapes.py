@@ -138,7 +138,7 @@ def transform(
     rotation : array_like, shape (3, 3), optional
         Rotation. By default, the identity.
     scale : float or array_like, shape (3,), optional
-        Scale along the shape's own axes.
+        Scale along the shape's own axes [-].
 
     Returns
     -------
@@ -319,7 +319,7 @@ def friction_polyhedron(
         Height, as for `friction_cone` [m].
     status : {"idle", "inside", "active", "outside"}
         Status of the force, as for `friction_cone`.
-    active : array_like, optional
+    active : array_like, shape (m,), optional
         Indices of the facets that have the colour of an active constraint.
 
     Returns
@@ -552,7 +552,7 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
     colour : tuple of float
         RGB.
     opacity : float
-        Opacity, from 0 to 1.
+        Opacity, from 0 to 1 [-].
 
     Returns
     -------

@@ -128,7 +128,7 @@ def mesh(
     colours : array_like, shape (n, 3), optional
         RGB of each vertex, 0 to 255. By default, the mesh has one colour.
     opacity : float, optional
-        Opacity: 0 is invisible, 1 is opaque.
+        Opacity [-]: 0 is invisible, 1 is opaque.
     flat : bool, optional
         Whether each triangle has one shade, so that edges look sharp.
     lit : bool, optional
@@ -179,7 +179,7 @@ def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
     colour : tuple of float
         RGB.
     opacity : float, optional
-        Opacity, from 0 to 1.
+        Opacity, from 0 to 1 [-].
 
     Returns
     -------

@@ -35,7 +35,7 @@ def arrow(colour: RGB, opacity: float) -> Shape:
     colour : tuple of float
         RGB.
     opacity : float
-        Opacity, from 0 to 1.
+        Opacity, from 0 to 1 [-].
 
     Returns
     -------
@@ -260,7 +260,7 @@ def polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float)
     colour : tuple of float
         RGB.
     opacity : float
-        Opacity, from 0 to 1.
+        Opacity, from 0 to 1 [-].
 
     Returns
     -------
