@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Exercise, NumericJudge
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import NumericJudge
 from floatbase.robots import Robot
 
 UP = 2.0  # m/s², the acceleration asked for

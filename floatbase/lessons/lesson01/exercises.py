@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import fixed_frame
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
     format_vector,
 )
 from floatbase.lessons.lesson01.pictures import PRESSING_POSTURE
@@ -115,13 +114,11 @@ def _in_proportion() -> float:
     return float(PLATE_SIZE[0] * (_by_levers() + twice) / (PLATE_SIZE[0] + twice))
 
 
-def _judge_thrust(answer: Any) -> Verdict:
+@array_judge((4, 3), (12,))
+def _judge_thrust(f: Array) -> Verdict:
     """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the
     centre of mass.
     """
-    f = array_or_verdict(answer, (4, 3), (12,))
-    if isinstance(f, Verdict):
-        return f
     f = f.reshape(4, 3)
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))

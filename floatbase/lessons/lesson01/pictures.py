@@ -12,7 +12,7 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import props
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.lessons.rounding import rounded
 from floatbase.objectives import Task, centroidal_momentum_rate

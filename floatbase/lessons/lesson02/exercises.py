@@ -10,10 +10,10 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     NO_ANSWER,
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,

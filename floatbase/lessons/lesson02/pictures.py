@@ -16,7 +16,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons import props
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.lessons.lesson02.helpers import DISC_RADIUS, parking_states, rolling_wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot

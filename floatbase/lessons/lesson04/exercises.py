@@ -10,9 +10,9 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
@@ -227,7 +227,6 @@ EXERCISES = (
                 "torques.",
                 (3,): "3 numbers: that is the residual. Two steps are left to come back to the "
                 "torques.",
-                (12, 1): "This is a matrix with one column; the answer is a vector of shape (12,).",
                 (12, 12): "That is a curvature, shape (12, 12); the gradient is a vector.",
             },
         ),

@@ -11,13 +11,13 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
 )
 from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
@@ -85,11 +85,9 @@ def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
     return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
 
 
-def _judge_forces(answer: Any) -> Verdict:
+@array_judge((12,))
+def _judge_forces(given: Array) -> Verdict:
     """Any forces that do what exercise 06.4 states, judged with forces and levers one by one."""
-    given = array_or_verdict(answer, (12,))
-    if isinstance(given, Verdict):
-        return given
     f = given.reshape(4, 3)
     return _out_of_balance(f) or _judge_margins(f)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,13 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
     lasting_or_verdict,
 )
 from floatbase.lessons.lesson09.helpers import (
@@ -132,11 +131,9 @@ def run_lean(seconds: float, posture: float) -> Rollout:
     )
 
 
-def _judge_lean(answer: Any) -> Verdict:
+@array_judge((2,))
+def _judge_lean(given: Array) -> Verdict:
     """A lean, judged on the physics."""
-    given = array_or_verdict(answer, (2,))
-    if isinstance(given, Verdict):
-        return given
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
         return Verdict(

@@ -11,7 +11,8 @@ import floatbase as fb
 from floatbase._geometry import rotation_z
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
-from floatbase.lessons.exercises import Exercise, NumericJudge
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import NumericJudge
 
 PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
 CHILD_POSITION, CHILD_VELOCITY = (

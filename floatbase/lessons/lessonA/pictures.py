@@ -15,7 +15,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, view_from_rotating_frame
 from floatbase.lessons import props, svg
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, shapes
 from floatbase.viewer.scene import geometry

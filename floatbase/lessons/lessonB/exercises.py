@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
 from floatbase.lessons.lessonB.helpers import push_response
 from floatbase.lessons.rounding import rounded
 
@@ -39,13 +39,11 @@ def _valve_opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array
     return lambda: np.asarray(GAIN * error(WANTED / LEVER, GOT / LEVER))
 
 
-def _judge_gains(answer: Any) -> Verdict:
+@array_judge((2,))
+def _judge_gains(given: Array) -> Verdict:
     """Whether go2 on 5 Hz comes back to within a millimetre; if not, what kind of mistake the gains
     look like.
     """
-    given = array_or_verdict(answer, (2,))
-    if isinstance(given, Verdict):
-        return given
     kp, kd = map(float, given)
     if min(kp, kd) <= 0.0:
         return Verdict(

@@ -8,12 +8,8 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import (
-    Example,
-    Exercise,
-    NumericJudge,
-    Verdict,
-)
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict
 from floatbase.lessons.lessonC.helpers import braking_qp
 from floatbase.lessons.lessonC.verdicts import judge_drop, judge_step
 from floatbase.qp import QP, active_set

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase.lessons.exercises import Verdict, function_or_verdict
+from floatbase.lessons.judges import Verdict, function_or_verdict
 
 _CLOSE = 1e-6  # of lengths, which are between 0 and 1
 

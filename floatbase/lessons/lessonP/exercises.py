@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
 from floatbase.lessons.lessonP.helpers import (
     BAG_MASS,
     HIDDEN_MASS,
@@ -60,11 +60,9 @@ _STIFFNESS = {
 }
 
 
-def _judge_stiffness(answer: Any) -> Verdict:
+@array_judge(())
+def _judge_stiffness(given: Array) -> Verdict:
     """Physics decides: go2 with the bag, and this kp."""
-    given = array_or_verdict(answer, ())
-    if isinstance(given, Verdict):
-        return given
     kp = float(given)
     if kp <= 0.0:
         return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
@@ -161,11 +159,9 @@ _SHIFT = NumericJudge(
 )
 
 
-def _judge_shift(answer: Any) -> Verdict:
+@array_judge((3,))
+def _judge_shift(given: Array) -> Verdict:
     """Geometry, and then physics: how long it stands on two feet."""
-    given = array_or_verdict(answer, (3,))
-    if isinstance(given, Verdict):
-        return given
     if abs(given[2]) > HEIGHT:
         return Verdict(
             False,

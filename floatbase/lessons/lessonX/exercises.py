@@ -12,14 +12,8 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import (
-    Example,
-    Exercise,
-    NumericJudge,
-    ShapeJudge,
-    Verdict,
-    function_or_verdict,
-)
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, ShapeJudge, Verdict, function_or_verdict
 from floatbase.lessons.lessonX import investigation
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase.lessons.exercises import Verdict
+from floatbase.lessons.judges import Verdict
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import DRIFT_TIME, FAULTS, MU, Case
 from floatbase.lessons.lessonX.diagnostics import ground_normal
