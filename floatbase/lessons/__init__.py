@@ -1,6 +1,4 @@
-"""What the lessons share: predictions, exercises that check themselves, panels that do not block
-the kernel, controllers.
-"""
+"""Shared parts of the lessons: predictions, exercises, slider panels and simple controllers."""
 
 import os
 from importlib import import_module
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     )
     from floatbase.lessons.submission import hand_in
 
-# imported at first use: they load physics and pictures
+# imported on first use, because they load the physics and the viewer
 _LAZY = {
     "hand_in": "submission",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
@@ -90,4 +88,4 @@ def __getattr__(name: str) -> Any:
 
 
 if os.environ.get("FLOATBASE_VIEWER") == "site":
-    import_module("floatbase.lessons.static_export")  # tells viewers how they display themselves
+    import_module("floatbase.lessons.static_export")  # registers how viewers display themselves

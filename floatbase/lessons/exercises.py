@@ -1,8 +1,7 @@
-"""Exercises that check themselves: `check` says right, or what kind of mistake it looks like,
-without giving the answer.
+"""Exercises that check themselves and give hints without giving the answer away.
 
-An exercise stands once, in the file `exercises` of its lesson: statement, stub, solution, judge.
-The judge computes the right value by other expressions than the solution does.
+Each exercise is defined once, in the module `exercises` of its lesson, with its statement, stub,
+solution and judge. The judge computes the right value in a different way from the solution.
 """
 
 from __future__ import annotations
@@ -22,22 +21,33 @@ from floatbase.errors import unknown_name
 from floatbase.lessons import progress
 from floatbase.lessons.judges import Example, Verdict, array_or_verdict
 
-TRIES_BEFORE_REVEAL = 2  # so many before `reveal` shows a solution
+TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
 
 @dataclass(frozen=True, eq=False)
 class Exercise:
-    """One exercise of a lesson.
+    """Exercise of a lesson.
 
-    name: of the lesson, and its own number, "01.2" or "C.2".
-    statement: what is to be found, with shape, unit and frame.
-    stub: the code that a learner starts from; it runs.
-    solution: the code that replaces the stub.
-    judge: answer -> `Verdict`.
-    examples: gives answers, and the names of the hints that they must get, beside those that the
-        judge gives itself.
-    explanation: why the solution is right, shown with it.
-    namespace: gives what the stub uses of the lesson, name -> value; numpy it has.
+    Parameters
+    ----------
+    name : str
+        Name of the lesson and number of the exercise, such as "01.2" or "C.2".
+    statement : str
+        What the learner has to find, with shape, unit and frame.
+    stub : str
+        Code that the learner starts from; it runs.
+    solution : str
+        Code that replaces the stub.
+    judge : callable
+        Function that takes an answer and returns a `Verdict`.
+    explanation : str
+        Why the solution is right; it is shown with the solution.
+    namespace : callable
+        Function without arguments that returns the names of the lesson that the stub uses, with
+        their values. NumPy is available as `np`.
+    examples : callable
+        Function without arguments that returns answers with the names of the hints that they must
+        get, in addition to the examples of the judge.
     """
 
     name: str
@@ -50,14 +60,20 @@ class Exercise:
     examples: Callable[[], Iterable[Example]] = tuple
 
     def placeholder(self) -> Any:
-        """What stands there before anybody answers: the stub's variable, or a tuple of them."""
+        """Return the answer in the stub: its variable, or a tuple if it has several."""
         made: dict[str, Any] = {}
         exec(self.stub, {"np": np, **self.namespace()}, made)
         return tuple(made.values()) if len(made) > 1 else next(iter(made.values()))
 
 
 def all_exercises() -> dict[str, Exercise]:
-    """All exercises of all lessons: name, such as "00.1", -> `Exercise`."""
+    """Return all exercises of all lessons.
+
+    Returns
+    -------
+    dict of str to Exercise
+        The exercises by name, such as "00.1", in order.
+    """
     found: dict[str, Exercise] = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         if module.name.startswith("lesson"):
@@ -67,10 +83,26 @@ def all_exercises() -> dict[str, Exercise]:
 
 
 def check(name: str, answer: Any) -> Verdict:
-    """Judge an answer to the exercise of that name, such as "00.1", and count the try; an unchanged
-    stub is none.
+    """Check an answer to an exercise and record the try.
 
-    Raises `UnknownNameError` for a name that does not exist.
+    An unchanged stub does not count as a try.
+
+    Parameters
+    ----------
+    name : str
+        Name of the exercise, such as "00.1".
+    answer : object
+        The answer: a number, an array or whatever the exercise asks for.
+
+    Returns
+    -------
+    Verdict
+        Whether the answer is right, and a comment. A notebook shows it as a line of text.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such exercise.
     """
     exercise = _find_exercise(name)
     verdict = exercise.judge(answer)
@@ -84,13 +116,24 @@ def check(name: str, answer: Any) -> Verdict:
 
 
 def reveal(name: str) -> None:
-    """Print the solution of an exercise and why, once it has been tried twice or solved."""
+    """Print the solution of an exercise and its explanation, after two tries or a right answer.
+
+    Parameters
+    ----------
+    name : str
+        Name of the exercise, such as "00.1".
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such exercise.
+    """
     exercise, tried = _find_exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
     if tried["tries"] < TRIES_BEFORE_REVEAL and not tried["right"]:
         remaining = TRIES_BEFORE_REVEAL - tried["tries"]
         print(
-            f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) on an '
-            f"answer of your own."
+            f'Try {"once" if remaining == 1 else "twice"} more first: run check("{name}", …) with '
+            f"your own answer."
         )
         return
     print(exercise.solution)
@@ -99,8 +142,9 @@ def reveal(name: str) -> None:
 
 
 def show_progress() -> None:
-    """Print what was solved, lesson by lesson: ✓ solved, ✗ tried, · not tried; and why tries cannot
-    be kept, if so.
+    """Print the progress in each lesson: ✓ solved, ✗ tried, · not tried.
+
+    If tries cannot be saved, the reason is printed as well.
     """
     tried, known = progress.load(), all_exercises()
     marks = {name: _progress_mark(tried.get(name)) for name in known}
@@ -113,8 +157,9 @@ def show_progress() -> None:
 
 
 def _is_placeholder(answer: Any, placeholder: Any) -> bool:
-    """Whether an answer is the placeholder still, up to the rounding of another machine; a function
-    by its code.
+    """Return whether an answer is still the placeholder.
+
+    Numbers may differ by rounding on another machine. Functions are compared by their code.
     """
     if isinstance(placeholder, FunctionType):
         return _bytecode(answer) == _bytecode(placeholder)
@@ -130,9 +175,7 @@ def _is_placeholder(answer: Any, placeholder: Any) -> bool:
 
 
 def _bytecode(function: Any) -> tuple[Any, ...] | None:
-    """What a function does, whatever it is called and wherever it stands; None for anything but a
-    function in Python.
-    """
+    """Return the code of a Python function without its name and place; None for anything else."""
     code = getattr(function, "__code__", None)
     return code and (code.co_code, code.co_consts, code.co_names, code.co_varnames)
 

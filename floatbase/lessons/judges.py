@@ -1,4 +1,4 @@
-"""Judges of exercises: what is said of an answer, without giving the right one away."""
+"""Judges of exercises: comments on an answer that do not give the solution away."""
 
 from __future__ import annotations
 
@@ -18,17 +18,24 @@ from floatbase.lessons.rounding import rounded
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-NEAR_MISS = 0.02  # of the right value: as much as a number with two digits may spoil
-Example: TypeAlias = tuple[
-    Any, str
-]  # an answer, and the name of the hint that it must get; "" where it is right
+# fraction of the right value: the error that rounding a number to two digits may cause
+NEAR_MISS = 0.02
+# an answer, and the name of the hint that it must get; "" for a right answer
+Example: TypeAlias = tuple[Any, str]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What `check` answers; a notebook shows it as a line of text.
+    """Result of a check. A notebook shows it as a line of text.
 
-    hint: the name of the mistake that the text speaks of; "" where the answer is right.
+    Parameters
+    ----------
+    right : bool
+        Whether the answer is right.
+    text : str
+        The comment for the learner.
+    hint : str
+        Name of the mistake that the text is about; "" if the answer is right.
     """
 
     right: bool
@@ -40,16 +47,28 @@ class Verdict:
 
 
 NO_ANSWER = Verdict(
-    False, "There is no answer yet: replace the placeholder by your expression.", "no_answer"
+    False, "There is no answer yet. Replace the placeholder by your expression.", "no_answer"
 )
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
-    """The least point, (n,), of a cost that a learner gives, or a `Verdict` that says what is wrong
-    with the cost.
+    """Return the minimiser of a learner's cost, or a verdict that says what is wrong with the cost.
 
-    answer: whatever a learner may give. n: how many numbers it is to be on. block: their name.
-        hint: where they are others.
+    Parameters
+    ----------
+    answer : object
+        Any answer of a learner.
+    n : int
+        Number of variables that the cost must have.
+    block : str
+        Name of these variables, for the message.
+    hint : str, optional
+        Advice for a cost with another number of variables.
+
+    Returns
+    -------
+    ndarray, shape (n,), or Verdict
+        The minimiser, or what is wrong.
     """
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
@@ -57,26 +76,36 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
         given = type(answer).__name__
         return Verdict(
             False,
-            f"Give the cost, an fb.Quadratic on {block}, not its minimiser or {given}.",
+            f"The answer must be the cost, an fb.Quadratic on {block}, not {given}. Its "
+            f"minimiser is not asked for.",
             "no_cost",
         )
     if answer.n != n:
         return Verdict(
             False,
-            f"This is a cost on {answer.n} numbers; {block} has {n}.{hint and f' {hint}'}",
+            f"This cost has {answer.n} variables, but {block} has {n}.{hint and f' {hint}'}",
             "other_block",
         )
     try:
         return answer.minimiser()
     except FloatbaseError as error:
-        return Verdict(False, f"It has no least point: {error}", "no_least_point")
+        return Verdict(False, f"The cost has no minimum: {error}", "no_least_point")
 
 
 def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
-    """The answer as an array of finite numbers in one of `shapes`, or a `Verdict` that says what is
-    wrong with it.
+    """Return an answer as an array of finite numbers, or a verdict that says what is wrong with it.
 
-    answer: whatever a learner may give. shapes: those allowed; a message names the first.
+    Parameters
+    ----------
+    answer : object
+        Any answer of a learner.
+    *shapes : tuple of int
+        Shapes that are accepted; a message names the first.
+
+    Returns
+    -------
+    ndarray or Verdict
+        The numbers, or what is wrong.
     """
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
@@ -87,13 +116,15 @@ def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
         given = None
     if given is None:
         return Verdict(
-            False, f"The answer should be numbers; this is {type(answer).__name__}.", "not_numbers"
+            False, f"The answer must be numbers, not {type(answer).__name__}.", "not_numbers"
         )
     if given.shape not in shapes:
         return Verdict(False, _shape_error(given.shape, shapes[0]), "shape")
     if not np.all(np.abs(given) <= MAX_MAGNITUDE):
         return Verdict(
-            False, "The answer holds numbers that are not finite, or far too large.", "not_finite"
+            False,
+            "The answer contains numbers that are infinite, NaN or far too large.",
+            "not_finite",
         )
     return given
 
@@ -101,7 +132,18 @@ def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
 def array_judge(
     *shapes: tuple[int, ...],
 ) -> Callable[[Callable[[Array], Verdict]], Callable[[Any], Verdict]]:
-    """Turn a judge of arrays in one of `shapes` into a judge of any answer, as a decorator."""
+    """Decorate a judge of arrays, so that it judges any answer.
+
+    Parameters
+    ----------
+    *shapes : tuple of int
+        Shapes that are accepted; a message names the first.
+
+    Returns
+    -------
+    callable
+        The decorator. It turns a function of an array into a function of any answer.
+    """
 
     def decorate(judge: Callable[[Array], Verdict]) -> Callable[[Any], Verdict]:
         @wraps(judge)
@@ -115,25 +157,46 @@ def array_judge(
 
 
 def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
-    """The answer if it is a function, or a `Verdict` that says that it is none."""
+    """Return an answer that is a function, or a verdict that says that it is not.
+
+    Parameters
+    ----------
+    answer : object
+        Any answer of a learner.
+
+    Returns
+    -------
+    callable or Verdict
+        The function, or what is wrong.
+    """
     if answer is None or answer is Ellipsis:
         return Verdict(
-            False, "There is no answer yet: give your function, without brackets.", "no_answer"
+            False, "There is no answer yet. Give your function, without parentheses.", "no_answer"
         )
     if not callable(answer):
         return Verdict(
             False,
-            f"The answer is a function, written with def; this is {type(answer).__name__}.",
+            f"The answer must be a function, written with def, not {type(answer).__name__}.",
             "no_function",
         )
     return answer
 
 
 def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | Verdict:
-    """The record of a run on the physics, or a `Verdict` that says why there is none, or how it
-    ended early.
+    """Run a simulation, and return its record or a verdict that says why it failed or ended early.
 
-    run: raises `InputError` where the answer makes no run. why: ends the text about an early end.
+    Parameters
+    ----------
+    run : callable
+        Function without arguments that returns the `Rollout`. It raises `InputError` if the answer
+        cannot be simulated.
+    why : str, optional
+        Sentence that is added if the run ends early.
+
+    Returns
+    -------
+    Rollout or Verdict
+        The record, or what is wrong.
     """
     try:
         record = run()
@@ -142,47 +205,70 @@ def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | V
     if record.outcome == "completed":
         return record
     stood = rounded(record.time[-1], "s")
-    text = f"It does not last: {record.outcome} {stood} after the start.{why}"
+    text = f"The run ended early: {record.outcome} {stood} after the start.{why}"
     return Verdict(False, text, "falls")
 
 
 def _shape_error(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     if not expected:
-        return f"The answer is one number; this has shape {given}."
+        return f"The answer must be one number, but it has shape {given}."
     if not given:
-        return f"This is a single number; the answer should have shape {expected}."
+        return f"This is a single number. The answer must have shape {expected}."
     flat = sorted(given) == sorted((1, *expected))
-    column = " This is a matrix with one row or column: `.ravel()` makes it flat." if flat else ""
-    return f"The answer has shape {given}; it should have shape {expected}.{column}"
+    column = " It is a matrix with one row or column; `.ravel()` flattens it." if flat else ""
+    return f"The answer has shape {given}, but it must have shape {expected}.{column}"
 
 
 def format_vector(vector: npt.ArrayLike, digits: int = 0) -> str:
-    """A vector as text, such as "(1, 0, -2)", by `rounded`, but with so many decimals at most."""
+    """Write a vector as text, such as "(1, 0, -2)".
+
+    Parameters
+    ----------
+    vector : array_like, shape (n,)
+        The vector.
+    digits : int, optional
+        Maximum number of decimals.
+
+    Returns
+    -------
+    str
+        The text, formatted by `rounded`.
+    """
     return rounded(np.round(np.asarray(vector, dtype=np.float64), digits), digits=12, floor=0.0)
 
 
 _GENERAL = {
-    "nearly": "Nearly: less than 2 % off. Is a number in it rounded, or a small part left out?",
-    "sign": "The size is right, the sign is not: whose force, and in which direction?",
+    "nearly": "Close: less than 2 % off. Was a number rounded, or a small contribution left out?",
+    "sign": "The magnitude is right, but the sign is wrong. Which body does the force act on, "
+    "and in which direction?",
     "transpose": "This is the transpose of the answer.",
-    "unknown": "Neither right nor a mistake this check knows. Look at the units, then at the "
-    "statement again.",
-    "unknown_count": "Neither right nor a mistake this check knows. What is counted, and what is "
-    "left out or counted twice?",
+    "unknown": "This is not right, and it is not a mistake that this check recognises. Check "
+    "the units, then read the statement again.",
+    "unknown_count": "This is not right, and it is not a mistake that this check recognises. "
+    "What is counted? Is anything left out or counted twice?",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class NumericJudge:
-    """A judge of numbers and arrays.
+    """Judge of numbers and arrays.
 
-    right: computes the right value.
-    praise: what a right answer is told.
-    mistakes: name of a hint -> computes the value that this kind of mistake leads to.
-    hints: the same names -> what is said then.
-    tolerance: values whose difference is less than this part of the right value's largest number
-        count as equal.
-    is_count: the answer is a number of things, without sign or unit.
+    Parameters
+    ----------
+    right : callable
+        Function without arguments that computes the right value.
+    praise : str
+        Comment on a right answer.
+    mistakes : mapping of str to callable, optional
+        For each known mistake, by the name of its hint: a function that computes the value it leads
+        to.
+    hints : mapping of str to str, optional
+        For each known mistake: the comment on it.
+    tolerance : float, optional
+        Relative tolerance: two values are equal if they differ by at most this fraction of the
+        largest entry of the right value [-].
+    is_count : bool, optional
+        Whether the answer counts things, and so has neither a sign nor a unit.
     """
 
     right: Callable[[], Any]
@@ -193,6 +279,7 @@ class NumericJudge:
     is_count: bool = False
 
     def __call__(self, answer: Any) -> Verdict:
+        """Judge an answer."""
         right = np.asarray(self.right(), dtype=np.float64)
         given = array_or_verdict(answer, right.shape)
         if isinstance(given, Verdict):
@@ -206,12 +293,12 @@ class NumericJudge:
         return Verdict(False, _GENERAL[hint], hint)
 
     def examples(self) -> Iterator[Example]:
-        """The right answer, and one for each mistake."""
+        """Yield the right answer and one answer for each known mistake, each with its hint."""
         yield self.right(), ""
         yield from ((wrong(), hint) for hint, wrong in self.mistakes.items())
 
     def _of_any_answer(self, given: Array, right: Array) -> str:
-        """The hint, one of `_GENERAL`, for a wrong answer that is none of the known mistakes."""
+        """Return the general hint, a key of `_GENERAL`, for a wrong answer of no known kind."""
         if self.is_count:
             return "unknown_count"
         if self._equal(given, right, NEAR_MISS):
@@ -223,8 +310,9 @@ class NumericJudge:
         return "unknown"
 
     def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
-        """Whether they differ by less than this part of b's largest number, or than
-        `self.tolerance`, if that is more.
+        """Return whether two arrays are equal within a tolerance.
+
+        The tolerance is a fraction of the largest entry of b, and at least `self.tolerance`.
         """
         b, relative = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
         return a.shape == b.shape and bool(
@@ -234,16 +322,22 @@ class NumericJudge:
 
 @dataclass(frozen=True, eq=False)
 class ShapeJudge:
-    """A judge that knows what a wrong shape means, and leaves other shapes to `judge`.
+    """Judge that comments on known wrong shapes and leaves every other shape to another judge.
 
-    shapes: shape -> what is said of it. The hint's name is made of it, such as "shape_4x3", or
-        "shape_" of one number.
+    Parameters
+    ----------
+    judge : callable
+        Judge of the other shapes.
+    shapes : mapping of tuple to str
+        For each known wrong shape: the comment on it. The name of the hint is built from the shape,
+        such as "shape_4x3", or "shape_" for a single number.
     """
 
     judge: Callable[[Any], Verdict]
     shapes: Mapping[tuple[int, ...], str]
 
     def __call__(self, answer: Any) -> Verdict:
+        """Judge an answer."""
         try:
             shape = np.shape(answer)
         except ValueError:  # rows of different lengths
@@ -253,7 +347,7 @@ class ShapeJudge:
         return Verdict(False, self.shapes[shape], self._name(shape))
 
     def examples(self) -> Iterator[Example]:
-        """Those of `judge`, and an array of each wrong shape."""
+        """Yield the examples of `judge` and one array of each known wrong shape."""
         yield from getattr(self.judge, "examples", tuple)()
         yield from ((np.zeros(shape), self._name(shape)) for shape in self.shapes)
 

@@ -30,7 +30,7 @@ EXERCISES = (
         judge=NumericJudge(
             is_count=True,
             right=lambda: rank(fb.accelerations_from_torques(diagonal_stance_eom()).A),
-            praise="Two feet have one internal force, along the line between them; every other "
+            praise="Two feet have one internal force, along the line between them. Every other "
             "direction moves something.",
             mistakes={
                 "all": lambda: 12,
@@ -41,21 +41,20 @@ EXERCISES = (
                 "more_internal": lambda: 10,
             },
             hints={
-                "all": "That is all of them. One thing can be done between two feet that moves "
-                "nothing.",
-                "unmoving": "That is how many do not move it.",
-                "components": "That is the number of force components k; the answer is the number "
-                "of directions of β.",
-                "three_feet": "That is for three feet.",
-                "base_alone": "That is how many motions of the base two feet can stop; the legs "
-                "move, too.",
-                "more_internal": "You have counted more than one internal force. Which pushes of "
-                "two feet turn nothing?",
+                "all": "That is all of them. One action between two feet does not move anything.",
+                "unmoving": "That is the number of directions that do not move the robot.",
+                "components": "That is k, the number of force components. The answer is the "
+                "number of directions of β.",
+                "three_feet": "That is the number for three feet.",
+                "base_alone": "That is the number of motions of the base that two feet can "
+                "stop. The legs move, too.",
+                "more_internal": "You have counted more than one internal force. Which pairs of "
+                "forces at two feet have no moment?",
             },
         ),
-        explanation="d - r + rank J_b = 12 - 6 + 5: about the line through both feet no point foot "
-        "can stop the base from "
-        "turning, so J_b has rank 5, and 6 - 5 = 1 direction only squeezes.",
+        explanation="d - r + rank J_b = 12 - 6 + 5. Point feet cannot stop the base from "
+        "turning about the line through both feet, so J_b has rank 5. The remaining 6 - 5 = 1 "
+        "direction is an internal force.",
     ),
     Exercise(
         name="03.2",
@@ -66,44 +65,38 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=squeeze_torques,
-                praise="Internal forces are answered joint by joint, in any posture, at any "
+                praise="Internal forces are balanced joint by joint, in any posture, at any "
                 "velocity, without M and without h.",
                 mistakes={"zero": lambda: np.zeros(12)} | squeeze_mistakes(),
                 hints={
-                    "sign": "The sign: these torques squeeze the other way. Torques and forces "
-                    "must cancel in the joint rows "
-                    "of (7).",
-                    "transpose": "J instead of its transpose: J turns velocities of joints into "
-                    "velocities of feet, Jᵀ forces "
-                    "into torques.",
-                    "into_base": "The frame: J and the forces are both in world axes here; no "
-                    "rotation of the base is needed.",
-                    "out_of_base": "The frame: the forces are given in world axes already; the "
-                    "base's rotation takes them out "
-                    "of it.",
-                    "standing": "This is the J of the standing robot; `tilted` has another "
-                    "posture, so another J.",
-                    "h_too": "h is in it: that would hold the robot up as well. The answer is only "
-                    "what the squeeze adds.",
-                    "zero": "These are no torques at all, so the forces stay as they are.",
+                    "sign": "The sign is wrong: these torques squeeze in the opposite "
+                    "direction. Torques and forces must cancel in the joint rows of (7).",
+                    "transpose": "This uses J instead of its transpose. J maps joint velocities "
+                    "to foot velocities, and Jᵀ maps forces to torques.",
+                    "into_base": "The frame is wrong. J and the forces are both in world axes "
+                    "here, so no rotation of the base is needed.",
+                    "out_of_base": "The frame is wrong. The forces are in world axes already, "
+                    "and the rotation of the base takes them out of these axes.",
+                    "standing": "This is the J of the standing robot. `tilted` has another "
+                    "posture, so J differs.",
+                    "h_too": "This includes h, which would also carry the robot. The answer is "
+                    "only what the squeeze adds.",
+                    "zero": "All torques are zero, so the forces do not change.",
                 },
             ),
             {
-                (
-                    18,
-                ): "18 numbers: these are generalised forces of base and joints. Motors reach the "
-                "joints alone: see S.",
-                (6,): "6 numbers: those are the base columns of J. The base has no motors.",
+                (18,): "18 numbers are generalised forces of base and joints. Motors act only on "
+                "the joints: see S.",
+                (6,): "6 numbers are the base columns of J. The base has no motors.",
             },
         ),
-        explanation="In (7) nothing may change but τ and λ: 0 = S τ + Jᵀ λ. The base rows say that "
-        "λ is internal; the joint "
-        "rows give τ.",
+        explanation="In (7) only τ and λ may change: 0 = S τ + Jᵀ λ. The base rows say that λ "
+        "is internal, and the joint rows give τ.",
     ),
     Exercise(
         name="03.3",
-        statement="Redistribute the forces of the standing robot so that FL carries 20 N and the "
-        "robot does not move.",
+        statement="Redistribute the forces of the standing robot so that FL carries 20 N and "
+        "the robot does not move.",
         stub="new_forces = forces.copy()  # replace: shape (12,), N",
         solution="squeezes = internal_forces(eom)  # (12, 6)\n"
         "row = squeezes[2]  # what each of them does to the vertical force of FL\n"
@@ -111,13 +104,13 @@ EXERCISES = (
         judge=judge_unloading,
         namespace=lambda: {"forces": standing_forces()},
         examples=unloading_examples,
-        explanation="Every λ = λ₀ + N x keeps the robot still; x is the shortest vector with row x "
-        "= 20 - λ₀[2].",
+        explanation="Every λ = λ₀ + N x keeps the robot still. x is the shortest vector with "
+        "row x = 20 - λ₀[2].",
     ),
     Exercise(
         name="03.4",
-        statement="Build (11) for a moving solo8: one matrix of 20 rows, first v, then the columns "
-        "of V⊥.",
+        statement="Build (11) for a moving solo8: one matrix with 20 rows, first v, then the "
+        "columns of V⊥.",
         stub="all_pairs = np.zeros((20, 9))  # replace: v, then V⊥ (8 torques, then 12 forces)",
         solution="J_Minv = rising.J @ np.linalg.inv(rising.M)\n"
         "C = np.hstack([J_Minv @ rising.S, J_Minv @ rising.J.T])\n"
@@ -127,8 +120,8 @@ EXERCISES = (
         "all_pairs = np.column_stack([v, Vt[r:].T])",
         judge=judge_all_pairs,
         examples=pair_examples,
-        explanation="C has 12 rows and rank 10: two of its singular values are zero but for "
-        "rounding. They belong to no "
-        "direction of V∥, must not be divided by, and leave 20 - 10 directions to V⊥.",
+        explanation="C has 12 rows and rank 10, so two of its singular values are zero except "
+        "for rounding. They do not belong to a direction of V∥, and you must not divide by "
+        "them. So 20 - 10 directions remain for V⊥.",
     ),
 )

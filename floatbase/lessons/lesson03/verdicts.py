@@ -18,19 +18,23 @@ from floatbase.lessons.judges import Example, Verdict, array_judge, array_or_ver
 from floatbase.lessons.lesson03.helpers import rising_solo8_eom, standing_go2_eom, tilted_squeeze
 from floatbase.linear_algebra import RANK_TOLERANCE, rank
 
-# part of the largest number by which two solutions may differ: rounding leaves 1e-12, the mistakes
-# 1e-2
+# relative tolerance between two solutions: rounding errors are 1e-12, mistakes 1e-2
 TOLERANCE = 1e-5
 
 
 def diagonal_stance_eom() -> EquationsOfMotion:
-    """(7) of go2 standing on two feet."""
+    """Return the equations of motion of go2 standing on two feet.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     standing = standing_go2_eom()
     return fb.equations_of_motion(standing.state, standing.contacts.only("FL_foot", "RR_foot"))
 
 
 def squeeze_torques() -> Array:
-    """By the inverse of ζ, not by the transpose of J."""
+    """Compute the torques by the inverse of ζ, without the transpose of J."""
     eom, squeeze = tilted_squeeze()
     return np.linalg.solve(fb.forces_from_torques(eom).A, squeeze)
 
@@ -40,6 +44,8 @@ def _turned(forces: Array, R: Array) -> Array:
 
 
 def squeeze_mistakes() -> dict[str, Any]:
+    """Return for each hint a function that computes the torques of this mistake."""
+
     def torques(change: Any = lambda eom, f: f, after: Any = lambda eom, tau: tau) -> Any:
         def value() -> Array:
             eom, squeeze = tilted_squeeze()
@@ -58,38 +64,39 @@ def squeeze_mistakes() -> dict[str, Any]:
 
 
 def standing_forces() -> Array:
-    """The smallest forces, shape (12,), N, world, that carry the standing robot."""
+    """Return the smallest forces that carry the standing robot, shape (12,), world frame [N]."""
     eom = standing_go2_eom()
     return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=RANK_TOLERANCE)[0])
 
 
 @array_judge((12,))
 def judge_unloading(forces: Array) -> Verdict:
-    """Any forces will do that balance the standing robot and give FL its 20 N."""
+    """Judge forces that balance the standing robot with 20 N at FL."""
     eom = standing_go2_eom()
     before = standing_forces()
     if np.allclose(forces, before, atol=1e-3):
         return Verdict(
             False,
-            f"Nothing has changed yet: the front left foot still carries {forces[2]:.0f} N.",
+            f"Nothing has changed yet. The front left foot still carries {forces[2]:.0f} N.",
             "unchanged",
         )
     off = eom.h[:6] - eom.J[:, :6].T @ forces
     if abs(off[:3]).max() > 0.05:
         return Verdict(
             False,
-            "The forces no longer add up to the weight: what one foot loses, the others must take.",
+            "The forces no longer add up to the weight. When one foot carries less, the others "
+            "must carry more.",
             "weight",
         )
     if abs(off[3:]).max() > 0.01:
         return Verdict(
             False,
-            "The sum is right, but the moments are not: the body would turn. Add internal forces "
-            "only.",
+            "The sum is right, but the moments are not: the body would turn. Add only internal "
+            "forces.",
             "moments",
         )
     if abs(forces[2] - 20.0) > 0.05:
-        more = " That is more than before: mind the sign." if forces[2] > before[2] + 0.05 else ""
+        more = " That is more than before. Check the sign." if forces[2] > before[2] + 0.05 else ""
         return Verdict(
             False,
             f"The robot stays at rest, but the front left foot carries {forces[2]:.1f} N, not "
@@ -98,37 +105,43 @@ def judge_unloading(forces: Array) -> Verdict:
         )
     if forces[2::3].min() < 0.0:
         return Verdict(
-            False, "It balances, but some foot would have to pull on the ground.", "pulls"
+            False, "The forces are balanced, but a foot would have to pull on the ground.", "pulls"
         )
     return Verdict(
-        True, "The wobbling table: FL gives up 23 N, RR as well, and the other diagonal takes them."
+        True,
+        "This is the wobbling table: FL and RR each carry 23 N less, and the other "
+        "diagonal carries it.",
     )
 
 
 def _wrong_pairs() -> dict[tuple[str, str], Array]:
-    """Name of a hint, hint -> the shortest pair (τ, λ) that this mistake leads to, shape (20,)."""
+    """Return (name, text) of each hint and the shortest pair of this mistake, shape (20,)."""
     eom = rising_solo8_eom()
     C, right_side = torque_force_matrix(eom)
     J, M, h, S, b = eom.J, eom.M, eom.h, eom.S, eom.b
     shortest = np.linalg.pinv(C, rcond=RANK_TOLERANCE)
     not_inverted = np.linalg.pinv(np.hstack([J @ M @ S, J @ M @ J.T]), rcond=RANK_TOLERANCE)
     b_missing = (
-        "b is missing on the right of (10): solo8 moves, and its feet stay only with J q̈ "
-        "= b, not 0."
+        "b is missing on the right-hand side of (10). solo8 moves, and its feet stay in place only "
+        "with J q̈ = b, not 0."
     )
     M_not_inverted = (
-        "M is not inverted: a force is divided by the inertia, so J M⁻¹ it is, not J M."
+        "M is not inverted. A force is divided by the inertia, so it must be J M⁻¹, not J M."
     )
     return {
         ("b_missing", b_missing): shortest @ (right_side - b),
-        ("h_missing", "h is missing on the right of (10): this robot has no weight."): shortest @ b,
+        (
+            "h_missing",
+            "h is missing on the right-hand side of (10), so this robot has no weight.",
+        ): shortest @ b,
         (
             "sign_of_h",
-            "The sign of h: in (8) and (10) it comes to the right as + J M⁻¹ h.",
+            "The sign of h is wrong. In (8) and (10) it appears on the right-hand side as + J "
+            "M⁻¹ h.",
         ): shortest @ (2.0 * b - right_side),
         (
             "sign_of_b",
-            "The sign of b: it stands on the right of (10) as in (7), with a plus.",
+            "The sign of b is wrong. It is on the right-hand side of (10) with a plus, as in (7).",
         ): shortest @ (right_side - 2.0 * b),
         ("M_not_inverted", M_not_inverted): not_inverted @ (b + J @ M @ h),
     }
@@ -139,7 +152,7 @@ def _nearly_equal(x: Array, y: Array) -> bool:
 
 
 def _fault_of_pair(pair: Array) -> Verdict | None:
-    """What is wrong with a shortest pair (τ, λ) of (11); None where nothing is."""
+    """Return what is wrong with the shortest pair (τ, λ) of (11), or None."""
     eom = rising_solo8_eom()
     C, right_side = torque_force_matrix(eom)
     if _nearly_equal(pair, torque_force_space(eom).b):
@@ -151,9 +164,8 @@ def _fault_of_pair(pair: Array) -> Verdict | None:
     if _nearly_equal(C @ pair, right_side):
         return Verdict(
             False,
-            "The first column solves (10), but it is longer than need be: some of the null space "
-            "is in it. "
-            "Was something divided by a singular value that is only rounding?",
+            "The first column solves (10), but it is longer than necessary: it has a component "
+            "in the null space. Did you divide by a singular value that is only rounding?",
             "longer",
         )
     fitting = (
@@ -163,27 +175,27 @@ def _fault_of_pair(pair: Array) -> Verdict | None:
     )
     unknown = Verdict(
         False,
-        "The first column does not solve (10). It is v, shape (20,): first τ, then λ.",
+        "The first column does not solve (10). It must be v, shape (20,): first τ, then λ.",
         "no_solution",
     )
     return next(fitting, unknown)
 
 
 def _fault_of_directions(V: Array) -> Verdict | None:
-    """What is wrong with columns that should be V⊥ of (11); None where nothing is."""
+    """Return what is wrong with columns that should be V⊥ of (11), or None."""
     C = torque_force_matrix(rising_solo8_eom())[0]
     orthonormal = np.allclose(V.T @ V, np.eye(V.shape[1]), atol=TOLERANCE)
     if np.max(np.abs(C @ V), initial=0.0) > TOLERANCE * np.max(np.abs(C)):
         if orthonormal:
             return Verdict(
                 False,
-                "v is right. The other columns are orthonormal, but C takes some of them not to "
-                "zero. The SVD gives Vᵀ: "
-                "its rows are the directions, those of the null space come last.",
+                "v is right. The other columns are orthonormal, but C does not map all of them "
+                "to zero. The SVD returns Vᵀ: its rows are the directions, and those of the "
+                "null space come last.",
                 "not_null_space",
             )
         return Verdict(
-            False, "v is right, but C takes some of the other columns not to zero.", "not_to_zero"
+            False, "v is right, but C does not map all of the other columns to zero.", "not_to_zero"
         )
     if not orthonormal:
         return Verdict(
@@ -195,22 +207,23 @@ def _fault_of_directions(V: Array) -> Verdict | None:
     if missing == C.shape[0] - rank(C):
         return Verdict(
             False,
-            "v is right. But these are too few directions: one is taken away for each row of C, "
-            "and not every row says "
-            "something new. How many singular values are not zero?",
+            "v is right, but there are too few directions. You have removed one for each row of "
+            "C, but some rows are redundant. How many singular values are not zero?",
             "full_rank",
         )
     if missing:
         return Verdict(
             False,
-            f"v is right, and so are these directions, but not all are there: {missing} missing.",
+            f"v is right, and so are these directions, but {missing} of them are missing.",
             "too_few",
         )
     return None
 
 
 def judge_all_pairs(answer: Any) -> Verdict:
-    """The shortest pair must be right; behind it any orthonormal columns will do that span the null
+    """Judge the matrix of exercise 03.4.
+
+    The first column must be the shortest pair. The others may be any orthonormal basis of the null
     space.
     """
     try:
@@ -222,26 +235,28 @@ def judge_all_pairs(answer: Any) -> Verdict:
         return given
     if given.ndim != 2 or shape[0] != 20 or not shape[1]:
         if given.ndim == 2 and shape[1] == 20:
-            return Verdict(False, "These are rows; pairs (τ, λ) are columns here.", "transpose")
+            return Verdict(False, "These are rows. Pairs (τ, λ) must be columns here.", "transpose")
         if shape[:1] == (34,):
             return Verdict(
-                False, "34 rows: that is (13) with q̈; in (11) are τ and λ alone.", "with_qdd"
+                False,
+                "34 rows are for (13), which includes q̈. (11) contains only τ and λ.",
+                "with_qdd",
             )
         form = (
-            "One matrix is asked for, of 20 rows: 8 torques and 12 forces. v is its first "
-            "column, then comes V⊥."
+            "The answer must be one matrix with 20 rows: 8 torques and 12 forces. Its first "
+            "column is v, followed by V⊥."
         )
         return Verdict(False, form, "no_matrix")
     right = Verdict(
-        True, "Ten directions for eight motors, and nobody typed a 10: the singular values said so."
+        True, "Ten directions for eight motors. You never typed a 10: the singular values gave it."
     )
     return _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:]) or right
 
 
 def unloading_examples() -> list[Example]:
-    wobble = np.array(
-        [0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0]
-    )  # forces without a sum and without a moment
+    # forces whose sum and moment are zero
+    """Return examples for exercise 03.3."""
+    wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
     forces, squeezes = standing_forces(), internal_forces(standing_go2_eom())
     less = 20.0 - forces[2]
     short, moved = np.eye(12)[[2, 11]] * less
@@ -255,6 +270,7 @@ def unloading_examples() -> list[Example]:
 
 
 def pair_examples() -> list[Example]:
+    """Return examples for exercise 03.4."""
     C, right_side = torque_force_matrix(rising_solo8_eom())
     (U, s, Vt), r = np.linalg.svd(C), rank(C)
     v, V = Vt[:r].T @ (U[:, :r].T @ right_side / s[:r]), Vt[r:].T

@@ -31,18 +31,15 @@ from floatbase.objectives import (
 
 UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
 FORWARDS = 60.0  # N, of exercise 05.4
-MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = (
-    0.5,
-    1.0,
-    0.1,
-)  # of a foot; N; N·m: what exercise 05.4 allows
-ROUNDING = 1e-6  # of a lean that is just what is allowed
-SHORT = 0.1  # s on the physics
-MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a slip
+# tolerances of exercise 05.4: ratio of tangential to normal force at a foot; N; N·m
+MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = 0.5, 1.0, 0.1
+ROUNDING = 1e-6  # tolerance of a ratio that just equals the limit
+SHORT = 0.1  # s: duration of the simulation
+MOST_SLIP = 0.005  # m; soft contacts move by 2 mm without slipping
 
 
 def moments_by_jacobian() -> Array:
-    """G_τ from the base's rows of J: the moment at the base's origin, moved to the CoM."""
+    """Compute G_τ from the base rows of J: moments about the base, moved to the CoM."""
     state, J = three_feet_eom().state, three_feet_eom().J
     pose = state.frame_pose("base")
     at_base = pose.rotation @ J[:, 3:6].T
@@ -50,11 +47,13 @@ def moments_by_jacobian() -> Array:
 
 
 def _blocks(levers: Any, order: float = 1.0) -> Array:
-    """One matrix of a cross product for each lever, side by side."""
+    """Return one matrix of a cross product for each lever, side by side."""
     return order * np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])
 
 
 def moment_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the matrix of this mistake."""
+
     def moments(
         about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)
     ) -> Callable[[], Array]:
@@ -81,8 +80,9 @@ def moment_mistakes() -> dict[str, Callable[[], Any]]:
 
 
 def force_by_momentum() -> Array:
-    """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to
-    change it.
+    """Compute the force from the rate of momentum of all links.
+
+    It takes any q̈ with the desired acceleration of the centre of mass.
     """
     state = standing_go2_eom().state
     rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
@@ -90,6 +90,7 @@ def force_by_momentum() -> Array:
 
 
 def force_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the force of this mistake."""
     robot = standing_go2_eom().robot
     m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
     g = weight / m
@@ -106,12 +107,14 @@ def force_mistakes() -> dict[str, Callable[[], Any]]:
 
 
 def smallest_by_zeta() -> Array:
-    """By (9) alone: the shortest τ with ζ(τ) = λ."""
+    """Compute the shortest τ with ζ(τ) = λ, by (9) alone."""
     zeta = fb.forces_from_torques(arm_robot_eom())
     return np.asarray(np.linalg.pinv(zeta.A) @ (squeezed_standing_forces() - zeta.b))
 
 
 def torque_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the torques of this mistake."""
+
     def torques(
         offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv
     ) -> Callable[[], Any]:
@@ -156,7 +159,7 @@ def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
 
 
 def stub_names() -> dict[str, Any]:
-    """What the stub of exercise 05.4 names."""
+    """Return the names that the stub of exercise 05.4 uses."""
     eom = standing_go2_eom()
     return {
         "cost60": _cost_60(eom),
@@ -168,7 +171,7 @@ def stub_names() -> dict[str, Any]:
 
 
 def judge_design(answer: Any) -> Verdict:
-    """Any cost on λ whose minimum does what exercise 05.4 asks, on paper and in simulation."""
+    """Judge a cost on λ by its minimum, on paper and in simulation."""
     eom = standing_go2_eom()
     forces = minimiser_or_verdict(answer, eom.k, "λ")
     if isinstance(forces, Verdict):
@@ -177,7 +180,7 @@ def judge_design(answer: Any) -> Verdict:
 
 
 def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
-    """What the forces of a design miss on paper; None where they miss nothing."""
+    """Return what is wrong with the forces of a design on paper, or None."""
     points, state = forces.reshape(-1, 3), eom.state
     force = points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]
     moment = np.cross(eom.contacts.positions(state) - state.com, points).sum(axis=0)
@@ -216,9 +219,7 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
 
 
 def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
-    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it
-    is taken as τ.
-    """
+    """Return whether a minimum with twelve numbers has about the desired wrench as torques τ."""
     points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
     return bool(
         np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight])
@@ -227,7 +228,7 @@ def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
 
 
 def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
-    """Give the forces for a moment on a floor with μ = 0.5."""
+    """Judge the forces in a short simulation on a floor with μ = 0.5."""
     record = fb.rollout(
         fb.Simulation(eom.robot, MOST_LEAN),
         ConstantForceController(eom.robot, eom.contacts, forces),
@@ -246,13 +247,14 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
 
 
 def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
-    """The wish, and friction counted from another direction than the ground's normal."""
+    """Return the cost with the friction measured from another direction than the normal."""
     eom = standing_go2_eom()
     normals = np.asarray(direction) / np.linalg.norm(direction)
     return _cost_60(eom) + weight * tangential_bias(fb.Contacts.points(eom.robot, normals=normals))
 
 
 def design_examples() -> list[Example]:
+    """Return examples for exercise 05.4."""
     eom = standing_go2_eom()
     cost, share, force = (
         _cost_60(eom),

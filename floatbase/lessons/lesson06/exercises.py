@@ -22,21 +22,19 @@ from floatbase.lessons.judges import (
 from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
 
-BANK, BANK_MU, BANK_FACETS = (
-    np.array([0.3, -0.2, 1.0]),
-    0.5,
-    5,
-)  # of exercise 06.1: normal, not unit; μ; facets
+# of exercise 06.1: normal, not a unit vector; μ; number of facets
+BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5
 FACETS, MU = 8, 0.7  # of exercise 06.2
 LOSS = 0.05  # of exercise 06.3
 HILL, MARGIN = 20.0, 3.0  # of exercise 06.4: degrees; N
-BALANCE = 0.1  # N, and N·m: what may be missing in exercise 06.4
-SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
+BALANCE = 0.1  # N, and N·m: tolerance of the balance in exercise 06.4
+SOLVED = 1e-3  # N: tolerance of the margin in exercise 06.4, for any solver
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
-    """Rows of exercise 06.1 from the polyhedron's edges, which are on the cone: each row is at
-    right angles to two of them.
+    """Compute the constraints of exercise 06.1 from the edges of the polyhedron.
+
+    The edges lie on the cone, and the normal of each facet is perpendicular to two of them.
     """
     n = np.asarray(normal) / np.linalg.norm(normal)
     t1, t2 = tangents(n)
@@ -48,7 +46,7 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
 
 
 def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
-    """The steepest slope [deg] whose cone or polyhedron holds a vertical force, by bisection."""
+    """Find the steepest slope [°] whose cone contains a vertical force, by bisection."""
     low, high = 0.0, 89.0
     while high - low > 1e-9:  # degrees
         middle = 0.5 * (low + high)
@@ -59,15 +57,17 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
 
 
 def _fewest(lost: Any) -> int:
-    """The smallest number of facets that loses less than `LOSS`. lost: number of facets -> part
-    that is lost.
+    """Return the smallest number of facets that loses less than `LOSS`.
+
+    lost: number of facets -> fraction that is lost.
     """
     return next(n for n in range(3, 100) if lost(n) < LOSS)
 
 
 def _lost_force(facets: int, inside: bool = True) -> float:
-    """What the middle of a facet misses of the cone, part of μ, tried with a force: how far it may
-    lean along t1.
+    """Return the fraction of μ that is lost in the middle of a facet.
+
+    It follows from the largest tangential force along t1.
     """
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
     leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])
@@ -80,22 +80,20 @@ def _lost_area(facets: int) -> float:
 
 @cache
 def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
-    """go2 standing on the slope of exercise 06.4, and its contacts."""
+    """Return go2 standing on the slope of exercise 06.4, and its contacts."""
     robot, n = fb.load("go2"), slope_normal(HILL)
     return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
 
 
 @array_judge((12,))
 def _judge_forces(given: Array) -> Verdict:
-    """Any forces that do what exercise 06.4 states, judged with forces and levers one by one."""
+    """Judge forces for exercise 06.4 by their sum, moment and margins."""
     f = given.reshape(4, 3)
     return _out_of_balance(f) or _judge_margins(f)
 
 
 def _out_of_balance(f: Array) -> Verdict | None:
-    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where
-    nothing is.
-    """
+    """Return what is wrong with the sum or moment of forces, shape (4, 3) [N], or None."""
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     carried = weight * np.array([0.0, 0.0, 1.0])
@@ -133,7 +131,7 @@ def _out_of_balance(f: Array) -> Verdict | None:
 
 
 def _judge_margins(f: Array) -> Verdict:
-    """Whether each of the forces in balance on the hill, (4, 3), N, is well inside its cone."""
+    """Judge whether each of the balanced forces, shape (4, 3) [N], is well inside its cone."""
     names, n = stance_on_hill()[1].names, slope_normal(HILL)
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
@@ -162,9 +160,7 @@ def _judge_margins(f: Array) -> Verdict:
 
 
 def _in_balance(facets: int, room: float) -> Array:
-    """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many
-    facets.
-    """
+    """Return the smallest forces that carry go2 on the hill with a margin, shape (12,) [N]."""
     state, contacts = stance_on_hill()
     carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
     rows = np.kron(np.eye(4), FrictionPolyhedron(slope_normal(HILL), MU, facets).face_matrix)
@@ -176,9 +172,8 @@ def _forces() -> list[Example]:
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
-    squeeze = np.zeros(
-        12
-    )  # the left feet against the right ones: it changes neither sum nor moment
+    # the left feet against the right feet: the sum and the moment do not change
+    squeeze = np.zeros(12)
     squeeze[[7, 10]] = 1.0, -1.0
     return [
         *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
@@ -340,7 +335,7 @@ EXERCISES = (
 
 
 def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
-    """d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
+    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
     n = BANK / np.linalg.norm(BANK)
     t1, t2 = tangents(n)
     angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS

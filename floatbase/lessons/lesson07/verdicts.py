@@ -29,17 +29,17 @@ from floatbase.lessons.rounding import rounded
 from floatbase.qp import ConstraintLabel
 from floatbase.simulation import Rollout
 
-INNER = MU * np.cos(np.pi / 4)  # of a pyramid inside the cone
-HARD, AFTER = 150.0, 1.0  # N, and s after the push's end: what exercise 07.4 asks for
-AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm
-STEP = 0.005  # by which μ grows in exercise 07.3
+INNER = MU * np.cos(np.pi / 4)  # μ' of a pyramid inside the cone
+HARD, AFTER = 150.0, 1.0  # of exercise 07.4: N, and s after the end of the push
+AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm: limits of exercise 07.4
+STEP = 0.005  # increase of μ in exercise 07.3
 
 
 # 07.1 ---------------------------------------------------------------------------------------------
 
 
 def rows_on_three_feet() -> int:
-    """Counted in the package's own QP."""
+    """Count the inequality constraints in the QP of floatbase."""
     state = standing_go2_eom().state
     contacts = fb.Contacts.points(state.robot, mu=MU).without("FL_foot")
     return len(
@@ -54,7 +54,7 @@ def rows_on_three_feet() -> int:
 
 @array_judge((4, 42))
 def judge_rows(G: Array) -> Verdict:
-    """Rows G, judged by G x ≤ 0 on vectors x: rows may have any order and any length."""
+    """Judge the matrix G by G x ≤ 0 on vectors x, whatever the order and length of its rows."""
     if not np.any(G):
         return Verdict(False, "There is nothing there yet: rows of zeros forbid nothing.", "zero")
     felt = [i for i in range(42) if np.any(G[:, i])]
@@ -127,28 +127,28 @@ def _places(columns: list[int]) -> str:
 
 @cache
 def _tried() -> Array:
-    """Forces of unit length all over the sphere, (n, 3)."""
+    """Return unit forces all over the sphere, shape (n, 3)."""
     made = np.random.default_rng(7).standard_normal((4000, 3))
     return made / np.linalg.norm(made, axis=1)[:, None]
 
 
 def _agrees(rows: Array, slope: float) -> bool:
-    """Whether rows allow exactly the forces of |f_x| ≤ slope f_z, |f_y| ≤ slope f_z, but for those
-    on the border.
+    """Return whether constraints allow exactly the forces with |f_x|, |f_y| ≤ slope f_z.
+
+    Forces close to the border do not count: rounding a number to two digits may move it.
     """
     forces = _tried()
     room = slope * forces[:, 2] - np.abs(forces[:, :2]).max(axis=1)
     allowed = np.max(rows @ forces.T, axis=0) <= 0
-    return bool(
-        np.all((allowed == (room > 0)) | (np.abs(room) < 5e-3))
-    )  # a number with two digits may move the border so far
+    # rounding a number to two digits may move the border by 5e-3
+    return bool(np.all((allowed == (room > 0)) | (np.abs(room) < 5e-3)))
 
 
 # 07.3 ---------------------------------------------------------------------------------------------
 
 
 def change_of_psi() -> float:
-    """From two problems solved anew on either side: no price in it."""
+    """Compute the change from two problems, solved on either side, without any multiplier."""
     state = standing_go2_eom().state
     below, above = (
         fb.solve(leaning_controller(0.5 + d).qp(state)).objective for d in (-1e-4, 1e-4)
@@ -157,6 +157,8 @@ def change_of_psi() -> float:
 
 
 def change_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the change of this mistake."""
+
     def change(
         cos: float = np.pi / 8, part: str = "own", grows: float = STEP, sign: float = -1.0
     ) -> Callable[[], float]:
@@ -209,7 +211,7 @@ def _record(design: tuple[float, ...]) -> Rollout:
 
 @array_judge((4,))
 def judge_design(given: Array) -> Verdict:
-    """Gains and weights, judged on the physics."""
+    """Judge gains and weights in simulation."""
     if np.any(given < 0) or given[2] == 0:
         return Verdict(
             False,
@@ -264,13 +266,14 @@ def judge_design(given: Array) -> Verdict:
 
 
 def _sides(slope: float = INNER, first: int = 36) -> Array:
-    """Four sides of a pyramid on three columns of x."""
+    """Return the four sides of a pyramid on three columns of x."""
     G = np.zeros((4, 42))
     G[:, first : first + 3] = [[1, 0, -slope], [0, 1, -slope], [-1, 0, -slope], [0, -1, -slope]]
     return G
 
 
 def pyramid_examples() -> list[Example]:
+    """Return examples for exercise 07.2."""
     right = _sides()
     leans_freely, up_forbidden = (
         right[[2, 1, 2, 3]],
@@ -289,6 +292,7 @@ def pyramid_examples() -> list[Example]:
 
 
 def design_examples() -> list[Example]:
+    """Return examples for exercise 07.4."""
     return [
         ((400, 80, 10, 1e-3), ""), ((400, 70, 10, 1e-3), ""), ((500, 90, 30, 1e-3), ""),
         ((200, 40, 10, 1e-3), "too_far"), ((100, 20, 10, 1e-3), "too_far_and_strays"),

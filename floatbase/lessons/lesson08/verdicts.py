@@ -30,15 +30,15 @@ from floatbase.lessons.lesson08.helpers import (
 FOOT = "FR_foot"  # of exercise 08.1
 CLEARANCE = 0.05  # m, of exercise 08.2
 PUSH = 0.1  # s, of exercise 08.3
-FAR, INSIDE, PRESSED = 600.0, 32.0, 80.0  # mm, mm and N: what exercise 08.4 asks for
-SLOWEST = 0.05  # s: shorter swings and pauses are a few ticks
+FAR, INSIDE, PRESSED = 600.0, 32.0, 80.0  # mm, mm and N: requirements of exercise 08.4
+SLOWEST = 0.05  # s: shorter swings and pauses are only a few control steps
 
 
 # 08.1 ---------------------------------------------------------------------------------------------
 
 
 def com_shift() -> Array:
-    """From the support region of the feet that stay, by its nearest point, mm."""
+    """Compute the shift [mm] to the nearest point of the support region of the other feet."""
     state = uneven_stance()
     corners = wrench_set(state, fb.Contacts.points(state.robot).without(FOOT)).support_region()
     ways = []
@@ -49,6 +49,7 @@ def com_shift() -> Array:
 
 
 def shift_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the shift of this mistake."""
     state = uneven_stance()
     feet = dict(
         zip(
@@ -86,7 +87,7 @@ def shift_mistakes() -> dict[str, Callable[[], Any]]:
 
 
 def bump_coefficients() -> Array:
-    """From its conditions: rest at u = 0 and 1, the clearance at u = 1/2."""
+    """Compute the bump from its conditions: rest at u = 0 and 1, the clearance at u = 1/2."""
     powers = np.arange(7)
 
     def row(u: float, order: int) -> Array:
@@ -115,8 +116,10 @@ BUMP_MISTAKES: Mapping[str, Callable[[], Any]] = {
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
-    """anymal_kinova standing; how high its centre of mass is, and how far hind and front feet are
-    from it along x, m.
+    """Return anymal_kinova standing and three lengths [m].
+
+    These are the height of its centre of mass, and its distances along x from the hind and front
+    feet.
     """
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
@@ -125,8 +128,9 @@ def _backwards() -> tuple[fb.State, float, float, float]:
 
 @cache
 def hardest_push() -> float:
-    """From a pendulum above the hind feet whose motion is integrated: the push after which it just
-    does not pass them, N.
+    """Return the largest push [N] after which a pendulum above the hind feet does not pass them.
+
+    Its motion is integrated numerically.
     """
     state, height, away, _ = _backwards()
     rate = state.robot.gravity / height
@@ -140,6 +144,8 @@ def hardest_push() -> float:
 
 
 def push_mistakes() -> dict[str, Callable[[], Any]]:
+    """Return for each hint a function that computes the force of this mistake."""
+
     def push(
         mass: str = "mass",
         height: str = "com",
@@ -192,7 +198,7 @@ def push_mistakes() -> dict[str, Callable[[], Any]]:
 
 @array_judge((3,))
 def judge_crawl(given: Array) -> Verdict:
-    """A crawl, judged on the physics."""
+    """Judge a crawl in simulation."""
     swing, pause, forwards = given.tolist()
     if min(swing, pause) < SLOWEST:
         return Verdict(
@@ -251,6 +257,7 @@ def judge_crawl(given: Array) -> Verdict:
 
 
 def crawl_examples() -> list[Example]:
+    """Return examples for exercise 08.4."""
     return [
         ((0.3, 0.25, 0.12), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"),
         ((0.3, 0.1, 0.13), "near"),

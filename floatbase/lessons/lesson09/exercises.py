@@ -34,16 +34,12 @@ from floatbase.linear_algebra import rank
 from floatbase.simulation import Rollout
 
 ANKLE = 0.107  # m: height of the sensor of exercise 09.1 above the sole
-CORNER_FORCES = (
-    (30.0, 5.0, 210.0),
-    (24.0, -6.0, 120.0),
-    (14.0, 2.0, 60.0),
-    (12.0, 9.0, 90.0),
-)  # N, of exercise 09.1
+# N, of exercise 09.1
+CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12.0, 9.0, 90.0))
 LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
-ROUND = 360  # facets that stand for a round cone: they miss 4e-5 of it
-LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09.4 asks for
-_LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little holds arms and trunk
+ROUND = 360  # facets that approximate a round cone with an error of 4e-5
+LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: requirements of exercise 09.4
+_LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it, arms and trunk are loose
 
 
 # 09.1 ---------------------------------------------------------------------------------------------
@@ -51,8 +47,9 @@ _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little hold
 
 @cache
 def ankle_sensor_reading() -> Array:
-    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about
-    itself, N·m, world.
+    """Return the reading of a sensor in the left ankle of Talos, shape (6,).
+
+    It contains the force [N] and the moment about the sensor [N·m], in the world frame.
     """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
@@ -62,8 +59,9 @@ def ankle_sensor_reading() -> Array:
 
 
 def _pushed() -> Array:
-    """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from
-    the point below the sensor.
+    """Compute the centre of pressure as the mean of the corners, weighted by their forces.
+
+    No moment is used. The result has shape (2,) and is relative to the point below the sensor [m].
     """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
@@ -73,8 +71,9 @@ def _pushed() -> Array:
 
 
 def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
-    """The centre of pressure from the sensor. height: which is added to the moments as height ·
-    force, m.
+    """Return a function that computes the centre of pressure from the sensor.
+
+    height [m]: the moments are changed by height · force.
     """
 
     def value() -> Array:
@@ -90,7 +89,7 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
 
 @cache
 def _new_soles() -> fb.Contacts:
-    """Two soles with six corners each."""
+    """Return two soles with six corners each."""
     angles = np.pi / 3 * np.arange(6)
     corners = np.column_stack([0.1 * np.cos(angles), 0.06 * np.sin(angles), np.zeros(6)])
     return fb.Contacts(
@@ -99,7 +98,7 @@ def _new_soles() -> fb.Contacts:
 
 
 def _counted() -> Array:
-    """By rank: λ that nobody feels, internal forces, and the dimension of all motions."""
+    """Count by rank: λ without any effect, internal forces, and the dimension of all motions."""
     eom = fb.equations_of_motion(load_talos().standing(), _new_soles())
     J = eom.J
     return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
@@ -109,7 +108,7 @@ def _counted() -> Array:
 
 
 def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
-    """The largest twist of the sole, N·m, by a linear program over its corner forces."""
+    """Compute the largest twist of the sole [N·m] by a linear program over its corner forces."""
     corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
     limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), LOAD, np.full(4, np.inf))
@@ -121,9 +120,7 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
 
 @cache
 def run_lean(seconds: float, posture: float) -> Rollout:
-    """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the
-    posture.
-    """
+    """Simulate the lean of exercise 09.4 with a duration [s] and a weight of the posture."""
     controller = leaning_controller(LEAN, seconds, posture)
     ticks = int(np.ceil((LEAN_START + seconds + TIME_AFTER_LEAN) / SLOW_PERIOD))
     return fb.rollout(
@@ -133,7 +130,7 @@ def run_lean(seconds: float, posture: float) -> Rollout:
 
 @array_judge((2,))
 def _judge_lean(given: Array) -> Verdict:
-    """A lean, judged on the physics."""
+    """Judge a lean in simulation."""
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
         return Verdict(
@@ -145,9 +142,7 @@ def _judge_lean(given: Array) -> Verdict:
 
 
 def _judge_record(record: Rollout, seconds: float) -> Verdict:
-    """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how
-    long it took.
-    """
+    """Judge a complete lean: where it ended, the centre of pressure, and the duration."""
     settled = record.time > 0.1  # the robot is put down at first
     toes, heels = (
         record.foot_positions[..., 0].max(axis=1),

@@ -15,23 +15,21 @@ from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import NumericJudge
 
 PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
-CHILD_POSITION, CHILD_VELOCITY = (
-    np.array([2.0, 0.0, 0.0]),
-    np.array([1.5, 0.0, 0.0]),
-)  # m and m/s, in the merry-go-round's axes
+# m and m/s, in the axes of the merry-go-round
+CHILD_POSITION, CHILD_VELOCITY = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])
 LIFT_JOINT, ELBOW_JOINT = 1, 2  # of exercise A.2: ur5's joints
 JOINT_VELOCITY = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
-STEP = 1e-4  # s, and of differences
+STEP = 1e-4  # s, and step of finite differences
 
 
 @cache
 def arm_state(v: tuple[float, ...] = (0.0,) * 6) -> fb.State:
-    """ur5 as it stands, its joints moving with v, rad/s."""
+    """Return ur5 in its standing posture, its joints moving with v [rad/s]."""
     return fb.load("ur5").standing().replace(v=np.array(v))
 
 
 def _force_on_the_walker() -> Array:
-    """Mass times the second difference of where the child is in the world."""
+    """Compute the force as mass times the second difference of the child's position."""
 
     def place(t: float) -> Array:
         return rotation_z(PLATFORM_RATE[2] * t) @ (CHILD_POSITION + t * CHILD_VELOCITY)
@@ -40,7 +38,7 @@ def _force_on_the_walker() -> Array:
 
 
 def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callable[[], Array]:
-    """Multiples of m 2 ω × ṗ and of m ω × (ω × p)."""
+    """Return a function that combines m 2 ω × ṗ and m ω × (ω × p)."""
 
     def force() -> Array:
         turned = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
@@ -56,8 +54,9 @@ def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callabl
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
-    """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's
-    velocity.
+    """Compute the joint effect of two joints at 1 rad/s.
+
+    It is the sum of both columns of the Coriolis matrix, each at the other joint's velocity.
     """
     e = np.eye(6)
     return np.asarray(
@@ -76,7 +75,7 @@ def _velocity_part() -> Array:
 
 
 def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callable[[], Array]:
-    """rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
+    """Return a function that computes rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
 
     def force() -> Array:
         state = arm_state(tuple(JOINT_VELOCITY))

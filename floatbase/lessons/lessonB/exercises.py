@@ -14,10 +14,8 @@ from floatbase.lessons.rounding import rounded
 
 FOOT, CRANK, GAMMA, PISTON = 0.40, 0.10, np.deg2rad(50.0), 5000.0  # of exercise B.1: m, m, rad, N
 STEP = 1e-5  # rad, of a difference
-WANTED, GOT = (
-    np.array([12.0, 12.0, -12.0, -12.0]),
-    np.array([9.0, 15.0, -9.0, -9.0]),
-)  # N·m, of exercise B.2
+# N·m, of exercise B.2
+WANTED, GOT = np.array([12.0, 12.0, -12.0, -12.0]), np.array([9.0, 15.0, -9.0, -9.0])
 LEVER, GAIN = np.array([0.036, 0.036, 0.036, -0.020]), 0.001  # m; 1/N
 NEAR_HOME = 1.0  # mm, of exercise B.3
 MOST_DAMPING = 20.0  # 1/s
@@ -25,25 +23,23 @@ LOST, SOFT = 50.0, 100.0  # mm; 1/s²
 
 
 def _length(gamma: float, sign: float = -1.0) -> float:
-    """From the cylinder's foot to the rod's end, m, as the distance of two points."""
+    """Return the distance from the foot of the cylinder to the end of the rod [m]."""
     return float(np.linalg.norm([CRANK * np.cos(gamma) + sign * FOOT, CRANK * np.sin(gamma)]))
 
 
 def _torque() -> float:
-    """The piston's force times what its length gains for each radian."""
+    """Return the force of the piston times the rate of its length per radian."""
     return PISTON * (_length(GAMMA + STEP) - _length(GAMMA - STEP)) / (2.0 * STEP)
 
 
 def _valve_opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array]:
-    """k times an error of the forces of the piston, wanted and got."""
+    """Return a function that computes k times an error of the desired and actual piston force."""
     return lambda: np.asarray(GAIN * error(WANTED / LEVER, GOT / LEVER))
 
 
 @array_judge((2,))
 def _judge_gains(given: Array) -> Verdict:
-    """Whether go2 on 5 Hz comes back to within a millimetre; if not, what kind of mistake the gains
-    look like.
-    """
+    """Judge gains by whether go2 with 5 Hz actuators comes back to within a millimetre."""
     kp, kd = map(float, given)
     if min(kp, kd) <= 0.0:
         return Verdict(

@@ -21,8 +21,9 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
 def slanted_table() -> QP:
-    """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along
-    - up ≤ 0.
+    """Return the bowl and the slanted table of exercise C.1.
+
+    up ≥ 0.5 along is written as 0.5 along - up ≤ 0.
     """
     H = np.diag([1.0, 4.0])
     return QP(
@@ -36,8 +37,9 @@ def slanted_table() -> QP:
 
 
 def _price() -> float:
-    """By the rate at which the least objective falls when the row is loosened: no system of
-    equations in it.
+    """Compute the multiplier as the rate of the minimum when the constraint is relaxed.
+
+    No system of equations is used.
     """
     qp = slanted_table()
     h = 1e-4
@@ -51,8 +53,10 @@ def _price() -> float:
 
 
 def _judge_guess(answer: Any) -> Verdict:
-    """One system of equations with the rows of the guess, as in the game; whether it is the optimum
-    a solver says.
+    """Judge a guess of the active constraints.
+
+    One system of equations with the guess is solved, as in the game, and the conditions for the
+    optimum are checked as a solver does.
     """
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: list the names of rows.", "no_answer")
@@ -115,14 +119,12 @@ def _judge_guess(answer: Any) -> Verdict:
 
 
 def _example_of(names: Sequence[str]) -> str:
-    """The first of some rows, and how many more."""
+    """Return the first of some names, and whether there are more."""
     return f"such as {names[0]}" if len(names) > 1 else f"namely {names[0]}"
 
 
 def rounds_from_guess(guess: Sequence[str]) -> int:
-    """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active
-    rows.
-    """
+    """Return how many iterations `active_set` takes for exercise C.4 from a guess."""
     return active_set(braking_qp(), working_set=tuple(guess)).solution.iterations
 
 
@@ -160,7 +162,7 @@ def _steps() -> list[Example]:
         beyond: float = 1.0,
         held: bool = True,
     ) -> Callable[..., Any]:
-        """A `longest_step` that does one thing in another way."""
+        """Return a `longest_step` that does one thing in another way."""
 
         def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
             rows = [
@@ -325,7 +327,7 @@ EXERCISES = (
 
 
 def _price_of(curvature: Sequence[float]) -> float:
-    """The price of C.1 for another bowl, from its equations."""
+    """Return the multiplier of C.1 for another bowl, from its equations."""
     G, H = np.array([0.5, -1.0]), np.diag(curvature)
     low = np.array([2.0, -2.0])
     return float(G @ low / (G @ np.linalg.solve(H, G)))

@@ -1,4 +1,4 @@
-"""Lesson C, How a QP solver thinks: what is said of a learner's parts of a solver."""
+"""Judges of lesson C for functions of a learner's solver."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from floatbase.lessons.judges import Verdict, function_or_verdict
 
-_CLOSE = 1e-6  # of lengths, which are between 0 and 1
+_CLOSE = 1e-6  # tolerance of lengths, which are between 0 and 1
 
 
 # C.2 ----------------------------------------------------------------------------------------------
@@ -19,9 +19,7 @@ _CLOSE = 1e-6  # of lengths, which are between 0 and 1
 
 @dataclass(frozen=True)
 class _StepCase:
-    """A step in the plane, whose answer is known from how it was made, and what is said of a
-    function that misses it.
-    """
+    """Step in the plane with a known answer, and the comment on a function that misses it."""
 
     hint: str  # its name
     text: str
@@ -91,7 +89,7 @@ _STEP_CASES = (
 
 
 def judge_step(answer: Any) -> Verdict:
-    """A function that returns the longest step of exercise C.2, tried on cases."""
+    """Judge a function that returns the longest step of exercise C.2, on test cases."""
 
     def one(way: _StepCase) -> Verdict | None:
         for origin in (
@@ -143,7 +141,7 @@ def judge_step(answer: Any) -> Verdict:
 
 
 def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
-    """Run cases of a learner's function; the first that has something to say decides."""
+    """Run test cases of a learner's function; the first verdict decides."""
     program = function_or_verdict(answer)
     if isinstance(program, Verdict):
         return program
@@ -165,9 +163,7 @@ def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: s
 
 @dataclass(frozen=True)
 class _Drop:
-    """Rows that are on and their prices, and what is said of a function that does not drop the
-    right one.
-    """
+    """Working set with its multipliers, and the comment on a function that drops another row."""
 
     hint: str  # its name
     text: str
@@ -217,7 +213,7 @@ _DROP_CASES = (
 
 
 def judge_drop(answer: Any) -> Verdict:
-    """A function that returns the row to drop of exercise C.3, tried on cases."""
+    """Judge a function that returns the constraint to drop of exercise C.3, on test cases."""
 
     def one(drop: _Drop) -> Verdict | None:
         given = answer(list(drop.W), np.array(drop.prices))

@@ -19,21 +19,21 @@ from floatbase.lessons.lessonP.helpers import (
 )
 
 G = 9.81  # m/s²
-MAX_SAG, MIN_SAG = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
+MAX_SAG, MIN_SAG = 10.0, 9.0  # mm: largest and smallest sag; less is stiffer than requested
 ROUNDING = 0.05  # mm
-MAX_KP = 1e5  # 1/s², that a judge still tries on physics
-MISTAKE_TOLERANCE = 0.01  # of a mistake's value
-TIME_ON_TWO_FEET = 1.0  # s on two feet
-HEIGHT = 1e-4  # m: less counts as none
+MAX_KP = 1e5  # 1/s²: the largest kp that is simulated
+MISTAKE_TOLERANCE = 0.01  # fraction of a mistake's value
+TIME_ON_TWO_FEET = 1.0  # s: required time on two feet
+HEIGHT = 1e-4  # m: smaller changes of height count as zero
 
 
 def _load() -> float:
-    """The bag as a part of the robot's mass."""
+    """Return the bag as a fraction of the robot's mass."""
     return BAG_MASS / fb.load("go2").mass
 
 
 def _stiffness_slips() -> dict[str, float]:
-    """Name of a hint -> the kp that this kind of mistake leads to."""
+    """Return for each hint the kp of this mistake."""
     right, ratio, mass = _load() * G / (MAX_SAG / 1e3), _load(), fb.load("go2").mass
     return {
         "robot_too": right * (1.0 + ratio) / ratio,
@@ -62,7 +62,7 @@ _STIFFNESS = {
 
 @array_judge(())
 def _judge_stiffness(given: Array) -> Verdict:
-    """Physics decides: go2 with the bag, and this kp."""
+    """Judge a kp by a simulation of go2 with the bag."""
     kp = float(given)
     if kp <= 0.0:
         return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
@@ -95,7 +95,7 @@ def _judge_stiffness(given: Array) -> Verdict:
 
 
 def _corners() -> tuple[Array, dict[str, Array]]:
-    """The centre of mass and the feet, each seen from above, (2,) m."""
+    """Return the centre of mass and the feet from above, shape (2,) [m]."""
     state = fb.load("go2").standing()
     contacts = fb.Contacts.feet(state.robot)
     return state.com[:2], {
@@ -105,8 +105,9 @@ def _corners() -> tuple[Array, dict[str, Array]]:
 
 
 def _nearest(first: str = "FL_foot", second: str = "RR_foot") -> Array:
-    """The way from the centre of mass to the nearest point of a line through two feet, (3,) m:
-    least squares along the line.
+    """Return the shift of the centre of mass to the line through two feet, shape (3,) [m].
+
+    The nearest point is found by least squares along the line.
     """
     com, feet = _corners()
     line = feet[second] - feet[first]
@@ -161,7 +162,7 @@ _SHIFT = NumericJudge(
 
 @array_judge((3,))
 def _judge_shift(given: Array) -> Verdict:
-    """Geometry, and then physics: how long it stands on two feet."""
+    """Judge a shift by geometry, then by how long the robot stands on two feet in simulation."""
     if abs(given[2]) > HEIGHT:
         return Verdict(
             False,

@@ -29,16 +29,10 @@ from floatbase.lessons.lessonX.diagnostics import required_forces
 from floatbase.lessons.lessonX.verdicts import COUNTER_EVIDENCE, judge_line, mistaken
 
 KICK_SEED = 5  # seed of the box of exercise X.1
-_UNSEEN_SEEDS = (
-    20611,
-    20612,
-    20613,
-    102,
-    20615,
-    20616,
-)  # seeds from which the last exercise takes one fault each
-_FAULTLESS_SEED = 20617  # and of its two robots without
-_KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
+# seeds from which the last exercise takes one fault each
+_UNSEEN_SEEDS = (20611, 20612, 20613, 102, 20615, 20616)
+_FAULTLESS_SEED = 20617  # seed of its two robots without a fault
+_KICK_FORCE = 20.0  # N: a larger residual is a kick and not a numerical error of the simulation
 
 
 # X.1 ----------------------------------------------------------------------------------------------
@@ -46,15 +40,13 @@ _KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' o
 
 @cache
 def kicked_box() -> BlackBox:
-    """The record of a robot without a fault that somebody kicked."""
+    """Return the record of a robot without a fault that was kicked."""
     return faultless_cases(KICK_SEED)[1].record()
 
 
 @cache
 def _residual() -> tuple[Array, Array]:
-    """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the
-    world's.
-    """
+    """Return the missing force on the base during the kick, (m, 3) [N], in base and world axes."""
     box = kicked_box()
     found = required_forces(box)[:, :3]
     rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _KICK_FORCE)
@@ -63,18 +55,18 @@ def _residual() -> tuple[Array, Array]:
 
 
 def _turned(i: int | np.integer[Any], row: Array) -> Array:
-    """A force in the base's axes at row i, (3,) N, in the world's."""
+    """Turn a force in base axes at row i, shape (3,) [N], into world axes."""
     return np.asarray(kicked_box().state(i).frame_pose("base").rotation @ row)
 
 
 def _impulse() -> Array:
-    """As it was given."""
+    """Return the impulse of the kick."""
     (push,) = faultless_cases(KICK_SEED)[1].pushes
     return np.asarray(push.force * push.duration)
 
 
 def _momentum() -> Array:
-    """How the robot's momentum changed while it was kicked."""
+    """Return the change of the robot's momentum during the kick."""
     box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
     first, last = (
         int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0)
@@ -105,7 +97,7 @@ def _kicks() -> dict[str, Callable[[], Any]]:
 
 
 def _judge_report(answer: Any) -> Verdict:
-    """A seed, and a line for each of its boxes."""
+    """Judge a seed and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet: the report is a list of lines.", "no_answer")
     if (
@@ -127,7 +119,7 @@ def _judge_report(answer: Any) -> Verdict:
 
 
 def _report_of(seed: int, told: dict[str, str]) -> Verdict:
-    """told: name of a box -> what is said of it."""
+    """Judge the lines about the boxes of a seed; told: name of a box -> its line."""
     cases = {case.name: case for case in random_cases(seed)}
     if unknown := sorted(set(told) - set(cases)):
         return Verdict(
@@ -164,7 +156,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
 
 @cache
 def _unseen_case(i: int) -> tuple[Case, BlackBox]:
-    """One of the cases of the last exercise: six with a fault, then two without."""
+    """Return a case of the last exercise: six with a fault, then two without."""
     if i < len(FAULTS):
         case = next(
             case for case in random_cases(_UNSEEN_SEEDS[i]) if case.injected_fault.kind == FAULTS[i]
@@ -177,7 +169,7 @@ def _unseen_case(i: int) -> tuple[Case, BlackBox]:
 
 
 def _judge_program(answer: Any) -> Verdict:
-    """A function of a box, tried on boxes of each kind that nobody has seen."""
+    """Judge a function of a box on unseen boxes of each kind."""
     program = function_or_verdict(answer)
     if isinstance(program, Verdict):
         return program
@@ -192,7 +184,7 @@ def _judge_program(answer: Any) -> Verdict:
 
 
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
-    """What is wrong with a program's word about a box; None where it is right."""
+    """Return what is wrong with a program's answer about a box, or None."""
     what = (
         f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
     )
@@ -218,7 +210,7 @@ def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Ver
 
 
 def _reports() -> list[Example]:
-    """On the boxes of seed 1."""
+    """Return examples with the boxes of seed 1."""
     boxes, found = (
         black_boxes(1),
         {box.name: investigation.investigate(box) for box in black_boxes(1)},
@@ -227,7 +219,7 @@ def _reports() -> list[Example]:
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
     def but(fault: str, line: str) -> list[str]:
-        """The report, which says something else of the box with a fault."""
+        """Return the report with another line about the box with a fault."""
         name = cases[fault].name
         return [f"{name}: {line}" if said.startswith(name) else said for said in report]
 

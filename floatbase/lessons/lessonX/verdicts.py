@@ -1,4 +1,4 @@
-"""Lesson X, The crash investigation: what is said of a diagnosis and of the evidence for it."""
+"""Judges of lesson X for a diagnosis and its evidence."""
 
 from __future__ import annotations
 
@@ -38,22 +38,19 @@ COUNTER_EVIDENCE = {
 }
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 _JOINT = re.compile(r"\w+_joint")
-_EVIDENCE_TOLERANCES = {
-    "friction": 0.04,
-    "normal": 1.5,
-    "mass": 0.02,
-}  # how far evidence may be off
-_RELATIVE_TOLERANCE = 0.1  # of it, for the others
-_MIN_TOLERANCE = 3.0  # ms that a time constant may be off
+# absolute tolerances of evidence
+_EVIDENCE_TOLERANCES = {"friction": 0.04, "normal": 1.5, "mass": 0.02}
+_RELATIVE_TOLERANCE = 0.1  # of the other evidence
+_MIN_TOLERANCE = 3.0  # ms: smallest tolerance of a time constant
 _RIGHT = Verdict(True, "")
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """A number that is evidence. off: how far it may be. known: hint -> the number of this mistake,
-    and what is said of it.
+    """Number that is evidence.
 
-    otherwise: what is said of other numbers.
+    off: its tolerance. known: hint -> the number of this mistake, and the comment on it. otherwise:
+    comment on other numbers.
     """
 
     right: float
@@ -63,14 +60,40 @@ class _Evidence:
 
 
 def named_fault(line: str) -> str:
-    """The fault that a line names first, or "nothing"; "" where it names none."""
+    """Return the fault that a line names first, or "nothing"; "" if there is none.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+
+    Returns
+    -------
+    str
+        Name of the fault.
+    """
     words = line.casefold()
     found = [(words.find(name), name) for name in (*FAULTS, NOTHING) if name in words]
     return min(found)[1] if found else ""
 
 
 def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
-    """The comment on a line about a case, a fault and its evidence; none on a right one."""
+    """Judge a line about a case: a fault and its evidence.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    box : BlackBox
+        Its black box.
+    line : str
+        The line.
+
+    Returns
+    -------
+    Verdict
+        The comment; it is empty if the line is right.
+    """
     said, fault = named_fault(line), case.injected_fault.kind or NOTHING
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
@@ -94,7 +117,7 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
 
 
 def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
-    """Hint -> a line with the right fault and evidence that gets it."""
+    """Return for each hint a line with the right fault and the evidence of this mistake."""
     fault = str(case.injected_fault.kind)
     if fault not in _NUMBERS:
         return {}
@@ -238,8 +261,9 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
 
 
 def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
-    """Right for what is near enough, else the hint for the nearest of the numbers that a known
-    mistake leads to.
+    """Judge a number as evidence.
+
+    If it is wrong, the hint is that of the nearest known mistake.
     """
     if abs(x - evidence.right) <= evidence.off:
         return _RIGHT
