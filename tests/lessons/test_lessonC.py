@@ -56,9 +56,9 @@ def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(
         next(answer for answer, hint in examples if hint == name) for name in ("", "nearest")
     )
     assert answer_or_default("C.2", mine, longest_step) is mine
-    assert "with yours" in capsys.readouterr().out
+    assert "with your answer" in capsys.readouterr().out
     assert answer_or_default("C.2", wrong, longest_step) is longest_step
-    assert "not yet right" in capsys.readouterr().out
+    assert "not right yet" in capsys.readouterr().out
 
 
 # problems in the plane ----------------------------------------------------------------------------
@@ -212,11 +212,11 @@ def test_pictures_show_what_they_are_given() -> None:
     ) and "multiplier of the constraint: <b>3</b>" in show_table(-1.5)
     edges = hexagon_table()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
-    assert "on: no row" in show_solver_path(edges, ways, 0) and "on: edge 0" in show_solver_path(
-        edges, ways, 1
-    )
+    assert "on: no constraint" in show_solver_path(
+        edges, ways, 0
+    ) and "on: edge 0" in show_solver_path(edges, ways, 1)
     between = show_solver_path(edges, ways, 0.5)
-    assert "on: no row" in between and between != show_solver_path(edges, ways, 0)
+    assert "on: no constraint" in between and between != show_solver_path(edges, ways, 0)
     assert rounded(edges.objective(np.array([0.5, 0.0])), digits=3) in between
     problem: Any = plot_problem(edges, (1.5, 0.0))
     assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]

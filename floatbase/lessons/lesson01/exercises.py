@@ -264,8 +264,8 @@ EXERCISES = (
         judge=NumericJudge(
             right=_carried_by_friction,
             tolerance=2e-3,  # g may be 9.8
-            praise="The bolts' answer had no bound. This one is friction times weight, as long as "
-            "no jump adds to it.",
+            praise="The force of the bolts had no bound. This force is at most friction times "
+            "weight, as long as the robot does not jump.",
             mistakes={
                 "g_is_10": lambda: 10 * _carried_by_friction() / 9.81,
                 "weight": lambda: _carried_by_friction() / 0.7,

@@ -188,17 +188,21 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
         if _is_on_torques(eom, forces):
             return Verdict(
                 False,
-                "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the "
-                "pullback.",
+                "That is a cost on τ, which has twelve numbers, too. The answer must be a cost "
+                "on λ, without the pullback.",
                 "on_torques",
             )
         f_c = rounded(points.sum(axis=0), "N", digits=3)
-        better = "A smaller weight for the preference, or a better preference."
-        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}", "force")
+        better = "Use a smaller weight for the preference, or a better preference."
+        return Verdict(
+            False,
+            f"The preference spoils the goal: f_c is {f_c} (forwards, left, up). {better}",
+            "force",
+        )
     if np.linalg.norm(moment) > MISSED_MOMENT:
         return Verdict(
             False,
-            f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.",
+            f"The force is right, but a moment of {np.linalg.norm(moment):.2f} N·m remains.",
             "moment",
         )
     if points[:, 2].min() <= 0:
@@ -207,12 +211,12 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
     if lean.max() > MOST_LEAN + ROUNDING:
         worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
         prefers = (
-            "What does your preference call a good direction for a force, and which would "
-            "be better?"
+            "Which direction of a force does your preference favour, and which would be better?"
         )
         return Verdict(
             False,
-            f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}",
+            f"The wrench is right, but the tangential force at {worst} is {lean.max():.2f} times "
+            f"the normal force. {prefers}",
             "leans",
         )
     return None
@@ -238,12 +242,12 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
     if slip > MOST_SLIP:
         return Verdict(
             False,
-            "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further "
-            "inside.",
+            "This is right on paper, but a foot slips in the simulation with μ = 0.5. Stay a "
+            "little further inside the cone.",
             "slips",
         )
     speed = record.final.com_velocity[0]
-    return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
+    return Verdict(True, f"In MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
 
 
 def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:

@@ -99,18 +99,19 @@ def _out_of_balance(f: Array) -> Verdict | None:
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
-        ("nobody", "Nobody carries the robot yet."): 0.0 * n,
+        ("nobody", "The forces do not carry the robot yet."): 0.0 * n,
         (
             "sign",
-            "The sign: λ is what the ground does to the robot, and it pushes upwards.",
+            "The sign is wrong. λ is the force of the ground on the robot, and it pushes upwards.",
         ): -carried,
         (
             "slides",
-            "These forces carry only the weight's part along the normal: the robot slides.",
+            "These forces carry only the normal component of the weight, so the robot slides.",
         ): weight * n[2] * n,
         (
             "along_normal",
-            "They add up to the weight, but along the slope's normal; gravity is vertical.",
+            "Their sum has the magnitude of the weight, but it is along the normal of the "
+            "slope. Gravity is vertical.",
         ): weight * n,
     }
     for (hint, text), total in sums.items():
@@ -118,13 +119,15 @@ def _out_of_balance(f: Array) -> Verdict | None:
             return Verdict(False, text, hint)
     if missing > BALANCE:
         return Verdict(
-            False, f"The sum is {missing:.1f} N away from what carries the weight.", "sum"
+            False,
+            f"The sum differs by {missing:.1f} N from the force that carries the weight.",
+            "sum",
         )
     moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
     if moment > BALANCE:
         return Verdict(
             False,
-            f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.",
+            f"The sum is right, but a moment of {moment:.1f} N·m remains: go2 would turn over.",
             "moment",
         )
     return None
@@ -138,25 +141,30 @@ def _judge_margins(f: Array) -> Verdict:
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
     if margins.min() >= MARGIN - SOLVED:
         return Verdict(
-            True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N."
+            True,
+            f"The forces are balanced. The smallest margin is {margins.min():.1f} N.",
         )
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(
             False,
-            f"In balance. But all feet hold alike against sliding, and the upper ones carry "
-            f"little: {least}.",
+            f"The forces are balanced. But all feet have the same tangential force, and the upper "
+            f"feet carry little: {least}.",
             "alike",
         )
     if margins.min() >= -BALANCE:
-        return Verdict(False, f"In balance and in the cones, but {least} only.", "in_cones")
+        return Verdict(
+            False, f"The forces are balanced and inside their cones, but {least} only.", "in_cones"
+        )
     if upright.min() >= MARGIN:
         return Verdict(
             False,
-            f"In balance, with room enough in cones about the vertical; in the slope's own, "
-            f"{least}.",
+            f"The forces are balanced and have enough margin in cones about the vertical. But in "
+            f"the cones about the slope's normal, {least}.",
             "vertical_cones",
         )
-    return Verdict(False, f"In balance, but outside of a cone: {least}.", "outside")
+    return Verdict(
+        False, f"The forces are balanced, but one is outside its cone: {least}.", "outside"
+    )
 
 
 def _in_balance(facets: int, room: float) -> Array:
@@ -189,8 +197,8 @@ def _forces() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="06.1",
-        statement="Rows of the polyhedron inside the cone for a normal that is not unit, shape (5, "
-        "3).",
+        statement="The matrix of the polyhedron inside the cone for a normal that is not a unit "
+        "vector, shape (5, 3).",
         stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the "
         "cone",
         solution="from floatbase.friction import tangents\n\n"
@@ -202,7 +210,7 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_rows_from_edges,
-                praise="Five half-spaces; where two meet is an edge, and the edges lie on the "
+                praise="Five half-spaces. Two of them meet at an edge, and the edges lie on the "
                 "cone.",
                 mistakes={
                     "zero": lambda: np.zeros((5, 3)),
@@ -218,38 +226,40 @@ EXERCISES = (
                     "level": lambda: _rows_from_edges(normal=[0.0, 0.0, 1.0]),
                 },
                 hints={
-                    "zero": "Nothing there yet: zero rows allow every force.",
-                    "outside": "That polyhedron lies outside the cone: its facets touch it in "
-                    "their middle.",
-                    "not_unit": "The normal is not of length one: make it so before its length "
-                    "counts as friction.",
-                    "scale": "The right half-spaces, in another scale: without the normal's part "
-                    "each row has length one.",
-                    "sign": "The sign: rows @ f ≤ 0 must hold for forces inside.",
-                    "normal_sign": "The sign of the normal's part: with + the rows forbid to push.",
+                    "zero": "There is no answer yet. Zero rows allow every force.",
+                    "outside": "That polyhedron is outside the cone: its facets touch the cone "
+                    "in their middle.",
+                    "not_unit": "The normal is not a unit vector. Normalize it before you use "
+                    "it for the friction term.",
+                    "scale": "These are the right half-spaces with another scale. Without its "
+                    "normal component, each row must have length one.",
+                    "sign": "The sign is wrong. rows @ f ≤ 0 must hold for forces inside.",
+                    "normal_sign": "The sign of the normal component is wrong. With a plus, the "
+                    "constraints forbid pushing.",
                     "no_mu": "μ is missing: these are the facets for μ = 1.",
-                    "turned": "The facets are turned by half a facet: facet 0 must face t1.",
-                    "level": "These are the rows of level ground: use the normal that is given.",
+                    "turned": "The facets are rotated by half a facet. Facet 0 must face t1.",
+                    "level": "These are the constraints on level ground. Use the given normal.",
                 },
             ),
             {
-                (3, 5): "This is the transpose: one row for each facet.",
-                (4, 3): "Four rows; five facets are asked for.",
-                (5,): "Five numbers; each facet needs a row of three.",
+                (3, 5): "This is the transpose. The matrix has one row for each facet.",
+                (4, 3): "There are four rows, but five facets are required.",
+                (5,): "There are five numbers, but each facet needs a row of three.",
             },
         ),
-        explanation="A facet's row takes the force along d_i and subtracts what friction allows in "
-        "its middle, μ cos(π/5) nᵀf.",
+        explanation="The row of a facet takes the force along d_i and subtracts what friction "
+        "allows in the middle of the facet, μ cos(π/5) nᵀf.",
     ),
     Exercise(
         name="06.2",
-        statement="The steepest slope, degrees, on which a force straight up stays in 8 facets "
-        "inside the cone, μ = 0.7.",
+        statement="The steepest slope, in degrees, on which a vertical force stays inside a "
+        "polyhedron with 8 facets inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
         judge=NumericJudge(
             right=_slip_angle,
-            praise="Two degrees less than the cone itself: the price of flat facets.",
+            praise="This is two degrees less than for the cone itself, because the facets are "
+            "flat.",
             mistakes={
                 "45": lambda: 45.0,
                 "radians": lambda: np.deg2rad(_slip_angle()),
@@ -262,34 +272,35 @@ EXERCISES = (
                 "cosine_on_angle": lambda: _slip_angle(None) * np.cos(np.pi / 8),
             },
             hints={
-                "45": "At 45° a force straight up needs μ = 1.",
+                "45": "At 45°, a vertical force needs μ = 1.",
                 "radians": "That is in radians.",
-                "round": "That is the round cone. A facet faces uphill, as this force leans; its "
-                "middle allows less than μ.",
-                "round_radians": "That is the angle in radians, and of the round cone.",
-                "sine": "A sine: on a slope α_∥ / α_⊥ is a tangent.",
-                "round_sine": "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet "
-                "allows less than μ.",
-                "four_facets": "That is for 4 facets, as before; here are 8.",
-                "outside": "That is for facets outside the cone; ask what their middle allows "
-                "inside.",
-                "cosine_on_angle": "That is the loss in degrees on the angle itself; the cosine "
-                "goes with μ.",
+                "round": "That is the round cone. A facet faces uphill, in the direction of "
+                "this force, and its middle allows less than μ.",
+                "round_radians": "That is the angle in radians, and for the round cone.",
+                "sine": "This uses a sine. On a slope, α_∥ / α_⊥ is a tangent.",
+                "round_sine": "This uses a sine and the round cone. α_∥ / α_⊥ is a tangent, and "
+                "a facet allows less than μ.",
+                "four_facets": "That is for 4 facets, as before. Here there are 8.",
+                "outside": "That is for facets outside the cone. What does the middle of a "
+                "facet allow inside?",
+                "cosine_on_angle": "This multiplies the angle by the cosine. The cosine belongs "
+                "to μ.",
             },
         ),
-        explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a "
-        "facet allows μ cos(π/8).",
+        explanation="α_∥ / α_⊥ of a vertical force is the tangent of the slope, and the middle "
+        "of a facet allows μ cos(π/8).",
     ),
     Exercise(
         name="06.3",
-        statement="The fewest facets inside the cone whose middles lose less than 5 % of the "
-        "tangential force.",
+        statement="The smallest number of facets inside the cone with which the middle of a "
+        "facet loses less than 5 % of the tangential force.",
         stub="fewest = 4  # replace this number",
         solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
         judge=NumericJudge(
             is_count=True,
             right=partial(_fewest, _lost_force),
-            praise="With 10 facets 4.9 % are lost in their middle, nothing at the edges.",
+            praise="With 10 facets, 4.9 % is lost in the middle of a facet and nothing at the "
+            "edges.",
             mistakes={
                 "area": partial(_fewest, _lost_area),
                 "outside": lambda: _fewest(partial(_lost_force, inside=False)),
@@ -299,21 +310,22 @@ EXERCISES = (
                 "not_fewest": lambda: 16,
             },
             hints={
-                "area": "That many are needed to lose less than 5 % of the area; the question is "
-                "about force.",
-                "outside": "That is for a polyhedron outside: what its edges promise too much.",
-                "one_too_few": "One facet too few: it loses 6 %.",
-                "four": "Four lose 29 %.",
-                "eight": "Eight lose 7.6 %.",
-                "not_fewest": "Enough, but not the fewest.",
+                "area": "That number is needed to lose less than 5 % of the area. The question "
+                "is about the force.",
+                "outside": "That is for a polyhedron outside the cone: how much its edges allow "
+                "in excess.",
+                "one_too_few": "That is one facet too few: it loses 6 %.",
+                "four": "Four facets lose 29 %.",
+                "eight": "Eight facets lose 7.6 %.",
+                "not_fewest": "That is enough, but not the smallest number.",
             },
         ),
-        explanation="1 - cos(π/n) < 0.05; for small angles it is about 5 / n².",
+        explanation="1 - cos(π/n) < 0.05. For small angles, 1 - cos(π/n) is about 5 / n².",
     ),
     Exercise(
         name="06.4",
-        statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin "
-        "of 3 N to its true cone.",
+        statement="Forces on a slope of 20°, shape (12,), N, world, that are balanced and each "
+        "have a margin of 3 N to their round cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import com_wrench_map\n\n"
@@ -328,8 +340,8 @@ EXERCISES = (
         judge=_judge_forces,
         namespace=lambda: {"robot": fb.load("go2"), "on_hill": stance_on_hill},
         examples=_forces,
-        explanation="The rows of all feet with -3 on their right side, the balance as equalities, "
-        "and least forces to choose.",
+        explanation="The constraints of all feet with -3 on the right-hand side, the balance as "
+        "equality constraints, and the smallest forces as the objective.",
     ),
 )
 

@@ -56,57 +56,58 @@ def rows_on_three_feet() -> int:
 def judge_rows(G: Array) -> Verdict:
     """Judge the matrix G by G x ≤ 0 on vectors x, whatever the order and length of its rows."""
     if not np.any(G):
-        return Verdict(False, "There is nothing there yet: rows of zeros forbid nothing.", "zero")
+        return Verdict(False, "There is no answer yet. Zero rows do not forbid anything.", "zero")
     felt = [i for i in range(42) if np.any(G[:, i])]
     if not set(felt) <= {36, 37, 38}:
         return Verdict(
             False,
-            f"These rows feel {_places(felt)}. RL is the third foot of λ: which columns of x are "
-            f"its own?",
+            f"These rows depend on {_places(felt)}. RL is the third foot of λ. Which columns of x "
+            f"belong to it?",
             "columns",
         )
     if not np.all(np.any(G, axis=1)):
-        return Verdict(False, "One of the four rows is zero: a pyramid has four sides.", "zero_row")
+        return Verdict(
+            False, "One of the four rows is zero, but a pyramid has four sides.", "zero_row"
+        )
     own = G[:, 36:39]
     if _agrees(own, INNER):
         return Verdict(
             True,
-            "Four rows of 42 numbers, three of them at work: that is all a solver knows of a "
-            "friction cone.",
+            "Four rows of 42 numbers, with three non-zero columns. That is all a solver knows "
+            "about a friction cone.",
         )
     if _agrees(-own, INNER):
         return Verdict(
             False,
-            "The sign: these rows are G x ≥ 0. A force straight up must give G x ≤ 0.",
+            "The sign is wrong: these rows are G x ≥ 0. A vertical upward force must satisfy G "
+            "x ≤ 0.",
             "sign",
         )
     if _agrees(own, MU):
         around = (
-            "This pyramid lies around the cone: at its edges it believes in more than μ. "
-            "Inside, μ' is μ cos 45°."
+            "This pyramid is outside the cone: at its edges it allows more than μ. Inside, μ' "
+            "is μ cos 45°."
         )
         return Verdict(False, around, "around")
     if _agrees(own, MU * np.cos(45)):
-        return Verdict(False, "np.cos takes radians: 45° is π/4.", "radians")
+        return Verdict(False, "np.cos takes radians, and 45° is π/4.", "radians")
     if _agrees(own, 1 / INNER):
         turned = (
-            "This is the pyramid of a ground with μ = 1/0.7: which of the two forces is at "
-            "most how much of the other?"
+            "This is the pyramid for μ = 1/0.7. Which of the two forces is limited by the other "
+            "one?"
         )
         return Verdict(False, turned, "inverse_mu")
     if np.any(own @ [0.0, 0.0, 1.0] > 0):
         return Verdict(
             False,
-            "A force straight up is forbidden by these rows: look at the signs of the last column.",
+            "These rows forbid a vertical upward force. Check the signs of the last column.",
             "up_forbidden",
         )
     if np.all(own @ [0.2, 0.0, 1.0] <= 0) and np.all(own @ [2.0, 0.0, 1.0] <= 0):
-        return Verdict(
-            False, "These rows let the foot lean forwards as far as it likes.", "leans_freely"
-        )
+        return Verdict(False, "These rows allow any forward tangential force.", "leans_freely")
     return Verdict(
         False,
-        "These rows allow other forces than the pyramid with its sides towards ±x and ±y does.",
+        "These rows do not allow the same forces as the pyramid with its sides towards ±x and ±y.",
         "other_forces",
     )
 
@@ -215,7 +216,8 @@ def judge_design(given: Array) -> Verdict:
     if np.any(given < 0) or given[2] == 0:
         return Verdict(
             False,
-            "Gains and weights are not negative, and the centre of mass needs a weight above 0.",
+            "Gains and weights must not be negative, and the centre of mass needs a weight "
+            "above 0.",
             "negative",
         )
     record = lasting_or_verdict(lambda: _record(tuple(given.tolist())))
@@ -225,43 +227,44 @@ def judge_design(given: Array) -> Verdict:
     strayed = 1e3 * record.slip().max()
     end = rounded(round(away[-1], 1), "mm", floor=0.5)
     told = (
-        f"{rounded(away.max(), 'mm')} away, {end} at the end; a foot strays "
+        f"x_c moves by {rounded(away.max(), 'mm')} at most, {end} at the end; a foot moves by "
         f"{rounded(strayed, 'mm')}"
     )
     if away.max() > AWAY and away[-1] > BACK:
         return Verdict(
             False,
-            f"It goes too far and does not come back: {told}. Look at what each gain does to e.",
+            f"The robot goes too far and stays there: {told}. How does each gain affect e?",
             "stays_away",
         )
     if away[-1] > BACK:
         return Verdict(
             False,
-            f"It creeps home too slowly: {told}. A damper without a spring behind it forgets the "
+            f"The robot returns too slowly: {told}. A damper without a spring does not know the "
             f"place.",
             "creeps",
         )
     if away.max() > AWAY and strayed > STRAYED:
         return Verdict(
             False,
-            f"It goes too far, and a foot strays: {told}. A spring pulls hardest at the far end, a "
-            f"damper earlier.",
+            f"The robot goes too far, and a foot slips: {told}. A spring pulls hardest at the far "
+            f"end, a damper earlier.",
             "too_far_and_strays",
         )
     if away.max() > AWAY:
         return Verdict(
             False,
-            f"It goes too far: {told}. When is there most to gain, early or late in the push?",
+            f"The robot goes too far: {told}. When does braking help most, early or late in the "
+            f"push?",
             "too_far",
         )
     if strayed > STRAYED:
         return Verdict(
-            False, f"A foot strays: {told}. It pulls home harder than it needs to.", "strays"
+            False, f"A foot slips: {told}. The robot pulls back harder than necessary.", "strays"
         )
     return Verdict(
         True,
-        f"On the physics: {told}. Damping brakes while the push still lasts; the spring then only "
-        f"brings it home.",
+        f"In simulation: {told}. The damping brakes while the push still acts. Then the spring "
+        f"only has to bring the robot back.",
     )
 
 

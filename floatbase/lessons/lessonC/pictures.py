@@ -194,7 +194,7 @@ def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list
     rows = [qp.inequality_names.index(name) for name in working]
     G, k = qp.G[rows], len(rows)
     if k and np.linalg.matrix_rank(G) < k:
-        return None, [f"{' and '.join(working)}: these lines do not intersect in a single point"]
+        return None, [f"{' and '.join(working)}: no point in common, or dependent on one another"]
     found = np.linalg.solve(
         np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]])
     )

@@ -99,19 +99,19 @@ def _kicks() -> dict[str, Callable[[], Any]]:
 def _judge_report(answer: Any) -> Verdict:
     """Judge a seed and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: the report is a list of lines.", "no_answer")
+        return Verdict(False, "There is no answer yet. The report is a list of lines.", "no_answer")
     if (
         not isinstance(answer, list | tuple)
         or not answer
         or not all(isinstance(line, str) for line in answer)
     ):
         return Verdict(
-            False, 'The report is a list of lines of text, such as "A: mass 0.93".', "no_lines"
+            False, 'The report must be a list of lines of text, such as "A: mass 0.93".', "no_lines"
         )
     seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
     if not seed or int(seed[1]) > LARGEST_SEED:
         return Verdict(
-            False, 'The first line says which boxes these are, as in "seed 7".', "no_seed"
+            False, 'The first line must give the seed of the boxes, as in "seed 7".', "no_seed"
         )
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
     told = {name: line for name, line in lines.items() if line.strip(" ?.")}
@@ -124,13 +124,13 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     if unknown := sorted(set(told) - set(cases)):
         return Verdict(
             False,
-            f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.",
+            f"There is no box {unknown[0]}. The boxes are A to F, each on its own line.",
             "no_such_box",
         )
     if not told:
         return Verdict(
             False,
-            'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".',
+            'There is no line yet. A line names a fault and its evidence, such as "A: mass 0.93".',
             "nothing_said",
         )
     boxes = {box.name: box for box in black_boxes(seed)}
@@ -141,7 +141,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
     solved = [name for name, verdict in verdicts.items() if verdict.right]
     left = [name for name in cases if name not in verdicts]
     if not wrong and not left:
-        return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
+        return Verdict(True, "Six faults, each with solid evidence. The insurance pays.")
     parts = [
         f"Solved: {', '.join(solved)}." if solved else "",
         *wrong,
@@ -178,8 +178,8 @@ def _judge_program(answer: Any) -> Verdict:
             return wrong
     return Verdict(
         True,
-        "Six faults found in boxes it had never seen, each with its evidence, and no innocent "
-        "accused.",
+        "Your program found six faults in unseen boxes, each with its evidence, and accused no "
+        "innocent robot.",
     )
 
 
@@ -193,19 +193,20 @@ def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Ver
         line = program(box)
     except Exception as error:  # whatever a learner's function raises
         return Verdict(
-            False, f"Of {what}: your function stops with {type(error).__name__}: {error}", "stops"
+            False, f"With {what}, your function stops with {type(error).__name__}: {error}", "stops"
         )
     if not isinstance(line, str):
         said = (
-            f'Return a line of text, such as "mass 0.93" or "nothing"; this is '
-            f"{type(line).__name__}."
+            f'Return a line of text, such as "mass 0.93" or "nothing", not {type(line).__name__}.'
         )
         return Verdict(False, said, "no_text")
     verdict = judge_line(case, box, line)
     return (
         None
         if verdict.right
-        else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
+        else Verdict(
+            False, f'About {what}, your program says "{line}": {verdict.text}', verdict.hint
+        )
     )
 
 
@@ -270,8 +271,8 @@ def _programs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="X.1",
-        statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of "
-        "a robot without a fault.",
+        statement="The impulse of a kick, shape (3,), N·s, world, from what is missing in (7) "
+        "in the record of a robot without a fault.",
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
         solution="missed = required_forces(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
@@ -281,32 +282,30 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_impulse,
-                praise="Nobody recorded the kick, and you know how hard it was and where it came "
-                "from.",
+                praise="The kick was not recorded, and still you know how hard it was and where "
+                "it came from.",
                 mistakes=_kicks(),
                 hints={
-                    "zero": "There is nothing there yet: the first three columns of what (7) "
-                    "misses, summed up over time.",
-                    "base_axes": "Those are the base's axes, which turn: take each row into the "
-                    "world's by R before you sum "
-                    "up.",
-                    "no_duration": "A sum of forces is no impulse yet: each row lasts 2 ms.",
-                    "fall": "The blows of the fall are in it, too: take the time of the kick "
-                    "alone.",
-                    "force": "That is the force, N. How long did it last?",
-                    "momentum": "That is what the robot's momentum gained. The ground has its part "
-                    "in that.",
+                    "zero": "There is no answer yet. Take the first three columns of what is "
+                    "missing in (7), and sum over time.",
+                    "base_axes": "These are the axes of the base, which turn. Convert each row "
+                    "to the world's axes by R before you sum.",
+                    "no_duration": "A sum of forces is not an impulse yet. Each row lasts 2 ms.",
+                    "fall": "This includes the impacts of the fall. Use only the time of the kick.",
+                    "force": "That is the force, N. How long did it act?",
+                    "momentum": "That is the change of the robot's momentum. The ground "
+                    "contributed to it, too.",
                 },
                 tolerance=0.02,
             ),
             {
-                (): "Three numbers: an impulse has a direction.",
-                (6,): "The force alone, three numbers, without its moment.",
+                (): "The answer has three numbers: an impulse has a direction.",
+                (6,): "Only the force counts, three numbers, without its moment.",
             },
         ),
         examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
-        explanation="Who touches the robot is missing in (7). The first rows have no motor that "
-        "could have done it.",
+        explanation="Whatever touches the robot is missing in (7). No motor acts in the first "
+        "rows, so no motor can be the cause.",
         namespace=lambda: {"kicked": kicked_box(), "required_forces": required_forces},
     ),
     Exercise(
@@ -323,19 +322,19 @@ EXERCISES = (
         'report += [f"{box.name}: {detective(box)}" for box in black_boxes(seed)]',
         judge=_judge_report,
         examples=_reports,
-        explanation="The detective is the solution of X.3, which reveal shows there.",
+        explanation="The detective is the solution of X.3, which `reveal` shows there.",
         namespace=lambda: {"seed": 1, "black_boxes": black_boxes},
     ),
     Exercise(
         name="X.3",
-        statement="A program that sees only a box, and names its fault with the evidence, or "
-        "nothing.",
+        statement="A program that sees only a box and returns its fault with the evidence, or "
+        '"nothing".',
         stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as '
         "in your report",
         solution=inspect.getsource(investigation),
         judge=_judge_program,
         examples=_programs,
-        explanation="The plan first, then the motors, then the ground: each question has an answer "
-        "of its own.",
+        explanation="First check the plan, then the motors, then the ground. Each question has "
+        "its own answer.",
     ),
 )
