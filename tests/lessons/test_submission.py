@@ -95,7 +95,7 @@ def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_ag
     progress.append("99.1", {"tries": 1, "right": 1})  # of another course
     hand_in("Ada")
     said = capsys.readouterr().out
-    assert "1 of" in said and "your answers to 00.1: check them once more" in said
+    assert "1 of" in said and "your answers to 00.1. Check them once more" in said
     check("00.1", LIFTED)
     hand_in("Ada")
     assert "once more" not in capsys.readouterr().out
