@@ -42,10 +42,10 @@ class Walk:
 
     It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
     `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
-    next footholds (`neutral_point`) and the centre of mass (`LIPM`) from its present position. In
-    each control step it shifts the ends of the swings by `step_adjustment`, as far as the legs
-    reach. The rest is done by one `WholeBodyController` for each stance. If no contact forces can
-    hold the feet, their contacts become soft.
+    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
+    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
+    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
+    forces can hold the feet, their contacts become soft.
 
     If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present

@@ -31,10 +31,10 @@ from floatbase.simulation.push import Push, as_pushes
 _FALLEN_HEIGHT_FRACTION = 0.4
 _FALLEN_COSINE = float(
     np.cos(np.deg2rad(60.0))
-)  # of the base's tilt since the last reset: no leg brings it back from there
+)  # of the base's tilt since the last reset: no leg can recover from more
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
-_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and a contact's time constant is 4 ms
+_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # after this warning of MuJoCo or a later one, its numbers are meaningless

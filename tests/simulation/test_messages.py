@@ -1,4 +1,4 @@
-"""What the physics and the loop refuse: the type of each error, and the names and numbers in it."""
+"""Errors of simulations and rollouts: their types, and the names and numbers in their messages."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
             "controller",
             "gain",
         ),
-        # go2 and solo12 have equally many joints: nothing but the robot itself tells them apart
+        # go2 and solo12 have the same number of joints: only the robots themselves differ
         (
             lambda: fb.rollout(fb.Simulation(SOLO), judges.controller_of("go2"), 0.01),
             InputError,
@@ -168,6 +168,6 @@ def test_a_push_that_does_not_act_in_a_rollout_is_said(
         fb.rollout(sim, limp, 0.02)
         fb.rollout(
             copy.copy(sim), limp, 0.01, [idle, near]
-        )  # of a copy: sim itself stays where it is
+        )  # a copy, so that sim itself does not move
     with warns(SimulationWarning, *numbers):
         fb.rollout(sim, limp, 0.01, [idle])
