@@ -1,4 +1,4 @@
-"""Regularization tasks, which keep contact forces and joint torques near a target."""
+"""Regularisation tasks, which keep contact forces and joint torques near a target."""
 
 from __future__ import annotations
 
