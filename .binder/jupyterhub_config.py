@@ -14,8 +14,8 @@ Start the hub with:
 Browsers need only the hub's own address, because pictures use Jupyter's connection. Use https
 before students type passwords: set `c.JupyterHub.ssl_key` and `ssl_cert`, or use a web server. If
 students might attack each other, also give each server its own host name with
-`c.JupyterHub.subdomain_host`. Otherwise a page that one student makes and another opens can act with
-the other's rights.
+`c.JupyterHub.subdomain_host`. Otherwise a page that one student makes and another opens can act
+with the other's rights.
 """
 
 import sys
@@ -23,7 +23,7 @@ import sys
 c = get_config()  # noqa: F821  JupyterHub defines it
 
 c.JupyterHub.bind_url = "http://:8000"
-# every account of this machine except root; to name them, set c.Authenticator.allowed_users = {"ada"}
+# every account of this machine except root; or name them: c.Authenticator.allowed_users = {"ada"}
 c.Authenticator.allow_all = True
 c.Authenticator.blocked_users = {"root"}
 
@@ -41,7 +41,7 @@ c.Spawner.start_timeout = 120  # s: many servers start in the first minute of a 
 c.Spawner.http_timeout = 120
 c.Spawner.environment = {"OPENBLAS_NUM_THREADS": "1"}  # one student's matrices do not use all cores
 c.Spawner.args = [
-    # other accounts of the machine could connect to a kernel's ports, but not to sockets in that folder
+    # other accounts of the machine could connect to a kernel's ports, but not to its sockets
     "--KernelManager.transport=ipc",
     # s after which a kernel without a page ends
     "--MappingKernelManager.cull_idle_timeout=3600",

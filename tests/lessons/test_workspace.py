@@ -69,7 +69,9 @@ def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> No
     claims = new_code_cell(
         "assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}}
     )
-    question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
+    question.outputs = [
+        new_output("stream", text="00.a: skipped. You can go on without a prediction.")
+    ]
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
     prepare_workspace(course)
     copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells
@@ -260,14 +262,14 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(
+def test_what_stands_in_the_way_of_one_file_is_reported_and_the_others_are_updated(
     mine: Path, obstacle: str
 ) -> None:
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line]
+        (told,) = [line for line in prepare_workspace(mine.parent) if "not updated" in line]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -294,11 +296,11 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
 @pytest.mark.parametrize(
     "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
 )
-def test_a_folder_that_cannot_be_is_told_in_words(
+def test_a_folder_that_cannot_be_created_is_reported(
     course: Path, make: Callable[[Path], object]
 ) -> None:
     make(course / MY_FOLDER)
-    with pytest.raises(InputError, match="must be a folder"):
+    with pytest.raises(InputError, match="can write to"):
         prepare_workspace(course)
 
 
