@@ -107,7 +107,7 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: P
     page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function(
-        "document.querySelector('#panel p.plot').textContent.includes('difference of')"
+        "document.querySelector('#panel p.plot').textContent.includes('difference between')"
     )
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
