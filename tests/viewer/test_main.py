@@ -63,7 +63,9 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
     # where `make setup` did not
-    compiled = "floatbase compiles its controller, once: about a minute.\n"
+    compiled = (
+        "floatbase is compiling its controller. This happens once and takes about a minute.\n"
+    )
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 
