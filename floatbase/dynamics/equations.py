@@ -81,12 +81,12 @@ class EquationsOfMotion(Value):
     @property
     def d(self) -> int:
         """Length of τ."""
-        return self.robot.d
+        return int(self.S.shape[1])
 
     @property
     def k(self) -> int:
         """Length of λ."""
-        return self.contacts.k
+        return len(vars(self)["J"]) if "J" in vars(self) else self.contacts.k
 
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h), shape (nv,), for torques (d,), N·m, and forces (k,), N,
