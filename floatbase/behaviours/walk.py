@@ -13,7 +13,15 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_callable, as_instance, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_callable,
+    as_instance,
+    as_number,
+    as_positive,
+    refuse_new_attributes,
+)
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.lipm import LIPM
@@ -69,6 +77,8 @@ class Walk:
     `history` tell what it is doing. A controller of your own around it needs its `contacts`, as
     they are at each tick. Raises `InputError` for arguments that do not fit.
     """
+
+    __setattr__ = refuse_new_attributes
 
     def __init__(
         self,
