@@ -180,8 +180,9 @@ class Walk:
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = as_array("velocity", velocity, (2,), "m/s")
-        as_number("speed", float(np.linalg.norm(self._velocity)), "m/s", maximum=_MAX_SPEED)
+        velocity = as_array("velocity", velocity, (2,), "m/s")
+        as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+        self._velocity = velocity
 
     @property
     def yaw_rate(self) -> float:
