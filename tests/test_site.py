@@ -19,11 +19,13 @@ import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from floatbase.errors import InputError
 from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
 from floatbase.lessons.publish.site import (
     add_links,
     mathml,
     prepare_lesson,
+    replace_site,
     run_lessons,
 )
 
@@ -163,6 +165,7 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any
     for path in pages(built):
         page.goto(path.as_uri())
         wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
+        wide += [f"{path.name}: {source[-60:]}" for source in page.evaluate(STRETCHED)]
     page.close()
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert (said, wide) == ([], [])
@@ -184,6 +187,11 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
     page.close()
 
 
+# addresses of images whose proportions are not their own
+STRETCHED = """() => [...document.images].filter((image) => {
+    const shown = image.clientWidth / image.clientHeight;
+    return image.clientHeight && Math.abs(shown * image.naturalHeight / image.naturalWidth - 1) > .05;
+}).map((image) => image.src)"""
 SEARCHES = {
     "install": "Installation and troubleshooting",
     "jupyterhub": "Teaching with floatbase",
@@ -215,6 +223,29 @@ def test_search_lists_the_right_page_among_the_first_three(built: Path, browser:
     assert {
         words: found[words] for words, title in SEARCHES.items() if title not in found[words]
     } == {}
+
+
+def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
+    built, folder = tmp_path / "built", tmp_path / "gh-pages"
+    (built / "api").mkdir(parents=True)
+    (folder / ".git").mkdir(parents=True)
+    (folder / ".git" / "config").write_text("unpushed")
+    (folder / ".buildinfo").write_text("of another project")
+    for name in ("index.html", "api/old.html"):
+        (built / name).write_text("first")
+    replace_site(built, folder)
+    (built / "api/old.html").unlink()
+    (built / "index.html").write_text("second")
+    replace_site(built, folder)
+    assert (folder / "index.html").read_text() == "second"
+    assert not (folder / "api/old.html").exists()
+    assert (folder / ".git" / "config").read_text() == "unpushed"
+    assert (folder / ".buildinfo").read_text() == "of another project"
+    (built / "CNAME").write_text("ours")
+    (folder / "CNAME").write_text("x.org")
+    with pytest.raises(InputError, match="CNAME"):
+        replace_site(built, folder)
+    assert (folder / "CNAME").read_text() == "x.org"
 
 
 class NoPictures:

@@ -5,7 +5,7 @@ user-defined rows.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, TypeAlias, cast
@@ -17,12 +17,16 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
+    as_bool,
     as_callable,
     as_instance,
+    as_integer,
+    as_number,
     as_positive,
     as_string,
     as_strings,
     cached_property,
+    checked,
     numeric_copy,
     read_only,
     short_repr,
@@ -30,6 +34,7 @@ from floatbase._validation import (
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
+from floatbase.friction.cones import MAX_FACETS
 from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits
@@ -58,25 +63,24 @@ class LinearInequality(Value):
     `at` does so for shapes that do not fit.
     """
 
-    name: str
-    block: Block
+    name: str = field(metadata=checked(as_string))
+    block: Block = field(metadata=checked(as_string))
     coefficients: Coefficients | Callable[[EquationsOfMotion, float], Coefficients]
-    row_names: Sequence[str] = ()
+    row_names: Sequence[str] = field(default=(), metadata=checked(as_strings))
 
     def __post_init__(self) -> None:
-        as_string("name of the inequality", self.name)
-        if as_string("block of the inequality", self.block) not in BLOCKS:
+        super().__post_init__()
+        if self.block not in BLOCKS:
             raise InputError(
-                f'inequality {self.name!r} has block {short_repr(self.block)}; it must be "qdd", '
-                f'"tau" or "forces".'
+                f'block of {self._label()} is {self.block!r}. It must be "qdd", "tau" or "forces".'
             )
-        object.__setattr__(
-            self, "row_names", as_strings(f"row_names of {self.name}", self.row_names)
-        )
         if callable(self.coefficients) and not isinstance(self.coefficients, type):
             as_callable(f"coefficients of {self.name}", self.coefficients, "coefficients(eom, t)")
         else:
             object.__setattr__(self, "coefficients", self._checked(self.coefficients, None))
+
+    def _label(self) -> str:
+        return f"inequality {self.name!r}"
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
@@ -125,6 +129,42 @@ class LinearInequality(Value):
         return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
 
+def _as_limits(name: str, value: npt.ArrayLike) -> Array:
+    """Torque limits of as many joints as they are given for, checked."""
+    limits = numeric_copy(value)
+    return as_torque_limits(1 if limits is None else limits.size, value)
+
+
+def _as_bounds(name: str, value: Any, optional: bool = False) -> NormalForces:
+    """Return a checked copy of bounds of normal forces; none at all may be given if `optional`."""
+    given = {} if optional and value is None else value
+    if not isinstance(given, Mapping):
+        number = numeric_copy(given)
+        if number is None or number.ndim:
+            raise InputError(
+                f"{name} is {short_repr(given)}. It must be one number (N), or a mapping from "
+                f"names of contacts to numbers or functions of t, such as "
+                f'{{"FL_foot": lambda t: …}}.'
+            )
+        return as_positive(name, given, "N", allow_zero=True)
+    return MappingProxyType(
+        {
+            contact: as_callable(f"{name} at {contact}", bound, "force(t)")
+            if callable(bound)
+            else as_positive(f"{name} at {contact}", bound, "N", allow_zero=True)
+            for contact, bound in given.items()
+        }
+    )
+
+
+def _as_inequalities(name: str, value: Any) -> tuple[LinearInequality, ...]:
+    """Return user-defined inequalities as a tuple, checked."""
+    if isinstance(value, LinearInequality) or not isinstance(value, Sequence):
+        raise InputError(f"{name} must be a list of LinearInequality, not {short_repr(value)}.")
+    example = "floatbase.control.LinearInequality(name, block, (G, h))"
+    return tuple(as_instance(f"each of {name}", each, LinearInequality, example) for each in value)
+
+
 @dataclass(frozen=True, eq=False)
 class Limits(Value):
     """The inequalities of (27).
@@ -144,50 +184,17 @@ class Limits(Value):
     """
 
     _example = "controller.limits"
-    torque_limits: Array
-    facets: int = 4
-    inner_approximation: bool = True
-    min_normal_force: NormalForces = 0.0
-    max_normal_force: NormalForces | None = None
-    inequalities: Sequence[LinearInequality] = ()
-    facet_rotation: float = 0.0
-
-    def __post_init__(self) -> None:
-        limits = numeric_copy(self.torque_limits)
-        object.__setattr__(
-            self,
-            "torque_limits",
-            as_torque_limits(1 if limits is None else limits.size, self.torque_limits),
-        )
-        object.__setattr__(
-            self, "min_normal_force", _checked_bounds("min_normal_force", self.min_normal_force)
-        )
-        object.__setattr__(
-            self,
-            "max_normal_force",
-            _checked_bounds(
-                "max_normal_force", {} if self.max_normal_force is None else self.max_normal_force
-            ),
-        )
-        polyhedron = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, *self.polyhedron_options)
-        for name in ("facets", "inner_approximation", "facet_rotation"):
-            object.__setattr__(self, name, getattr(polyhedron, name))
-        if isinstance(self.inequalities, LinearInequality) or not isinstance(
-            self.inequalities, Sequence
-        ):
-            raise InputError(
-                f"inequalities must be a list of LinearInequality, not "
-                f"{short_repr(self.inequalities)}."
-            )
-        example = "floatbase.control.LinearInequality(name, block, (G, h))"
-        object.__setattr__(
-            self,
-            "inequalities",
-            tuple(
-                as_instance("each of inequalities", each, LinearInequality, example)
-                for each in self.inequalities
-            ),
-        )
+    torque_limits: Array = field(metadata=checked(_as_limits))
+    facets: int = field(
+        default=4, metadata=checked(as_integer, 3, MAX_FACETS, "μ is never known more accurately")
+    )
+    inner_approximation: bool = field(default=True, metadata=checked(as_bool))
+    min_normal_force: NormalForces = field(default=0.0, metadata=checked(_as_bounds))
+    max_normal_force: NormalForces | None = field(
+        default=None, metadata=checked(_as_bounds, optional=True)
+    )
+    inequalities: Sequence[LinearInequality] = field(default=(), metadata=checked(_as_inequalities))
+    facet_rotation: float = field(default=0.0, metadata=checked(as_number, "rad"))
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
@@ -250,26 +257,6 @@ class Limits(Value):
         )
 
 
-def _checked_bounds(name: str, given: NormalForces) -> NormalForces:
-    """A checked copy of what bounds normal forces."""
-    if not isinstance(given, Mapping):
-        one = numeric_copy(given)
-        if one is None or one.ndim:
-            raise InputError(
-                f"{name} must be one number (N), or a mapping from the name of a contact to one or "
-                f'to a function, as {{"FL_foot": lambda t: …}}, not {short_repr(given)}.'
-            )
-        return as_positive(name, given, "N", allow_zero=True)
-    return MappingProxyType(
-        {
-            contact: as_callable(f"{name} of {contact}", value, "force(t)")
-            if callable(value)
-            else as_positive(f"{name} of {contact}", value, "N", allow_zero=True)
-            for contact, value in given.items()
-        }
-    )
-
-
 def _bounds_at(
     name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float
 ) -> Array:
@@ -280,7 +267,7 @@ def _bounds_at(
     for each in contacts.friction_contacts:
         value = given.get(each.name, otherwise)
         if callable(value):
-            value = as_positive(f"{name} of {each.name}", value(t), "N", allow_zero=True)
+            value = as_positive(f"{name} at {each.name}", value(t), "N", allow_zero=True)
         found += [value] * len(each.point_names)
     return np.array(found, dtype=np.float64)
 

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TypeAlias, cast
 
 import numpy as np
 
-from floatbase._validation import Array, Value, as_callable, as_instance, as_positive, short_repr
+from floatbase._validation import (
+    Array,
+    Value,
+    as_callable,
+    as_instance,
+    as_positive,
+    checked,
+    short_repr,
+)
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
 from floatbase.dynamics import (
@@ -45,19 +53,21 @@ class Problem(Value):
     fit.
     """
 
-    robot: Robot
-    contacts: Contacts
+    robot: Robot = field(metadata=checked(as_instance, Robot))
+    contacts: Contacts = field(metadata=checked(as_instance, Contacts))
     tasks: Sequence[Task]
-    limits: Limits
+    limits: Limits = field(metadata=checked(as_instance, Limits))
     modify_qp: ModifyQP | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("robot", Robot), ("contacts", Contacts), ("limits", Limits)):
-            as_instance(name, getattr(self, name), kind)
+        super().__post_init__()
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
+
+    def _label(self) -> str:
+        return "the control problem"
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """The QP at a state and a time t in s."""

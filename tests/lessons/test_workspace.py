@@ -69,7 +69,9 @@ def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> No
     claims = new_code_cell(
         "assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}}
     )
-    question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
+    question.outputs = [
+        new_output("stream", text="00.a: skipped. You can go on without a prediction.")
+    ]
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
     prepare_workspace(course)
     copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells

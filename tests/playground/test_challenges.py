@@ -43,7 +43,7 @@ SOLUTIONS: dict[str, list[tuple[float, Act]]] = {
     "Survive 300 N": [(0.0, change(steps_when_pushed=True)), (0.3, push(300.0, 90.0))],
     "Down an icy slope": [(0.0, change(slope=(20.0, 20.0), friction=(0.2, 0.2)))],
     "On an edge": [(0.0, change(friction=(0.1, 0.7))), (0.5, push(60.0, 45.0))],
-    "No answer": [(0.2, change(torque_fraction=0.1, min_normal_force=60.0))],
+    "Infeasible": [(0.2, change(torque_fraction=0.1, min_normal_force=60.0))],
     "Quick foot": [
         (0.0, change(com_shift=(-0.05, -0.03, 0.0))),
         (1.0, change(lifted_feet=("FL_foot",))),
@@ -190,7 +190,7 @@ def test_a_push_of_300_n_counts_in_every_direction() -> None:
     for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
         judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
         judge.observe(record, session)
-        assert judge.message.startswith("On its feet")
+        assert judge.message.startswith("Standing")
 
 
 def test_a_start_is_a_setting_that_the_card_itself_allows() -> None:

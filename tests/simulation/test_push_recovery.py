@@ -106,7 +106,7 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
     measured = axis.get_lines()[0]
     assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "largest push survived", "theory: capture point", "theory: steady push",
+        "largest push survived", "capture-point bound (theory)", "static bound (theory)",
     ]  # fmt: skip
     plt.close(axis.figure)
     refused(
@@ -133,7 +133,7 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
     grey = axis.get_lines()[1]
     assert (
         np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
-        and grey.get_label() == "largest push survived before"
+        and grey.get_label() == "largest push survived, previous run"
     )
     plt.close(axis.figure)
     assert {

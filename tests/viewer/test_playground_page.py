@@ -60,7 +60,7 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
             page.wait_for_timeout(30)
     picture(page, "playground_ends")
     page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
-    page.evaluate("viewer.gui_controllers['all as at first'].fire()")
+    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
     until(
         lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0,
         lambda: page.wait_for_timeout(20),
@@ -69,8 +69,8 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
     said = page.evaluate(
         "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
     )
-    assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["perfect", "perfect"]
-    page.wait_for_function("viewer.gui_controllers['friction believed'].getValue() == 0.7")
+    assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
+    page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
 
 
 def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -> None:
@@ -102,15 +102,15 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(
     def work() -> None:
         page.wait_for_timeout(20)
 
-    page.evaluate("viewer.gui_controllers['mass [×] true'].setValue(1.5)")
+    page.evaluate("viewer.gui_controllers['mass [×] reality'].setValue(1.5)")
     until(lambda: abs(sunk() - 0.049) < 0.01, work)
     page.wait_for_function(
         "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
     )
-    page.evaluate("viewer.gui_controllers['mass [×] believed'].setValue(1.5)")
+    page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function(
-        "document.querySelector('#panel p.plot').textContent.includes('differ by')"
+        "document.querySelector('#panel p.plot').textContent.includes('difference of')"
     )
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
@@ -134,7 +134,7 @@ def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None
     for size in (240.0, 220.0):
         field.push(size, 90.0)
         until(lambda seen=size: field.judge.largest_push == seen and field.run.status == "fell")
-        until(lambda seen=size: f"{0.1 * seen:.1f} N·s topple it" in field.judge.message)
+        until(lambda seen=size: f"{0.1 * seen:.1f} N·s toppled" in field.judge.message)
 
 
 def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None:
@@ -193,7 +193,7 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(
     until(
         lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
     )
-    page.evaluate("viewer.gui_controllers['all as at first'].fire()")
+    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
     until(
         lambda: shown() == before and (field.force, field.towards) == first,
         lambda: page.wait_for_timeout(20),

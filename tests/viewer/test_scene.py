@@ -364,10 +364,10 @@ def test_the_legend_names_what_is_shown(
     cone = [
         "friction cone: force inside",
         "friction cone: surface reached",
-        "friction cone: outside (rim)",
+        "friction cone: force outside (rim)",
     ]
     assert legend(viewer) == [
-        "measured force", "planned force", "centre of mass", "push", *cone, "support region",
+        "measured force", "planned force", "centre of mass", "push", *cone, "support polygon",
         "desired posture",
     ]  # fmt: skip
     viewer.show(standing, contacts, planned=forces)

@@ -83,7 +83,7 @@ NAN = float("nan")
         (lambda: shapes.label([0, 0, 0], "x", 0.0), "height", 0),
         (lambda: shapes.label([0, 0, NAN], "x", 0.1), "position", NAN),
         (lambda: shapes.rod([0, 0, 0], np.eye(3), 0.0, 0.1, MEASURED), "length", 0),
-        (lambda: shapes.transform([0, 0, 0], np.eye(3) * NAN), "axes", NAN),
+        (lambda: shapes.transform([0, 0, 0], np.eye(3) * NAN), "rotation", NAN),
         (lambda: shapes.flat_polygon([[0, 0, 0], [1, 0, 0]], MEASURED, 0.5), "corners", 2),
         (lambda: markers.curled_arrow([0, 0, 0], [0, 0, 0]), "arrow"),
         (lambda: markers.frame_axes(np.eye(3), 0.1), "pose", 3, 4),
@@ -198,7 +198,7 @@ def test_the_compass_is_plotted_and_drawn_to_scale(
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
     np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "reachable horizontal force"
+        "maximum horizontal force"
     ]
     plt.close(axis.figure)
     near, far = (
@@ -268,7 +268,7 @@ def test_prices_stand_at_the_middle_of_their_facets(
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
     assert [
         hex_code(viewer.painter.text_colour),
-        "price of a limit: its multiplier",
+        "multiplier (shadow price)",
         "patch",
     ] in legend
     with raises(InputError, "contacts", "solution"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 from floatbase.errors import InputError
@@ -69,6 +70,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--table", type=Path, metavar="CSV", help="also write a row per learner and exercise"
     )
     graded.add_argument("--code", action="store_true", help="print the code that was handed in")
+    graded.add_argument(
+        "--latest", action="store_true", help="grade only the last file of each learner"
+    )
+    graded.add_argument(
+        "--before",
+        type=datetime.fromisoformat,
+        metavar="TIME",
+        help="leave out files written after TIME, such as 2026-05-31T18:00",
+    )
     laid = commands.add_parser("workspace", help="update the learner's copy of the course")
     laid.add_argument(
         "--to",
@@ -91,7 +101,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
-            _grade(given.files, given.table, given.code)
+            unread = _grade(given.files, given.table, given.code, given.latest, given.before)
+            if unread:
+                parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
         else:
             for line in prepare_workspace(mine=given.to):
                 print(line)
@@ -125,16 +137,21 @@ def _solutions(folder: Path) -> None:
         print(path)
 
 
-def _grade(files: Sequence[Path], table: Path | None, code: bool) -> None:
+def _grade(
+    files: Sequence[Path], table: Path | None, code: bool, latest: bool, before: datetime | None
+) -> int:
     from floatbase.lessons.publish import grades
 
-    submissions = grades.grade_files(files)
+    submissions, unread = grades.grade_files(
+        files, latest=latest, before=before.astimezone() if before else None
+    )
     print(grades.overview(submissions))
     if code:
         print(grades.code_to_read(submissions))
     if table:
         grades.write_table(submissions, table)
         print(f"All marks: {table}")
+    return unread
 
 
 def _site(lessons: Sequence[Path] | None, folder: Path | None, stored: bool) -> None:

@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+import os
+import stat
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from textwrap import indent
 from typing import Any
@@ -102,8 +106,11 @@ def grade_file(path: str | Path) -> Submission:
 def _read(path: Path) -> dict[str, Any]:
     """Read a file of `hand_in`."""
     try:
-        large = path.stat().st_size > _LARGEST_FILE
-        found = None if large else json.loads(path.read_bytes())
+        # a FIFO or a device in a shared folder must not stop the grading of the others
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            is_file = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+            data = file.read(_LARGEST_FILE + 1) if is_file else b""
+        found = None if len(data) > _LARGEST_FILE else json.loads(data)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError):
@@ -149,25 +156,65 @@ def _one_line(value: Any) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in str(value))[:80]
 
 
-def grade_files(files: Sequence[Path]) -> list[Submission]:
+def grade_files(
+    files: Sequence[Path], *, latest: bool = False, before: datetime | None = None
+) -> tuple[list[Submission], int]:
     """Judge files in their order, and report those that `hand_in` did not write.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files.
+    latest : bool
+        Whether to keep only the last file of each name.
+    before : datetime, optional
+        Whether to leave out files that were written later, or that do not say when.
+
+    Returns
+    -------
+    submissions : list of Submission
+        The grades.
+    unread : int
+        Number of files that could not be read.
 
     Raises
     ------
     InputError
         If no file is left.
     """
-    submissions = []
+    submissions, unread = [], 0
     for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
             submissions.append(grade_file(path))
         except InputError as error:
             print(error, file=sys.stderr)
+            unread += 1
+    if before:
+        times = [_time_of(one) for one in submissions]
+        submissions = [
+            one for one, time in zip(submissions, times, strict=True) if time and time <= before
+        ]
+    if latest:
+        last = {one.name: one for one in sorted(submissions, key=lambda one: _order(one))}
+        submissions = [one for one in submissions if last[one.name] is one]
     if not submissions:
         raise InputError(
             "There is no file to grade. Name files that learners wrote with hand_in(…)."
         )
-    return submissions
+    return submissions, unread
+
+
+def _time_of(submission: Submission) -> datetime | None:
+    """Return when a file was written, or None if it does not say so."""
+    try:
+        return datetime.fromisoformat(submission.time).astimezone()
+    except ValueError:
+        return None
+
+
+def _order(submission: Submission) -> float:
+    time = _time_of(submission)
+    return time.timestamp() if time else -math.inf
 
 
 def overview(submissions: Sequence[Submission]) -> str:
@@ -238,5 +285,8 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
 
 
 def _csv_safe(value: object) -> object:
-    """Prefix a value that a spreadsheet would read as a formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA_STARTS) else value
+    """Keep a spreadsheet from reading a value as a formula, also one that splits cells at ";"."""
+    if not isinstance(value, str):
+        return value
+    value = value.replace(";", ",")
+    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value

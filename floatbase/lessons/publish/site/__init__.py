@@ -7,7 +7,7 @@ Sphinx. The pages' texts are in the folder `docs`. This needs the extra `site`.
 
 from floatbase.lessons.publish.site import mathml
 from floatbase.lessons.publish.site.addresses import PACKAGES, exported
-from floatbase.lessons.publish.site.build import SITE, build
+from floatbase.lessons.publish.site.build import SITE, build, replace_site
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import add_links
 
@@ -19,5 +19,6 @@ __all__ = [
     "exported",
     "mathml",
     "prepare_lesson",
+    "replace_site",
     "run_lessons",
 ]

@@ -33,6 +33,7 @@ _MOVED = {
     "../benchmarks/": "benchmarks/",
     "../CHANGELOG.md": "changelog.md",
 }
+_FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
@@ -70,7 +71,8 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     Raises
     ------
     InputError
-        If a lesson does not exist.
+        If a lesson does not exist, or if the folder holds a file of the same name as a page that
+        an earlier build did not write.
     FloatbaseError
         If Sphinx reports a warning or an error.
     """
@@ -82,11 +84,9 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     *notebooks, scene = run_lessons(
         [*([] if stored else shown), _front_page_notebook()], RUN_FOLDER
     ).values()
-    pictures = Pictures(folder / "_static")
-    if (folder / ".buildinfo").exists():  # an earlier site, not another folder
-        shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
-        source = Path(place) / "source"
+        source, built = Path(place) / "source", Path(place) / "site"
+        pictures = Pictures(built / "_static")
         shutil.copytree(DOCS, source)
         (source / "benchmarks").mkdir()
         _write_lessons(
@@ -94,11 +94,33 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         )
         _write_texts(source, shown, _first_picture(scene, pictures))
         _write_reference(source / "api")
-        _run_sphinx(source, folder)
-    pictures.write()
-    pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
-    mathml.write_font(pages, folder / "_static" / mathml.FONT)
+        _run_sphinx(source, built)
+        pictures.write()
+        pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
+        mathml.write_font(pages, built / "_static" / mathml.FONT)
+        replace_site(built, folder)
     return folder / "index.html"
+
+
+def replace_site(built: Path, folder: Path) -> None:
+    """Replace the files of an earlier build in `folder`. All other files stay, such as a .git."""
+    for unused in built.rglob("*.map"):  # source maps of the theme
+        unused.unlink()
+    names = {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file()}
+    listed = folder / _FILE_LIST
+    earlier = set(listed.read_text(encoding="utf-8").splitlines()) if listed.is_file() else set()
+    earlier = {name for name in earlier if ".." not in name and not Path(name).is_absolute()}
+    if foreign := sorted(name for name in names - earlier if (folder / name).exists()):
+        raise InputError(
+            f"{folder / foreign[0]} was not written by an earlier build of the site, so it is not "
+            f"replaced. Choose another folder, or move the file."
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    # listed before they are copied, so that an interrupted build can be repeated
+    listed.write_text("".join(f"{name}\n" for name in sorted(names)), encoding="utf-8")
+    for name in earlier - names:
+        (folder / name).unlink(missing_ok=True)
+    shutil.copytree(built, folder, dirs_exist_ok=True)
 
 
 def _front_page_notebook() -> Path:
