@@ -133,7 +133,7 @@ def centre_of_mass(bodies: Bodies):
 
 @jit
 def copy_rows(numbers, first, n_rows, n_columns, out, row):
-    """Copy a table (n_rows, n_columns) from `numbers` into out (·, n_columns), and return where it ends.
+    """Copy a table (n_rows, n_columns) from `numbers` into `out`, and return where it ends.
 
     first: index in `numbers` where the table starts. row: first row of `out` to fill.
     """
