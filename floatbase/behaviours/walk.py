@@ -15,7 +15,15 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_callable, as_instance, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_callable,
+    as_instance,
+    as_number,
+    as_positive,
+    refuse_new_attributes,
+)
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.lipm import LIPM
@@ -104,6 +112,8 @@ class Walk:
     >>> walk
     Walk(go2, 4 feet, 0.3 and 0 m/s)
     """
+
+    __setattr__ = refuse_new_attributes
 
     def __init__(
         self,
@@ -205,8 +215,9 @@ class Walk:
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = as_array("velocity", velocity, (2,), "m/s")
-        as_number("speed", float(np.linalg.norm(self._velocity)), "m/s", maximum=_MAX_SPEED)
+        velocity = as_array("velocity", velocity, (2,), "m/s")
+        as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+        self._velocity = velocity
 
     @property
     def yaw_rate(self) -> float:

@@ -18,6 +18,7 @@ from floatbase._validation import (
     cached_property,
     numeric_copy,
     read_only,
+    refuse_new_attributes,
 )
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
@@ -86,6 +87,7 @@ class WholeBodyController:
     in conflict.
     """
 
+    __setattr__ = refuse_new_attributes
     _softened = False  # whether this controller answers what another one finds infeasible
 
     def __init__(

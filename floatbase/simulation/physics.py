@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     cross,
+    refuse_new_attributes,
 )
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
@@ -81,6 +82,7 @@ class Simulation:
     """
 
     _example = "fb.Simulation(robot)"
+    __setattr__ = refuse_new_attributes
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self._robot = as_instance("robot", robot, Robot)
@@ -93,7 +95,7 @@ class Simulation:
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
-        self.foot_contacts = FootContacts(self.model, self.ground, self.point_names)
+        self._foot_contacts = FootContacts(self.model, self.ground, self.point_names)
         self._planes = list(
             zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
         )
@@ -163,6 +165,11 @@ class Simulation:
     def point_names(self) -> tuple[str, ...]:
         """Names of the robot's contact points: point feet, and corners of flat feet."""
         return self.feet.point_names
+
+    @property
+    def foot_contacts(self) -> FootContacts:
+        """Reader of the feet's contacts."""
+        return self._foot_contacts
 
     @property
     def time(self) -> float:

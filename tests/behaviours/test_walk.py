@@ -571,9 +571,11 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),
     ):
         refused(call, InputError, *named)
-    for name in ("clearance", "history", "time"):
+    refused(lambda: setattr(walk, "velocity", (100.0, 0.0)), InputError, "speed", 100)
+    assert np.array_equal(walk.velocity, (0.0, 0.0))  # a value that was refused is not kept
+    for name in ("clearance", "history", "time", "velocty"):
         with pytest.raises(AttributeError):
-            setattr(walk, name, getattr(walk, name))
+            setattr(walk, name, getattr(walk, name, 0.2))
 
 
 @pytest.mark.parametrize("name", ["anymal_kinova", "hyq", "g1"])

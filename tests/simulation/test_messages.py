@@ -150,6 +150,13 @@ def test_what_a_simulation_was_made_with_cannot_be_set(name: str) -> None:
             setattr(sim, name, getattr(sim, name))
 
 
+@pytest.mark.parametrize("name", ["mu", "link_colisions"])
+def test_a_simulation_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+    for sim in (SIM, copy.deepcopy(SIM)):
+        with raises(AttributeError, name):
+            setattr(sim, name, True)
+
+
 def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
     sim = fb.Simulation(GO2)
     sim.model.opt.timestep = 0.002

@@ -65,7 +65,7 @@ def _impulse() -> Array:
     return np.asarray(push.force * push.duration)
 
 
-def _momentum() -> Array:
+def _momentum_change() -> Array:
     """Return the change of the robot's momentum during the kick."""
     box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
     first, last = (
@@ -89,7 +89,7 @@ def _kicks() -> dict[str, Callable[[], Any]]:
             )
         ),
         "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
-        "momentum": _momentum,
+        "momentum": _momentum_change,
     }
 
 
