@@ -29,7 +29,7 @@ ARRAY = re.compile(r"\b(Array|ArrayLike)\b")
 def public(package: str) -> Iterator[tuple[str, Any]]:
     """Full name and value of every public function, class and member of a package."""
     for name, value in exported(package):
-        if inspect.ismodule(value) or not callable(value):
+        if not (inspect.isclass(value) or inspect.isroutine(value)):
             continue
         if getattr(value, "_is_protocol", False):
             continue
