@@ -216,7 +216,8 @@ class Affine(Value):
         if isinstance(other, Affine):
             if other.A.shape != self.A.shape:
                 raise InputError(
-                    f"Cannot add maps of different shapes {self.A.shape} and {other.A.shape}."
+                    f"Cannot add maps of shapes {self.A.shape} and {other.A.shape}. Their shapes "
+                    f"must be equal."
                 )
             return Affine(self.A + other.A, self.b + other.b, self.blocks)
         return Affine(self.A, self.b + as_array("the constant", other, (self.n_out,)), self.blocks)
@@ -475,7 +476,10 @@ class Quadratic(Value):
         if not isinstance(other, Quadratic):
             return NotImplemented
         if other.n != self.n:
-            raise InputError(f"Cannot add costs on {self.n} and {other.n} variables.")
+            raise InputError(
+                f"Cannot add costs on {self.n} and {other.n} variables. Their numbers of variables "
+                f"must be equal."
+            )
         return Quadratic(self.H + other.H, self.g + other.g, self.c + other.c)
 
     def __rmul__(self, scale: float) -> Quadratic:

@@ -1,5 +1,6 @@
-"""(1)(4)(7): inertia, bias force and acceleration, judged by MuJoCo and by Pinocchio's recursive
-algorithm.
+"""Eqs. (1), (4), (7): inertia, bias force and acceleration.
+
+MuJoCo and Pinocchio's recursive algorithm give the expected results.
 """
 
 from __future__ import annotations
@@ -67,9 +68,7 @@ def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algo
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_torques_cannot_move_the_centre_of_mass_or_turn_the_robot_in_free_fall(name: str) -> None:
-    """ẍ_c = g by differences, and no angular momentum about the centre of mass, whatever the joints
-    do.
-    """
+    """For any joint motion, ẍ_c = g by differences, and the angular momentum stays zero."""
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         eom = fb.equations_of_motion(state, fb.Contacts.none())
@@ -104,8 +103,8 @@ def test_rotor_inertia_counts() -> None:
 
 @pytest.mark.parametrize("name", fb.catalogue())
 def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) -> None:
-    """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J
-    M⁻¹ Jᵀ.
+    """Eq. (8): unit forces, one at a time, accelerate the contact points by the columns of J M⁻¹
+    Jᵀ.
     """
     state = judges.states(name, 1)[0]
     contacts = (

@@ -1,4 +1,4 @@
-"""The angular momentum task: judged by finite differences of Pinocchio's centroidal momentum."""
+"""The angular momentum task, against finite differences of Pinocchio's centroidal momentum."""
 
 from __future__ import annotations
 
