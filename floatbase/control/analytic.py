@@ -198,7 +198,7 @@ class AnalyticController(Value):
             Configuration.
         v : array_like, shape (nv,)
             Generalized velocity: the base's linear [m/s] and angular [rad/s] part in the base
-            frame, then the joints [rad/s].
+            frame, then the joints [rad/s or m/s].
         t : float, optional
             Time [s].
 

@@ -60,9 +60,9 @@ class WholeBodyController:
         Angle by which the facets are rotated about the normal [rad].
     min_normal_force, max_normal_force : float or mapping, optional
         Bounds of the normal force at every contact point, so at each corner of a flat foot [N].
-        Each is one number, or a mapping from names of contacts to numbers or functions of t, for
-        example to unload a foot. A bound may name a foot that is not in contact: it has no effect
-        until `replace(contacts=...)` adds the foot. Any other unknown name is an error. The
+        Each is one number, or a mapping from names of contacts to numbers or functions of t [s],
+        for example to unload a foot. A bound may name a foot that is not in contact: it has no
+        effect until `replace(contacts=...)` adds the foot. Any other unknown name is an error. The
         defaults are 0 and no maximum.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; np.inf switches them off. The default is those of the robot.
@@ -284,7 +284,7 @@ class WholeBodyController:
             Configuration.
         v : array_like, shape (nv,)
             Generalized velocity: the base's linear [m/s] and angular [rad/s] part in the base
-            frame, then the joints [rad/s].
+            frame, then the joints [rad/s or m/s].
         t : float, optional
             Time, for tasks and bounds that depend on it [s].
 

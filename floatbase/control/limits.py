@@ -37,11 +37,8 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits
 
-SIZES = {
-    "qdd": "nv",
-    "tau": "d",
-    "forces": "k",
-}  # of the blocks of x: attributes of the equations of motion (7)
+# sizes of the blocks of x: attributes of the equations of motion (7)
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}
 BLOCKS = tuple(SIZES)
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
@@ -54,8 +51,8 @@ class LinearInequality(Value):
     Parameters
     ----------
     name : str
-        Name used in messages. It names a single row; several rows are called "name 0", "name 1" and
-        so on.
+        Name used in messages. A single row has this name; several rows are called "name 0",
+        "name 1" and so on.
     block : {"qdd", "tau", "forces"}
         Block x on which the inequalities act.
     coefficients : tuple or callable
@@ -70,12 +67,6 @@ class LinearInequality(Value):
     InputError
         If the block is unknown, or if shapes do not fit. Shapes that depend on the robot are
         checked by `at`.
-
-    Notes
-    -----
-    A function of (eom, t) can follow the contacts. For example, `lambda eom, t: (np.tile([0.0, 0.0,
-    1.0], (1, eom.k // 3)), [500.0])` on "forces" limits the total vertical force to at most 500 N,
-    whatever the number of feet in contact.
 
     Examples
     --------
@@ -394,7 +385,7 @@ def _bounds_at(
     return np.array(found, dtype=np.float64)
 
 
-# what does not depend on the state is cached for each contacts, robot and limits: all immutable
+# what does not depend on the state is cached; contacts, robots and limits are immutable
 @lru_cache(maxsize=64)
 def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
     """Return bounds that do not depend on time, cached."""

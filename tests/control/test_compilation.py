@@ -67,9 +67,9 @@ except fb.FloatbaseError as error:
         (
             'sys.modules["numba"] = None',
             {},
-            "numba cannot be loaded (.*); pip install numba may mend it",
+            "numba cannot be loaded (.*); reinstall it with pip install numba",
         ),
-        ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, and numba compiles nothing"),
+        ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, so numba does not compile"),
     ],
 )
 def test_without_numba_the_reference_backend_answers_and_says_why(
