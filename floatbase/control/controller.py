@@ -18,6 +18,7 @@ from floatbase._validation import (
     cached_property,
     numeric_copy,
     read_only,
+    refuse_new_attributes,
 )
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
@@ -106,8 +107,9 @@ class WholeBodyController:
     answers are identical to the bit. Answers of the process that compiled may differ by rounding.
     If the code cannot be kept on disk, `backend_reason` says why.
 
-    If the compiled backend finds no answer at a state, or none that is accurate to the last digits,
-    the reference backend takes over, and `Command.backend` is "reference".
+    The properties `backend` and `backend_reason` say which backend is in use and why. If the
+    compiled backend finds no answer at a state, or none that is accurate to the last digits, the
+    reference backend takes over, and `Command.backend` is "reference".
 
     Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
     and in the standing posture. They must therefore be defined at t = 0, also if a trajectory
@@ -123,6 +125,7 @@ class WholeBodyController:
     (12,)
     """
 
+    __setattr__ = refuse_new_attributes
     _softened = False  # whether this controller is another one's fallback for infeasible states
 
     def __init__(

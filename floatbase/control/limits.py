@@ -202,7 +202,7 @@ def _as_bounds(name: str, value: Any, optional: bool = False) -> NormalForces:
         number = numeric_copy(given)
         if number is None or number.ndim:
             raise InputError(
-                f"{name} is {short_repr(given)}. It must be one number (N), or a mapping from "
+                f"{name} is {short_repr(given)}. It must be one number [N], or a mapping from "
                 f"names of contacts to numbers or functions of t, such as "
                 f'{{"FL_foot": lambda t: …}}.'
             )

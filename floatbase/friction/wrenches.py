@@ -97,7 +97,7 @@ class WrenchSet(Value):
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             raise InputError(
                 f"max_normal_force must be one number > 0, or {len(points)} of them, one for each "
-                f"contact point (N)."
+                f"contact point [N]."
             )
         object.__setattr__(self, "max_normal_force", read_only(limits))
 

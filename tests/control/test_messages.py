@@ -355,3 +355,9 @@ def test_what_a_controller_was_made_with_cannot_be_set(name: str) -> None:
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
         with raises(AttributeError, name):
             setattr(one, name, getattr(one, name))
+
+
+@pytest.mark.parametrize("name", ["task", "facets", "torque_limits", "on_infeasible"])
+def test_a_controller_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+    with raises(AttributeError, name):
+        setattr(controller(fb.ForceTask(), backend="reference"), name, 3)

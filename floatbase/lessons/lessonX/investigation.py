@@ -1,4 +1,4 @@
-"""Lesson X: a program that sees only a black box, the solution of exercise X.3."""
+"""Lesson X: a program that finds the fault in a black box, the solution of exercise X.3."""
 
 from itertools import combinations
 
@@ -14,12 +14,12 @@ from floatbase.lessons.lessonX.diagnostics import (
 
 
 def investigate(box: BlackBox) -> str:
-    """A fault with its evidence, or "nothing"."""
+    """Return a fault with its evidence, or "nothing"."""
     return plan_fault(box) or motor_fault(box) or ground_fault(box) or "nothing"
 
 
 def plan_fault(box: BlackBox) -> str:
-    """Did the controller plan a motion that is possible?"""
+    """Check whether the controller planned a possible motion."""
     rows = [(i, box.equations(i)) for i in range(0, len(box), 5)]
     left = np.array([e.M @ box.qdd[i] + e.h for i, e in rows])
     right = np.array([e.S @ box.tau[i] + e.J.T @ box.planned[i] for i, e in rows])
@@ -33,7 +33,7 @@ def plan_fault(box: BlackBox) -> str:
 
 
 def motor_fault(box: BlackBox) -> str:
-    """Did the joints get what was ordered?"""
+    """Check whether the joints got the commanded torques."""
     got, told = required_forces(box)[:, 6:], box.tau[:-1]
     off = np.median(abs(told - got), axis=0)
     if off.max() < 0.5:  # N·m
@@ -52,7 +52,7 @@ def swapped_joints(
     told: np.ndarray,
     off: np.ndarray,
 ) -> str:
-    """Two joints that got each other's orders, as far as their motors can."""
+    """Find two joints that got each other's commands, within the limits of their motors."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
     for i, j in combinations(range(len(names)), 2):
@@ -65,7 +65,7 @@ def swapped_joints(
 
 
 def ground_fault(box: BlackBox) -> str:
-    """Is the ground what the controller was told?"""
+    """Check whether the ground is what the controller assumed."""
     normal, told = ground_normal(box), box.contacts.normals[0]
     angle = np.rad2deg(np.arccos(min(1.0, normal @ told)))
     if angle > 5:
