@@ -96,8 +96,8 @@ def independent_rows(A, b, v, rows, rhs):
     """Write orthonormal rows (r, nv) equivalent to A q̈ = b along the directions that A resolves.
 
     The rule is that of `build_qp`. Returns r, or -1 if rows of A q̈ = b disagree by more than the
-    contacts' motion A v explains. rows, rhs: (m, nv), (m,), receive the rows and their right-hand
-    sides first.
+    contacts' motion A v explains. rows, rhs: (m, nv), (m,), whose first r entries receive the rows
+    and their right-hand sides.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
