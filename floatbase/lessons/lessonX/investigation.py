@@ -1,4 +1,4 @@
-"""Lesson X: a program that finds the fault in a black box, the solution of exercise X.3."""
+"""Lesson X: find the fault in a black box, the solution of exercise X.3."""
 
 from itertools import combinations
 
@@ -52,7 +52,7 @@ def swapped_joints(
     commanded: np.ndarray,
     off: np.ndarray,
 ) -> str:
-    """Find two joints that got each other's commands, within the limits of their motors."""
+    """Find two joints that got each other's commands, within torque limits."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
     for i, j in combinations(range(len(names)), 2):
