@@ -108,11 +108,11 @@ def _judge_guess(answer: Any) -> Verdict:
             "The motors are far from their limits here. What does a push do to the feet?",
             "motors",
         )
-    told = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
-    told += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
+    faults = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
+    faults += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
     return Verdict(
         False,
-        f"With your list, {' and '.join(told)}. Correct the guess as the solver would, and check "
+        f"With your list, {' and '.join(faults)}. Correct the guess as the solver would, and check "
         f"again.",
         "corrections",
     )
