@@ -166,7 +166,7 @@ def as_strings(name: str, value: Any) -> tuple[str, ...]:
         return tuple(value)
     example = value if isinstance(value, str) else "…"
     raise InputError(
-        f'{name} must be a list of strings, such as {name}=["{example}"], not {short_repr(value)}.'
+        f'{name} must be a list of strings, such as ["{example}"], not {short_repr(value)}.'
     )
 
 

@@ -32,7 +32,7 @@ from floatbase._validation import (
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
-from floatbase.friction.cones import MAX_FACETS
+from floatbase.friction._polytopes import MAX_FACETS
 from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits

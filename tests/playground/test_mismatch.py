@@ -6,8 +6,10 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import refused
 
 import floatbase as fb
+from floatbase.errors import InputError
 from floatbase.playground import ModelMismatch
 from floatbase.qp import solve
 
@@ -131,3 +133,12 @@ def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]
     carried = forces.reshape(-1, 3)[:, 2].sum()
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
+
+
+def test_a_name_given_alone_is_refused_with_the_list_to_give() -> None:
+    refused(
+        lambda: ModelMismatch(ignored_contacts="FR_foot"),
+        InputError,
+        "ignored_contacts",
+        'such as ["FR_foot"]',
+    )
