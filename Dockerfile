@@ -3,16 +3,16 @@
 #     docker build -t floatbase .
 #     docker run --rm -p 127.0.0.1:8888:8888 -v floatbase:/home/learner/floatbase floatbase
 #
-# It prints an address to open. What a reader writes is in the volume. A hub that starts containers needs another command:
+# It prints an address to open. The reader's work is in the volume. A hub that starts containers needs this command instead:
 # ["sh", "-c", "python -m floatbase.lessons.publish workspace --to floatbase; exec jupyterhub-singleuser"]
 FROM python:3.12-slim
 
-# Code is compiled here for any processor of this kind, so that the first start is as quick as the next.
+# Code is compiled here for any processor of this architecture, so that the first start is as fast as the next.
 ENV NUMBA_CPU_NAME=generic OPENBLAS_NUM_THREADS=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/venv/bin:$PATH
-# what was predicted and solved lies with the lessons, in the volume
+# predictions and answers are kept with the lessons, in the volume
 ENV FLOATBASE_HOME=/home/learner/floatbase/.floatbase
 
-# Pinocchio needs libgomp1, which this small system lacks
+# Pinocchio needs libgomp1, which the slim image lacks
 RUN apt-get update && apt-get install -y --no-install-recommends libgomp1 && rm -rf /var/lib/apt/lists/*
 RUN useradd --create-home --uid 1000 learner && install -d -o learner /home/learner/floatbase
 COPY . /opt/floatbase
@@ -23,7 +23,7 @@ RUN python -m venv /opt/venv \
     && jupyter labextension disable @jupyterlab/apputils-extension:announcements
 RUN python -m floatbase compile
 
-# all that was made above can be read, and not written, by whoever reads the course
+# the reader can read everything above, but not write to it
 USER learner
 WORKDIR /home/learner
 EXPOSE 8888

@@ -1,20 +1,23 @@
-"""The problems on which floatbase and its C++ peers are compared: one optimum, in words that each
-of them has.
+"""Problems for the comparison of floatbase with its C++ peers.
+
+The problems are stated so that each library can express them.
 
 Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains
-and weights of `fb.standing_tasks`, but for the posture's weight, 0.1), four friction facets |f_x|,
-|f_y| ≤ μ f_z, no pull, torque limits. What the peers cannot say, the problem does without:
+and weights of `fb.standing_tasks`, except for the posture's weight, 0.1), four friction facets
+|f_x|, |f_y| ≤ μ f_z, unilateral contacts, and torque limits. What a peer cannot express is left
+out:
 
-- contacts are at the foot frames themselves, not at the balls' lowest points; normals point up;
-- the peers' friction pyramids touch the cone from outside (`inner_approximation=False`) and turn
-  with a flat foot, so Talos' soles are level and straight in every state, as they are on level
-  ground;
-- TSID (from Python) has no torque regularisation, and for flat feet only one of the foot's wrench
-  rather than of the corner forces. It adds 1e-8 to the diagonal of its Hessian: that is a force
-  regularisation, and on flat feet the only one;
-- placo's flat feet are a force at each corner there too: points without weight carry the forces,
-  the foot's frame keeps still. Its own flat foot carries a wrench without a limit to the moment
-  about the normal; that is an easier problem, measured apart.
+- Contacts are at the origins of the foot frames, not at the lowest points of the balls. Normals
+  point up.
+- The peers' friction pyramids lie outside the cone (`inner_approximation=False`) and turn with a
+  flat foot, so the soles of talos are level and straight in every state, as they are on level
+  ground.
+- TSID (from Python) has no torque regularization. For flat feet it regularizes the wrench of the
+  foot instead of the corner forces. It adds 1e-8 to the diagonal of its Hessian, which acts as a
+  force regularization, and on flat feet as the only one.
+- placo's flat feet also have a force at each corner: points without weight carry the forces, and
+  the frame of the foot does not move. placo's own flat foot carries a wrench without a limit on
+  the moment about the normal, which is an easier problem and is measured separately.
 """
 
 from __future__ import annotations
@@ -42,9 +45,7 @@ HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Weights of ‖λ‖² and ‖τ‖², as the peer is told and as the same optimum needs them in
-    floatbase.
-    """
+    """Weights of ‖λ‖² and ‖τ‖² in the peer, and in floatbase for the same optimum."""
 
     peer_force: float
     peer_torque: float

@@ -1,15 +1,14 @@
-"""floatbase's tick against TSID and placo, the C++ libraries one would bind to otherwise: torques
-first, then times.
+"""Compare a control step of floatbase with TSID and placo, two C++ libraries: torques, then times.
 
-    python benchmarks/peers.py                  makes what is missing, compares, measures ->
+    python benchmarks/peers.py                  creates environments, compares, measures ->
                                                 benchmarks/peers.md, peers.png
     python benchmarks/peers.py --env FOLDER     where the peers' environments are kept;
                                                 build/peers by default
     python benchmarks/peers.py --peers placo    only these
 
-Each library runs in a process of its own, in its own environment, through its own Python binding,
-on the same states; blocks of ticks take turns, so that a busy moment of the machine meets both.
-`peer_problems.py` says how the problems are made the same.
+Each library runs in its own process and environment, through its own Python binding, on the same
+states. Blocks of control steps alternate, so that other load on the machine affects both.
+`peer_problems.py` describes how the problems are made equal.
 """
 
 from __future__ import annotations
@@ -204,7 +203,7 @@ def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
 
 
 def stage_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| robot | peer | states | where its time goes |"
+    yield "| robot | peer | states | time of each call |"
     yield "|---|---|---|---|"
     for row in rows:
         parts = ", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())
@@ -242,7 +241,7 @@ def plot(rows: Sequence[Row]) -> None:
                 ha="center",
             )
         ax.set_xticks(range(len(chosen)), [row.label for row in chosen])
-        ax.set(title=f"{robot} against {peer}", ylabel="median tick, µs")
+        ax.set(title=f"{robot} against {peer}", ylabel="median control step [µs]")
         ax.margins(y=0.15)
         ax.spines[["top", "right"]].set_visible(False)
     figure.legend(
@@ -252,25 +251,26 @@ def plot(rows: Sequence[Row]) -> None:
 
 
 INTRODUCTION = """\
-Ratios are reliable; absolute times depend on the machine. A ratio is the median over turns, in each
-of which both sides answer all states, one side after the other. Every tick goes from q and v to
+Ratios are reliable; absolute times depend on the machine. A ratio is the median over turns. In each
+turn both libraries solve all states, one after the other. Each control step goes from q and v to
 torques, in Python, through each library's own binding: `computeProblemData`, `solve` and
 `getActuatorForces` for TSID, `update_kinematics` and `solve` for placo, `controller(q, v)` for
-floatbase. The peers are the packages of PyPI, compiled for any processor of their kind; numba
-compiles floatbase's tick for this one."""
+floatbase. The peers are the packages on PyPI, compiled for any processor of the architecture. numba
+compiles floatbase's control step for the processor in use."""
 
 OWN = """\
 floatbase accepts tasks written in Python. TSID's binding accepts only its own classes:
 `addMotionTask` has an overload for each of them, and C++ never calls what a Python subclass
-overrides; a custom task has to be written in C++. So these rows do not compare like with like, but
-show what a task in Python costs. The problem is the one above, but floatbase's task for the centre
-of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every tick, while TSID has its
-`TaskComEquality`."""
+overrides, so a custom task has to be written in C++. These rows therefore do not compare the same
+thing; they show the cost of a task in Python. The problem is the one above, but floatbase's task
+for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every control step,
+while TSID uses its `TaskComEquality`."""
 
 SAMENESS = """\
-Torques are compared before times: they count as equal up to a millionth of the strongest motor's
-limit. The remaining difference is rounding in the peers' solver, because floatbase's compiled and
-reference backends, which share no solver, agree more closely (on every fifth state)."""
+Torques are compared before times. They count as equal if they differ by at most a millionth of the
+strongest motor's limit. The remaining difference is rounding in the peers' solver, because
+floatbase's compiled and reference backends, which share no solver, agree more closely (on every
+fifth state)."""
 
 
 def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
@@ -284,7 +284,7 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
         f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items()
     )
     lines = [
-        "# The tick against C++ peers, measured",
+        "# Computing time of floatbase, TSID and placo",
         "",
         f"`python benchmarks/peers.py` on {machine()}. {peers}.",
         "",
@@ -292,7 +292,7 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
     lines += [f"**Not measured: {why}**\n" for why in lacking]
     lines += [INTRODUCTION, ""]
     lines += [
-        "## The same optimum",
+        "## The common problem",
         "",
         (peer_problems.__doc__ or "").strip(),
         "",
@@ -302,7 +302,8 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
         "",
     ]
     lines += [
-        f"Not the same, so no times: {row.robot} with {row.peer}, {row.label}, {row.way}.\n"
+        f"Torques differ, so times are not compared: "
+        f"{row.robot} with {row.peer}, {row.label}, {row.way}.\n"
         for row in other
     ]
     lines += ["## Times", "", *time_table(compiled), ""]
@@ -314,7 +315,7 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
             "",
         ]
     lines += [
-        "Inside the peers' ticks, medians of each call alone:",
+        "Time of each call inside the peers' control steps (medians):",
         "",
         *stage_table(compiled),
         "",
@@ -330,10 +331,9 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
 def planar_section(rows: Sequence[Row]) -> Iterator[str]:
     """placo's own flat foot, which floatbase has no equal to."""
     yield (
-        "placo's own flat foot carries six numbers instead of twelve, and has no limit to the "
-        "moment about its normal: it "
-        "answers an easier problem. Where friction at the corners can give its wrenches, its "
-        "torques are those of floatbase."
+        "placo's own flat foot has six variables instead of twelve and no limit on the moment "
+        "about its normal, so its problem is easier. Its torques equal those of floatbase where "
+        "friction at the corners can produce its wrenches."
     )
     yield ""
     for row in rows:

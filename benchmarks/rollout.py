@@ -1,12 +1,12 @@
-"""What `fb.rollout` costs beside the bare loop that keeps no record: one command, one table.
+"""Compare the computing time of `fb.rollout` with that of a bare loop without a record.
 
     python benchmarks/rollout.py             -> benchmarks/rollout.md
-    python benchmarks/rollout.py --turns 10  fewer turns, for a quick look
+    python benchmarks/rollout.py --turns 10  fewer runs, for a quick look
 
-The bare loop reads the state, asks the controller and advances the physics, and nothing else: no
-check, no record, no look at whether the robot fell. Both take turns on one simulation and one
-controller, so that a busy moment of the machine meets both. Ratios are to be trusted, microseconds
-to be taken with salt.
+The bare loop reads the state, calls the controller and advances the physics. It has no checks, no
+record and no fall detection. Both loops run alternately on one simulation and one controller, so
+that other load on the machine affects both. The ratios are reliable; the microseconds depend on the
+machine.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ TICKS = 1000  # in a turn: a second
 
 
 def bare(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
-    """The loop alone."""
+    """Run the bare loop."""
     for _ in range(TICKS):
         command = controller(sim.q, sim.v, sim.time)
         sim.advance(command.tau)
 
 
 def recorded(sim: fb.Simulation, controller: fb.WholeBodyController) -> None:
-    """The same with everything that a rollout checks and records."""
+    """Run the same steps with all checks and records of a rollout."""
     run = fb.rollout(sim, controller, TICKS * sim.timestep)
     if run.outcome != "completed":
         raise SystemExit(f"{sim.robot.name}: {run.outcome}")
@@ -48,7 +48,7 @@ def tick_time(
     sim: fb.Simulation,
     controller: object,
 ) -> float:
-    """µs of the processor for each tick of a turn that starts from standing."""
+    """Measure processor time per control step [µs] in a run that starts from standing."""
     sim.reset()
     start = time.thread_time()
     loop(sim, controller)
@@ -56,7 +56,7 @@ def tick_time(
 
 
 def row(name: str, turns: int) -> str:
-    """One robot: medians over all turns, and the median of the ratios turn by turn."""
+    """Measure one robot: medians over all runs, and the median ratio of paired runs."""
     robot = fb.load(name)
     controller, sim = tick.controller(robot), fb.Simulation(robot)
     times = np.array(
@@ -72,20 +72,21 @@ def main() -> None:
     ask = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    ask.add_argument("--turns", type=int, default=50, help="of each loop, for each robot")
+    ask.add_argument("--turns", type=int, default=50, help="runs of each loop for each robot")
     turns = ask.parse_args().turns
     lines = [
-        "# The rollout, measured",
+        "# Computing time of a rollout",
         "",
         f"`python benchmarks/rollout.py` on {tick.machine()}.",
         "",
     ]
     lines += [
-        f"A robot stands on all its feet at 1 kHz, {TICKS} ticks a turn, {turns} turns of each "
-        f"loop: time for each tick,"
+        f"A robot stands on all its feet at 1 kHz: {turns} runs of {TICKS} control steps for each "
+        f"loop. The table gives the time per control step"
     ]
     lines += [
-        "and times real time. The ratio is the rollout's speed as a part of the bare loop's.",
+        "and the speed relative to real time. The ratio is the speed of the rollout divided by "
+        "that of the bare loop.",
         "",
     ]
     lines += [

@@ -1,11 +1,11 @@
-"""How fast the controller's tick is, and that its backends agree: one command, a table and a plot.
+"""Measure the controller's control step, and check that its backends agree.
 
     python benchmarks/tick.py                    times, growth -> benchmarks/tick.md, tick.png
     python benchmarks/tick.py --agreement 2000   compares the backends on that many random states
                                                  for each robot and stance
 
-Both backends take turns within one run, on the same states. Times are ratios to be trusted,
-microseconds to be taken with salt.
+Both backends run alternately on the same states. The ratios are reliable; the microseconds depend
+on the machine.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 
 
 def two_points(robot: fb.Robot) -> fb.Contacts:
-    """The first two feet, as points."""
+    """Return point contacts at the first two feet."""
     return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
 
 
 def controller(
     robot: fb.Robot, backend: str = "compiled", **options: object
 ) -> fb.WholeBodyController:
-    """Keep standing on all feet."""
+    """Make a controller that stands on all feet."""
     contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
     return fb.WholeBodyController(
         robot, contacts, fb.standing_tasks(robot.standing()), backend=backend, **options
@@ -50,13 +50,13 @@ def controller(
 
 
 def states(robot: fb.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Configurations and velocities, the same ones every time."""
+    """Return the same random configurations and velocities every time."""
     found = [robot.random_state(seed, spread) for seed in range(n)]
     return [(np.array(s.q), np.array(s.v)) for s in found]
 
 
 def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) -> np.ndarray:
-    """Time of each call, µs."""
+    """Measure each call [µs]."""
     times = np.empty(len(arguments))
     for i, args in enumerate(arguments):
         start = time.perf_counter_ns()
@@ -68,9 +68,7 @@ def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) 
 def interleaved(
     calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int
 ) -> list[np.ndarray]:
-    """Times of several ways to do the same thing, in turns, so that a busy moment of the machine
-    meets all of them.
-    """
+    """Measure several functions alternately, so that other load affects all of them."""
     blocks = [[clock(call, arguments) for call in calls] for _ in range(rounds)]
     return [np.concatenate([block[i] for block in blocks]) for i in range(len(calls))]
 
@@ -79,10 +77,10 @@ def interleaved(
 
 
 def tick_times(n: int) -> Iterator[str]:
-    """Both backends, by robot and difficulty."""
+    """Measure both backends by robot and difficulty."""
     yield (
         "| robot | states | active rows | compiled median | compiled p99 | reference median | "
-        "reference p99 | times faster |"
+        "reference p99 | speed-up |"
     )
     yield "|---" * 8 + "|"
     for name in ROBOTS:
@@ -104,10 +102,7 @@ def parts(n: int) -> Iterator[str]:
     """
     from floatbase.control.tick import tick
 
-    yield (
-        "| robot | states | dynamics | rows | elimination | objective | optimum | Python around "
-        "them |"
-    )
+    yield ("| robot | states | dynamics | rows | elimination | objective | optimum | Python them |")
     yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
@@ -131,7 +126,7 @@ def parts(n: int) -> Iterator[str]:
 
 
 class OwnCoM:
-    """`fb.CoMTask` as a user writes it."""
+    """`fb.CoMTask` as a user would write it."""
 
     name, weight, block = "my centre of mass", 10.0, "qdd"
 
@@ -149,8 +144,8 @@ def own(n: int) -> Iterator[str]:
     and a constraint beside.
     """
     yield (
-        "| robot | states | package's tasks | own task | own task and 2 rows | own constraint | "
-        "own task, reference |"
+        "| robot | states | built-in tasks | user-defined task | user-defined task and 2 "
+        "inequalities | user-defined constraint | user-defined task, reference |"
     )
     yield "|---" * 7 + "|"
     for name in ROBOTS:
@@ -189,7 +184,7 @@ def own(n: int) -> Iterator[str]:
 
 
 def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
-    """Medians in µs, by facets, by contacts and by degrees of freedom; easy and saturated."""
+    """Measure medians [µs] by facets, contacts and degrees of freedom; easy and saturated."""
     go2, talos = fb.load("go2"), fb.load("talos")
     frames = [foot.frame for foot in go2.feet]
     families = {
@@ -229,7 +224,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
     figure, axes = plt.subplots(
         1, len(curves), figsize=(11, 3.4), constrained_layout=True, sharey=True
     )
-    figure.suptitle("A tick of the compiled backend")
+    figure.suptitle("Control step of the compiled backend")
     top = 1.1 * max(max(row[1:]) for rows in curves.values() for row in rows)
     for ax, (family, rows) in zip(axes, curves.items(), strict=True):
         x, easy, saturated = np.array(rows).T
@@ -237,7 +232,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
         ax.plot(x, saturated, "s-", label="saturated")
         ax.set(xlabel=family, ylim=(0, top), xticks=x)
         ax.grid(alpha=0.3)
-    axes[0].set(ylabel="median tick, µs", xticks=[4, 16, 32, 64])
+    axes[0].set(ylabel="median control step [µs]", xticks=[4, 16, 32, 64])
     axes[0].legend()
     figure.savefig(HERE / "tick.png", dpi=120)
 
@@ -246,7 +241,7 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
 
 
 def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
-    """Largest torque difference between the backends, on n random states per robot and stance."""
+    """Find the largest torque difference of the backends over n random states per stance."""
     yield (
         "| robot | feet | states | infeasible | left to the reference backend | largest "
         "difference |"
@@ -278,18 +273,18 @@ def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
 def check_verdict(
     compiled: fb.WholeBodyController, state: fb.State, rows: Sequence[str], where: str
 ) -> None:
-    """End with a message unless the controller calls the state infeasible, with the same rows."""
+    """Exit unless the controller reports the state as infeasible, with the same constraints."""
     try:
         compiled(state.q, state.v)
     except InfeasibleError as error:
         if error.constraints != rows:
-            raise SystemExit(f"{where}: other rows on the compiled backend") from None
+            raise SystemExit(f"{where}: other constraints on the compiled backend") from None
         return
     raise SystemExit(f"{where}: not infeasible on the compiled backend")
 
 
 def long_run(ticks: int) -> Iterator[str]:
-    """Memory and time per tick over a long run."""
+    """Measure memory and time per control step over a long run."""
     import resource
 
     robot = fb.load("go2")
@@ -301,7 +296,7 @@ def long_run(ticks: int) -> Iterator[str]:
 
 
 def machine() -> str:
-    """What it was measured on."""
+    """Describe the machine and the versions."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -342,30 +337,36 @@ def main() -> None:
         return
     curves = growth(options.states // 4)
     plot(curves)
-    lines = ["# The tick, measured", "", f"`python benchmarks/tick.py` on {machine()}.", ""]
-    lines += [
-        "States are random around standing. Joints and attitude stray by 0.02 (easy), 0.1 (medium) "
-        "and 0.3 rad"
+    lines = [
+        "# Computing time of a control step",
+        "",
+        f"`python benchmarks/tick.py` on {machine()}.",
+        "",
     ]
     lines += [
-        "(saturated: friction or torque limits hold most of them), velocities by as much a second.",
+        "States are random around standing. Joint angles and attitude vary by 0.02 rad (easy), "
+        "0.1 rad (medium) and 0.3 rad (saturated: friction"
+    ]
+    lines += [
+        "or torque limits are active in most of them), velocities by as much per second.",
         "",
     ]
     lines += [*tick_times(options.states), ""]
     lines += [
-        "Compiled, part by part (stopped after each part, best of 5, median over states):",
+        "Parts of the compiled control step (stopped after each part, best of 5, median over "
+        "states):",
         "",
         *parts(options.states // 4),
         "",
     ]
     lines += [
-        "What a user writes, run at every tick beside the compiled one (median):",
+        "User-defined terms, called at every control step beside the compiled code (median):",
         "",
         *own(options.states // 4),
         "",
     ]
     lines += [
-        "Growth, median tick (tick.png):",
+        "Growth of the median control step (tick.png):",
         "",
         "| what | number | easy | saturated |",
         "|---|---|---|---|",

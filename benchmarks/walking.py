@@ -1,11 +1,10 @@
-"""How the robots walk: every figure that `floatbase.behaviours` is held to, on MuJoCo, in one
-command and one table.
+"""Measure how well robots walk on MuJoCo, and compare with the requirements.
 
     python benchmarks/walking.py             -> benchmarks/walking.md
     python benchmarks/walking.py --pushes 6  fewer pushes, for a quick look
 
-Friction is 0.6 in the controller and 1 on the ground, pushes take 0.1 s. The control period is 1
-ms, and 2 ms where it says so.
+Friction is 0.6 in the controller and 1 on the ground; pushes last 0.1 s. The control period is
+1 ms, or 2 ms where noted.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ def speed(run: Rollout, begin: float, end: float) -> np.ndarray:
 
 
 def jump(run: Rollout) -> float:
-    """Median over the changes of stance of the largest jump of a torque, N·m."""
+    """Return the median over changes of stance of the largest jump of a torque [N·m]."""
     changes = [i for i in range(1, len(run)) if run.contacts_at(i) is not run.contacts_at(i - 1)]
     return float(
         np.median([np.abs(run.tau_desired[i] - run.tau_desired[i - 1]).max() for i in changes])
@@ -76,7 +75,7 @@ def lifted(name: str, period: float) -> Row:
         run.com[-1, :2] - walk.plan(run.time[-1])[0]
     )  # feet roll by millimetres while it comes there
     found = (
-        f"{rise:.1f} mm, CoM {com:.1f} mm from its goal, tilt {tilt(run):.2f}°, drift "
+        f"{rise:.1f} mm, CoM {com:.1f} mm from its target, tilt {tilt(run):.2f}°, drift "
         f"{drift:.1f} mm"
     )
     holds = (
@@ -87,7 +86,7 @@ def lifted(name: str, period: float) -> Row:
         and com <= 1.0
     )
     return (
-        f"{name}: each foot lifted 5 cm{at(period)}",
+        f"{name}: each foot raised 5 cm{at(period)}",
         found,
         "≥ 48 mm, ≤ 1 mm, ≤ 0.3°, ≤ 10 mm",
         holds,
@@ -98,7 +97,7 @@ def crawled(name: str, most: float, period: float) -> Row:
     step = 0.08 if name == "go2" else 0.06
     run, _ = walked(name, Gait.crawl, (step, 0.0), 11.0, period=period)
     v = speed(run, 3.0, 11.0)[0]
-    found = f"{100 * v:.1f} cm/s, tilt {tilt(run):.2f}°, torques jump {jump(run):.2f} N·m"
+    found = f"{100 * v:.1f} cm/s, tilt {tilt(run):.2f}°, torque jump {jump(run):.2f} N·m"
     holds = (
         run.outcome == "completed"
         and abs(v / step - 1.0) <= 0.05
@@ -145,10 +144,10 @@ def pushed(force: float, period: float) -> Row:
         "go2", Gait.trot, (0.3, 0.0), 8.0, fb.Push(np.array([0.0, force, 0.0]), 4.0), period=period
     )
     aside, small = 1e3 * abs(run.com[-1, 1]), force <= 60.0
-    found = f"{run.outcome}, {aside:.0f} mm aside, tilt {tilt(run):.1f}°"
+    found = f"{run.outcome}, {aside:.0f} mm to the side, tilt {tilt(run):.1f}°"
     holds = run.outcome == "completed" and (not small or (aside <= 150.0 and tilt(run) <= 2.0))
     return (
-        f"go2: the same, {force:g} N aside{at(period)}",
+        f"go2: the same, {force:g} N to the side{at(period)}",
         found,
         "≤ 150 mm, ≤ 2°" if small else "completed",
         holds,
@@ -161,7 +160,7 @@ def one_leg(period: float) -> Row:
     )
     feet = 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
     found = (
-        f"{run.outcome}, tilt {tilt(run):.2f}°, feet back within {feet:.2f} mm, torques jump "
+        f"{run.outcome}, tilt {tilt(run):.2f}°, feet back within {feet:.2f} mm, torque jump "
         f"{jump(run):.1f} N·m"
     )
     holds = run.outcome == "completed" and tilt(run) <= 0.2 and feet <= 2.0 and jump(run) <= 20.0
@@ -178,7 +177,7 @@ def talos_walks(period: float) -> Row:
         for p, i in zip(plans, rows, strict=True)
     ]
     found = (
-        f"{v:.3f} m/s, CoM {1e3 * max(error):.1f} mm off, tilt {tilt(run):.2f}°, corner peak "
+        f"{v:.3f} m/s, CoM {1e3 * max(error):.1f} mm error, tilt {tilt(run):.2f}°, corner peak "
         f"{peak:.2f} weights"
     )
     holds = (
@@ -229,7 +228,7 @@ def recovered(name: str, low: float, high: float, gait: Callable[[fb.Robot], Gai
     lost = sum(a and not b for a, b in zip(survived[False], survived[True], strict=True))
     enough = 26 * n // 30 if name == "talos" else 27 * n // 30
     more = stood + 8 * n // 30 if name == "talos" else 2 * stood
-    found = f"standing {stood}, with steps {stepped} of {n}; {lost} lost by stepping"
+    found = f"standing {stood}, with steps {stepped} of {n}; {lost or 'none'} lost by stepping"
     what = f"{name}: {n} pushes of {low:g} to {high:g} N (2 ms)"
     return (
         what,
@@ -258,7 +257,7 @@ def tick(name: str, gait: Callable[[fb.Robot], Gait]) -> Row:
         f"{' and '.join(sorted(backends))}"
     )
     return (
-        f"{name}: a tick of `Walk`",
+        f"{name}: a control step of `Walk`",
         found,
         "≤ 300 µs, compiled",
         np.median(times) <= 300.0 and backends == {"compiled"},
@@ -289,19 +288,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--pushes", type=int, default=30, help="how many in each series, 30 by default"
-    )
+    parser.add_argument("--pushes", type=int, default=30, help="pushes per series, 30 by default")
     given = parser.parse_args()
-    lines = ["| what | found | required | |", "|---|---|---|---|"]
+    lines = ["| test | measured | required | |", "|---|---|---|---|"]
     for row in rows(given.pushes):
         what, found, required, holds = row()
-        lines.append(f"| {what} | {found} | {required} | {'holds' if holds else '**missed**'} |")
+        lines.append(f"| {what} | {found} | {required} | {'met' if holds else '**missed**'} |")
         print(lines[-1], flush=True)
     if given.pushes == 30:
         text = (
-            f"# How the robots walk\n\n`python benchmarks/walking.py`, floatbase "
-            f"{fb.__version__}.\n\n" + "\n".join(lines) + "\n"
+            f"# Walking: measured results\n\nMade by `python benchmarks/walking.py` with floatbase "
+            f"{fb.__version__}. Friction is 0.6 in the controller and 1 on the ground; pushes last "
+            f"0.1 s. The control period is 1 ms, or 2 ms where noted.\n\n" + "\n".join(lines) + "\n"
         )
         Path(__file__).with_suffix(".md").write_text(text, encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""floatbase: controlling floating-based robots, as a course and as a library.
+"""floatbase: control of floating-base robots, as a course and as a library.
 
     import floatbase as fb
 
@@ -20,9 +20,9 @@ Walking       from floatbase.behaviours import Gait, Walk, Stand
 Pictures      Viewer
 Errors        FloatbaseError, InfeasibleError
 
-Symbols, frames, signs and units: help("floatbase.conventions"). All other names are imported from
-their packages, such as `from floatbase.friction import FrictionPolyhedron`. Physics and pictures
-load when they are first used.
+Symbols, frames, signs and units: help("floatbase.conventions"). Import all other names from their
+packages, as in `from floatbase.friction import FrictionPolyhedron`. MuJoCo and the viewer are
+imported on first use.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# heavy packages, imported at first use: mujoco behind Simulation, meshcat behind Viewer
+# heavy packages, imported on first use: mujoco for Simulation, meshcat for Viewer
 _LAZY = {
     "Ground": "floatbase.simulation",
     "Push": "floatbase.simulation",
@@ -116,11 +116,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
-        other = (
-            "other names are in its packages, as in `from floatbase.friction import "
-            "FrictionPolyhedron`"
+        raise AttributeError(
+            f"module 'floatbase' has no attribute {name!r}. Import other names from their "
+            f"packages, as in `from floatbase.friction import FrictionPolyhedron`."
         )
-        raise AttributeError(f"module 'floatbase' has no attribute {name!r}; {other}")
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value
     return value

@@ -17,45 +17,61 @@ import floatbase as fb
 if TYPE_CHECKING:
     from floatbase.playground import Playground
 
-_POLL_INTERVAL = 0.05  # s between looks for a page: soon enough for a reader
+_POLL_INTERVAL = 0.05  # s between checks for a connected page: short enough for a reader
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Arguments of the command; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     parser = argparse.ArgumentParser(
-        prog="floatbase", description="Controlling floating-based robots."
+        prog="floatbase", description="Control of floating-base robots."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("robots", help="list the robots and what they are for")
-    view = commands.add_parser("view", help="a live robot in the browser; end it with Ctrl-C")
-    view.add_argument("robot", help="a name that `robots` lists, or the file of a URDF")
+    commands.add_parser("robots", help="list the available robots and their uses")
+    view = commands.add_parser("view", help="show a live robot in the browser (Ctrl-C to stop)")
+    view.add_argument(
+        "robot", help="name of a robot, as listed by `robots`, or path of a URDF file"
+    )
     view.add_argument(
         "--feet",
         nargs="+",
         default=[],
         metavar="LINK",
-        help="links of a URDF that stand on the ground",
+        help="links of the URDF that are in contact with the ground",
     )
     view.add_argument(
         "--foot-radius",
         type=float,
         default=None,
         metavar="M",
-        help="radius of balls at these feet, m",
+        help="radius of ball feet at these links [m]",
     )
     view.add_argument(
-        "--fixed", action="store_true", help="bolt the root link of a URDF to the ground"
+        "--fixed", action="store_true", help="fix the root link of the URDF to the ground"
     )
     view.add_argument(
-        "--friction", type=float, default=0.7, help="coefficient of friction of the ground (0.7)"
+        "--friction",
+        type=float,
+        default=0.7,
+        help="friction coefficient of the ground (default: 0.7)",
     )
-    view.add_argument("--background", default="light", help="white, light or dark (light)")
-    view.add_argument("--port", type=int, default=0, help="port of the page (a free one)")
+    view.add_argument("--background", default="light", help="white, light or dark (default: light)")
+    view.add_argument("--port", type=int, default=0, help="port of the page (default: a free port)")
     view.add_argument(
-        "--no-browser", action="store_true", help="print the address and open nothing"
+        "--no-browser", action="store_true", help="print the address without opening a browser"
     )
     commands.add_parser(
-        "compile", help="compile the controller's tick, so that the first controller need not"
+        "compile", help="compile the controller in advance, so that the first one starts quickly"
     )
     options = parser.parse_args(arguments)
     if options.command == "robots":
@@ -76,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
-    """The robot that a command line names. Raises `FloatbaseError`."""
+    """Load the robot named on the command line."""
     if not options.robot.lower().endswith((".urdf", ".xml")):
         return fb.load(options.robot)
     return fb.load_urdf(
@@ -88,20 +104,28 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:
-    """What the page says when it has ended. given: arguments of the command line; requested_port:
-    the port among them, 0 for none.
+    """Return the text of the page after the program has ended.
+
+    `given` are the arguments of the command line, and `requested_port` is the port among them or 0.
     """
     command = shlex.join(
         ["python", "-m", "floatbase", *given, *([] if requested_port else ["--port", str(port)])]
     )
     return (
-        f"This robot has gone. Start it again with\n{command}\nand this page comes back by itself."
+        f"The program has ended. Start it again with\n{command}\n"
+        f"and this page reconnects by itself."
     )
 
 
 def start_when_connected(page: Playground, ended: threading.Event) -> None:
-    """Let the robot run once a page is connected, so that nobody finds it fallen, or paused for
-    want of a reader.
+    """Start the robot once a page is connected, so that it has not fallen or paused before.
+
+    Parameters
+    ----------
+    page : Playground
+        Playground to start.
+    ended : threading.Event
+        Event that ends the wait.
     """
     while not (page.view.window.n_pages or ended.wait(_POLL_INTERVAL)):
         pass
@@ -110,11 +134,11 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
-    """Show a robot until Ctrl-C or SIGTERM. given: the arguments of the command line."""
+    """Show a robot until Ctrl-C or SIGTERM; `given` are the arguments of the command line."""
     from floatbase.playground import (
         Playground,
         Settings,
-    )  # loads MuJoCo and the viewer, which the other commands do without
+    )  # imports MuJoCo and the viewer, which the other commands do not need
 
     ended = threading.Event()
     before = {
@@ -130,7 +154,7 @@ def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
             page.view.set_disconnect_message(
                 _restart_message(given, options.port, page.view.window.port)
             )
-            print(f"{robot.name} at {page.url} (end with Ctrl-C)", flush=True)
+            print(f"{robot.name} at {page.url} (Ctrl-C to stop)", flush=True)
             if not options.no_browser:
                 webbrowser.open(page.url, new=2)
             start_when_connected(page, ended)

@@ -1,4 +1,4 @@
-"""Where the files that come with the package lie."""
+"""Location of the data files of the package."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def assets_root() -> Path:
-    """The folder `assets/`: inside an installed package, else at the top of the repository."""
+    """Return `assets/`: inside an installed package, or else at the top of the repository."""
     package = Path(__file__).parent
     installed = package / "_assets"
     return installed if installed.is_dir() else package.parent / "assets"

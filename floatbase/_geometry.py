@@ -1,4 +1,4 @@
-"""Shared geometry: rotations about z, the minimum-jerk profile, convex polygons in the plane."""
+"""Rotations about z, the minimum-jerk profile, and convex polygons in the plane."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from floatbase._validation import Array
 
 
 def rotation_z(angle: float) -> Array:
-    """The rotation by `angle`, rad, about the z axis, shape (3, 3)."""
+    """Return the rotation matrix about the z axis by an angle [rad]."""
     c, s = cos(angle), sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def minimum_jerk(s: float) -> tuple[float, float, float]:
-    """10 s³ - 15 s⁴ + 6 s⁵ and its first two derivatives: from 0 to 1, at rest at both ends.
+    """Return 10 s³ - 15 s⁴ + 6 s⁵ and its first two derivatives: from 0 to 1, at rest at both ends.
 
-    s: a fraction of the time, clipped to [0, 1].
+    The fraction s of the time is clipped to [0, 1].
     """
     s = min(max(s, 0.0), 1.0)
     w = s * (1.0 - s)
@@ -26,12 +26,12 @@ def minimum_jerk(s: float) -> tuple[float, float, float]:
 
 
 def convex_hull(points: Array) -> Array:
-    """Corners of the convex hull of points (n, 2), n ≥ 1: shape (k, 2), counter-clockwise.
+    """Return the corners of the convex hull of n ≥ 1 points, shape (k, 2), counter-clockwise.
 
-    Points on one line give the two ends of the segment, equal points give one.
+    Points on one line give the two ends of the segment, and equal points give a single point.
     """
-    # Andrew, Another efficient algorithm, 1979. scipy's takes 0.1 ms more, and `Stand` asks at each
-    # control step.
+    # Andrew, Another efficient algorithm, 1979. scipy's takes 0.1 ms more, and `Stand` calls this
+    # in each control step.
     ordered = sorted(set(map(tuple, points.tolist())))
     corners: list[tuple[float, ...]] = []
     for line in (ordered, ordered[::-1]):
@@ -47,12 +47,10 @@ def convex_hull(points: Array) -> Array:
 
 
 def distance_to_polygon(points: Array, polygon: Array) -> Array:
-    """Distance of points from the border of a convex polygon: positive inside, negative outside.
+    """Return the distance of points from the border of a convex polygon, negative outside.
 
-    points: (2,) or (n, 2).
-    polygon: corners, (k, 2), counter-clockwise; a segment or a point has no inside.
-
-    Returns shape () or (n,), in the unit of the points.
+    The points have shape (2,) or (n, 2), and the result has shape () or (n,). The corners of the
+    polygon, shape (k, 2), are counter-clockwise. A segment or a point has no inside.
     """
     edges = np.roll(polygon, -1, axis=0) - polygon
     from_corners = points[..., None, :] - polygon
@@ -60,7 +58,7 @@ def distance_to_polygon(points: Array, polygon: Array) -> Array:
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     heights = (
         edges[:, 0] * from_corners[..., 1] - edges[:, 1] * from_corners[..., 0]
-    ) / lengths  # of the points above the edges' lines
+    ) / lengths  # of the points above the lines through the edges
     nearest = heights.min(axis=-1)
     inside = (nearest >= 0.0) & (len(polygon) > 2)
     if np.all(inside):

@@ -1,4 +1,4 @@
-"""Checked arguments, read-only arrays, and `Value`: what every value of the package is made of."""
+"""Argument checks, read-only arrays, and `Value`, the base of all immutable classes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import FrozenInstanceError, fields
+from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 
@@ -17,18 +18,17 @@ from floatbase.errors import InputError
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 _FLOAT64 = np.dtype(np.float64)
-# in SI units nothing about a robot comes near, and a product of ten such numbers is still finite
+# no quantity of a robot in SI units comes near it, and a product of ten such numbers is finite
 MAX_MAGNITUDE = 1e30
-_ZERO_NORM = 1e-9  # a vector shorter than this is zero but for rounding, and has no direction
-_MAX_REPR = 60  # characters of a value that a message repeats
+_ZERO_NORM = 1e-9  # a shorter vector is zero up to rounding and has no direction
+_MAX_REPR = 60  # characters of a value that a message shows
 
 
 class cached_property(functools.cached_property[T]):
-    """What a value computes of itself when it is first asked for, and keeps; where threads ask at
-    once, what the first found.
+    """A property computed on first use and then kept; threads that compete get the first result.
 
-    It takes no lock, as that of functools does in Python 3.11: values find the same whenever they
-    compute it, and in a forked process nobody is left to release a lock that another thread held.
+    It takes no lock, unlike the one of functools in Python 3.11. A value computes the same result
+    every time, and a lock that another thread holds during a fork is never released in the child.
     """
 
     @overload
@@ -43,31 +43,31 @@ class cached_property(functools.cached_property[T]):
 
 
 class Value:
-    """Base of values: they do not change, so a copy is the value itself, and out of a pickle their
-    arrays come read-only.
+    """Base of immutable classes: a copy is the object itself, and arrays stay read-only in pickles.
 
-    What a value has computed for itself (`cached_property`) stays behind and is computed anew.
+    Pickles leave out cached properties, which are computed again on demand.
     """
 
     def __post_init__(self) -> None:
-        """Check and convert each field that declares how (`checked`)."""
+        """Check and convert each field that declares a check with `checked`."""
         cls: Any = type(self)
         for name, check in _field_checks(cls):
             value = check(f"{name} of {self._label()}", getattr(self, name))
             object.__setattr__(self, name, value)
 
     def _label(self) -> str:
-        """What messages about a field call this value."""
+        """Return the name of this value in messages about its fields."""
         return type(self).__name__
 
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(
-            f"cannot assign to field {name!r}: a {type(self).__name__} does not change"
+            f"Cannot assign to field {name!r}: {type(self).__name__} is immutable. Make a changed "
+            f"copy with replace()."
         )
 
     def __delattr__(self, name: str) -> None:
         raise FrozenInstanceError(
-            f"cannot delete field {name!r}: a {type(self).__name__} does not change"
+            f"Cannot delete field {name!r}: {type(self).__name__} is immutable."
         )
 
     def __copy__(self) -> Self:
@@ -84,7 +84,7 @@ class Value:
         }
         computed -= set(
             getattr(self, "__dataclass_fields__", ())
-        )  # given here, though a class above computes it
+        )  # a field here, but computed by a base class
         kept = {name: value for name, value in vars(self).items() if name not in computed}
         return {
             name: dict(value) if isinstance(value, MappingProxyType) else value
@@ -100,11 +100,25 @@ class Value:
             )
 
 
-def checked(check: Callable[..., Any], *args: Any, **options: Any) -> dict[str, Any]:
-    """Metadata of a field that says how it is checked: `check(name, value, *args, **options)`.
+def refuse_new_attributes(self: object, name: str, value: object) -> None:
+    """Set an attribute, as `__setattr__` of a class whose public attributes are properties.
 
-    As in `force: Array = field(metadata=checked(as_array, (3,), "N"))`. `Value.__post_init__` runs
-    the checks in the order of the fields, and each field becomes what its check returns.
+    Any other public name raises `AttributeError`: a misspelled one would be set and never read.
+    Classes derived from such a class may set attributes of their own.
+    """
+    cls = type(self)
+    if not name.startswith("_") and not hasattr(cls, name) and "__setattr__" in vars(cls):
+        public = [known for known in dir(cls) if not known.startswith("_")]
+        near = "".join(f" Did you mean {known!r}?" for known in get_close_matches(name, public, 1))
+        raise AttributeError(f"A {cls.__name__} has no attribute {name!r} to set.{near}")
+    object.__setattr__(self, name, value)
+
+
+def checked(check: Callable[..., Any], *args: Any, **options: Any) -> dict[str, Any]:
+    """Return field metadata that declares the check `check(name, value, *args, **options)`.
+
+    For example `force: Array = field(metadata=checked(as_array, (3,), "N"))`.
+    `Value.__post_init__` runs the checks in the order of the fields and stores what they return.
     """
 
     def check_field(name: str, value: Any) -> Any:
@@ -115,35 +129,35 @@ def checked(check: Callable[..., Any], *args: Any, **options: Any) -> dict[str, 
 
 @functools.cache
 def _field_checks(cls: Any) -> tuple[tuple[str, Callable[[str, Any], Any]], ...]:
-    """Name and check of each field of a dataclass that declares one."""
+    """Return name and check of each field of a dataclass that declares a check."""
     return tuple(
         (field.name, field.metadata["check"]) for field in fields(cls) if "check" in field.metadata
     )
 
 
 def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:
-    """`value`, after checking that it is a `cls`.
+    """Return `value` after checking that it is an instance of `cls`.
 
-    example: how to get one, for the message; by default the class's own, `_example`.
+    `example` shows in the message how to get one; the default is the `_example` of the class.
     """
     if isinstance(value, cls):
         return value
     example = example or getattr(cls, "_example", "")
     raise InputError(
-        f"{name} must be of type {cls.__name__}{f', as {example}' if example else ''}, not "
-        f"{short_repr(value)}."
+        f"{name} must be of type {cls.__name__}{f', such as {example}' if example else ''}, "
+        f"not {short_repr(value)}."
     )
 
 
 def as_string(name: str, value: object) -> str:
-    """`value`, after checking that it is a text."""
+    """Return `value` after checking that it is a string."""
     if isinstance(value, str):
         return value
-    raise InputError(f"{name} must be a text, not {short_repr(value)}.")
+    raise InputError(f"{name} must be a string, not {short_repr(value)}.")
 
 
 def as_strings(name: str, value: Any) -> tuple[str, ...]:
-    """`value` as a tuple, after checking that it is a list of texts, and not one text."""
+    """Return `value` as a tuple after checking that it is a list of strings, not one string."""
     if (
         isinstance(value, Sequence)
         and not isinstance(value, str)
@@ -152,31 +166,31 @@ def as_strings(name: str, value: Any) -> tuple[str, ...]:
         return tuple(value)
     example = value if isinstance(value, str) else "…"
     raise InputError(
-        f'{name} must be a list of names, as in {name}=["{example}"], not {short_repr(value)}.'
+        f'{name} must be a list of strings, such as ["{example}"], not {short_repr(value)}.'
     )
 
 
 def as_bool(name: str, value: object) -> bool:
-    """`value` as a bool, after checking that it is one: "no" would count as true."""
+    """Return `value` as a bool after checking that it is one, since "no" would count as true."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise InputError(f"{name} must be True or False, not {short_repr(value)}.")
 
 
 def as_callable(name: str, value: Any, usage: str) -> Any:
-    """`value`, after checking that it can be called as `call` says, such as "rows(state, t)"."""
+    """Return `value` after checking that it can be called as `usage`, such as "rows(state, t)"."""
     if not callable(value) or isinstance(value, type):
-        raise InputError(f"{name} must be a function, called as {usage}, not {short_repr(value)}.")
+        raise InputError(
+            f"{name} must be a function that can be called as {usage}, not {short_repr(value)}."
+        )
     arguments = [part for part in usage.partition("(")[2].strip(")").split(",") if part]
     if error := signature_error(value, *arguments):
-        raise InputError(f"{name} must be a function that can be called as {usage}; {error}.")
+        raise InputError(f"{name} must be a function that can be called as {usage}, but {error}.")
     return value
 
 
 def signature_error(function: Any, *args: object, **kwargs: object) -> str:
-    """What a function takes, and why it cannot be called like this; "" where it can, or hides it,
-    as compiled ones do.
-    """
+    """Return why a function cannot be called like this, or "" if it can be or has no signature."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):
@@ -184,32 +198,29 @@ def signature_error(function: Any, *args: object, **kwargs: object) -> str:
     try:
         signature.bind(*args, **kwargs)
     except TypeError as error:
-        return (
-            f"{getattr(function, '__name__', type(function).__name__)} takes {signature}: {error}"
-        )
+        function_name = getattr(function, "__name__", type(function).__name__)
+        return f"the signature of {function_name} is {signature}: {error}"
     return ""
 
 
 def as_integer(name: str, value: Any, minimum: int, maximum: int, reason: str = "") -> int:
-    """`value` as an int, after checking that it is a whole number from `least` to `most`. why: the
-    reason for the bounds.
-    """
+    """Return `value` as an int after checking its bounds; `reason` explains them in the message."""
     is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
     )
     if is_number and minimum <= value <= maximum and value == int(value):
         return int(value)
     raise InputError(
-        f"{name} is {short_repr(value)}; it must be a whole number ≥ {minimum} and ≤ {maximum}"
-        + (f": {reason}." if reason else ".")
+        f"{name} is {short_repr(value)}, but it must be an integer from {minimum} to {maximum}"
+        + (f" ({reason})." if reason else ".")
     )
 
 
 def read_only(value: Any) -> Array:
-    """`value` as a float64 array that cannot be written to: a copy, unless it is one already.
+    """Return `value` as a read-only float64 array: a copy, unless it already is one.
 
-    A read-only array is taken at its word: numpy does not tell of views that were taken of it
-    before and can be written to.
+    Read-only arrays are trusted and not copied: numpy cannot report earlier, writable views of
+    them.
     """
     if _is_read_only(value):
         return value
@@ -217,15 +228,13 @@ def read_only(value: Any) -> Array:
 
 
 def frozen(array: Array) -> Array:
-    """An array that nobody else has, which cannot be written to any more."""
+    """Make an array read-only in place; nothing else may hold a reference to it."""
     array.setflags(write=False)
     return array
 
 
 def _is_read_only(value: Any) -> TypeGuard[Array]:
-    """Whether `value` is a float64 array in one piece that cannot be written to, and no view of one
-    that can.
-    """
+    """Return whether `value` is a contiguous, read-only float64 array without a writable base."""
     if (
         type(value) is not np.ndarray
         or value.dtype is not _FLOAT64
@@ -239,14 +248,15 @@ def _is_read_only(value: Any) -> TypeGuard[Array]:
 
 
 def numeric_copy(value: Any) -> Array | None:
-    """A float64 copy of numbers; None for anything else: complex or masked numbers, texts, truth
-    values, dates, objects.
+    """Return a float64 copy of real numbers, and None for anything else.
+
+    Complex or masked numbers, strings, booleans, dates and objects give None.
     """
     if type(value) is np.ndarray and value.dtype is _FLOAT64:
-        return value.copy("K")  # most of them, and in the controller's loop
+        return value.copy("K")  # the most frequent case, and in the control loop
     try:
         array = np.array(value)
-    except Exception:  # of another shape in each row, or of a class with an opinion of its own
+    except Exception:  # ragged rows, or a class whose conversion fails
         return None
     if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
         return None
@@ -254,48 +264,48 @@ def numeric_copy(value: Any) -> Array | None:
 
 
 def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
-    """`value`, `read_only`, after checking that it holds plain numbers of `shape` (None = any
-    length), finite ones.
+    """Return `value` as a read-only array after checking its shape (None = any length) and entries.
 
-    Raises `InputError` with the name, the shape found and the shape required.
+    All entries must be finite real numbers of at most `MAX_MAGNITUDE`.
     """
     array = value if _is_read_only(value) else numeric_copy(value)
     if array is None:
         required = f"numbers of shape {_shape_str(shape)}" if shape else "a number"
         raise InputError(
-            f"{name} must be {required}{f' ({unit})' if unit else ''}, not {short_repr(value)}."
+            f"{name} must be {required}{f' [{unit}]' if unit else ''}, not {short_repr(value)}."
         )
     if array.shape != shape and not _shape_matches(array.shape, shape):
-        required = f"have shape {_shape_str(shape)}" if shape else "be one number"
+        required = f"have shape {_shape_str(shape)}" if shape else "be a single number"
         hint = (
-            ": one row alone is rows[:1], not rows[0]"
+            " To select a single row, write rows[:1] instead of rows[0]."
             if array.ndim == 1 and shape[:-1] in ((None,), (1,))
             else ""
         )
         raise InputError(
-            f"{name} has shape {array.shape}; it must "
-            f"{required}{f' ({unit})' if unit else ''}{hint}."
+            f"{name} has shape {array.shape}, but it must "
+            f"{required}{f' [{unit}]' if unit else ''}.{hint}"
         )
-    # the sum of squares tells in a third of the time, and is False for NaN too; where it is larger,
-    # the entries decide
+    # testing the sum of squares takes a third of the time and is False for NaN too; if the sum is
+    # larger, the entries decide
     if not (
         np.vdot(array, array) <= MAX_MAGNITUDE**2
         or (bounded := np.abs(array) <= MAX_MAGNITUDE).all()
     ):
         at = tuple(np.argwhere(~bounded)[0].tolist())
         place = (
-            f"holds {array[at]:g} at index {list(at)}; every entry must be"
+            f"contains {array[at]:g} at index {list(at)}, but every entry must be"
             if shape
-            else f"is {array[at]:g}; it must be"
+            else f"is {array[at]:g}, but it must be"
         )
         raise InputError(
             f"{name} {place} a finite "
-            f"number{f' of at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}."
+            f"number{f' of magnitude at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}."
         )
     return frozen(array)
 
 
 def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    """Return whether a shape has the required lengths; None allows any length."""
     for size, required in zip(found, shape, strict=False):
         if required is not None and required != size:
             return False
@@ -303,13 +313,14 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
 
 
 def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
-    """Forces of contact points, (k,) or (k / 3, 3), N, as a read-only array of shape (k,), checked.
-    k: None for any.
+    """Return contact forces, shape (k,) or (k / 3, 3), as a read-only array of shape (k,) [N].
+
+    With `k` = None, any number of forces is accepted.
     """
     array = numeric_copy(forces)
     one_row_per_point = (
         array is not None and array.ndim == 2 and array.shape[1] == 3
-    )  # not (3, k / 3): another order
+    )  # shape (3, k / 3) has another order
     return as_array(
         name, array.ravel() if array is not None and one_row_per_point else forces, (k,), "N"
     )
@@ -322,7 +333,7 @@ def as_number(
     minimum: float = -MAX_MAGNITUDE,
     maximum: float = MAX_MAGNITUDE,
 ) -> float:
-    """`value` as a float, after checking that it is a plain number from `least` to `most`."""
+    """Return `value` as a float after checking that it is a number from `minimum` to `maximum`."""
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if minimum <= result <= maximum:
         return result
@@ -331,30 +342,35 @@ def as_number(
         if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE
         else f"from {minimum:g} to {maximum:g}"
     )
-    raise InputError(f"{name} is {result:g}; it must be {bounds}{f' ({unit})' if unit else ''}.")
+    raise InputError(
+        f"{name} is {result:g}, but it must be {bounds}{f' [{unit}]' if unit else ''}."
+    )
 
 
 def as_positive(
     name: str, value: Any, unit: str = "", allow_zero: bool = False, maximum: float = MAX_MAGNITUDE
 ) -> float:
-    """`value` as a float, after checking that it is above zero (or not below, with `allow_zero`)
-    and at most `most`.
+    """Return `value` as a float after checking that it is positive and at most `maximum`.
+
+    With `allow_zero`, zero is accepted too.
     """
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if 0.0 < result <= maximum or (result == 0.0 and allow_zero):
         return result
-    bound = f"at most {maximum:g}" if result > 0.0 else "≥ 0" if allow_zero else "> 0"
-    raise InputError(f"{name} is {result:g}; it must be {bound}{f' {unit}' if unit else ''}.")
+    bound = (
+        f"at most {maximum:g}" if result > 0.0 else "at least 0" if allow_zero else "greater than 0"
+    )
+    raise InputError(f"{name} is {result:g}, but it must be {bound}{f' [{unit}]' if unit else ''}.")
 
 
 def short_repr(value: object) -> str:
-    """A value as a message repeats it: short, and by its kind where it is not a plain one."""
+    """Return a short representation of a value for error messages, or only its type."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, np.ndarray) and value.ndim:
-        return f"an array of {value.dtype} of shape {value.shape}"
+        return f"an array of shape {value.shape} and dtype {value.dtype}"
     if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
-        return f"a whole number beyond {MAX_MAGNITUDE:g}"
+        return f"an integer of magnitude above {MAX_MAGNITUDE:g}"
     if value is None or isinstance(
         value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray
     ):
@@ -364,19 +380,19 @@ def short_repr(value: object) -> str:
 
 
 def unit_vector(name: str, value: Any) -> Array:
-    """`value` scaled to unit length, shape (3,); a zero vector is an `InputError`."""
+    """Return `value` scaled to unit length, shape (3,); refuse the zero vector."""
     vector = as_array(name, value, (3,))
     length = float(np.linalg.norm(vector))
     if length < _ZERO_NORM:
-        raise InputError(f"{name} is the zero vector; it must have a direction.")
+        raise InputError(f"{name} is the zero vector, but it must have a direction.")
     return read_only(vector / length)
 
 
 def as_half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
-    """Planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,), m,
-    checked.
+    """Return planes normal · x = offset as unit normals, shape (n, 3), and offsets, shape (n,) [m].
 
-    normal: (3,) for one plane, (n, 3) for several. offset: m, one number for all, or (n,).
+    `normal` has shape (3,) for one plane or (n, 3) for several; `offset` [m] is a single number for
+    all planes or has shape (n,).
     """
     array = numeric_copy(normal)
     if array is None or array.ndim != 2 or array.shape[1] != 3 or not len(array):
@@ -392,10 +408,11 @@ def as_half_spaces(name: str, normal: Any, offset: Any) -> tuple[Array, Array]:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a × b of two vectors, shape (3,); numpy's own takes twenty times as long on three numbers."""
+    """Return a × b of two vectors, shape (3,); `np.cross` takes twenty times as long."""
     (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
 
 def _shape_str(shape: tuple[int | None, ...]) -> str:
+    """Return a required shape as text, with "any" for None."""
     return str(tuple(n if n is None else int(n) for n in shape)).replace("None", "any")

@@ -1,6 +1,6 @@
-"""Every error that `floatbase` raises on purpose, under one root.
+"""Exceptions and warnings of the package.
 
-A message says what was wrong, what would be right, and what to do next.
+Each message says what is wrong, what is expected, and what to do.
 """
 
 from __future__ import annotations
@@ -12,39 +12,39 @@ from types import ModuleType
 
 
 class FloatbaseError(Exception):
-    """Root of all errors of the package: `except fb.FloatbaseError` catches them all."""
+    """Base of all exceptions of the package: `except fb.FloatbaseError` catches them all."""
 
 
 class InputError(FloatbaseError, ValueError):
-    """A value handed in cannot be used: wrong shape, NaN, a quaternion that is not of unit length,
-    μ ≤ 0, …
-    """
+    """An argument is invalid: a wrong shape, NaN, a quaternion without unit length, μ ≤ 0, …."""
 
 
 class UnknownNameError(FloatbaseError, KeyError):
-    """A robot, frame, task or back end of that name does not exist; the message lists the near
-    ones.
-    """
+    """No robot, frame, task or backend has this name; the message lists similar names."""
 
     def __str__(self) -> str:  # KeyError would print the repr of the message
         return str(self.args[0])
 
 
 class RobotWarning(UserWarning):
-    """A robot was loaded that cannot do what one expects of it; the message says what."""
+    """A loaded robot lacks something that most uses require; the message says what."""
 
 
 class SimulationWarning(UserWarning):
-    """A rollout runs, and a part of what it was given does nothing; the message says which, and
-    why.
-    """
+    """A part of the input of a rollout has no effect; the message says which part and why."""
 
 
 class InfeasibleError(FloatbaseError):
     """No point satisfies all constraints of a quadratic program.
 
-    `constraints` holds the names of a smallest set of constraints in conflict: they can be met
-    without any one of them. Other constraints may be in conflict too.
+    Parameters
+    ----------
+    message : str
+        Message of the exception.
+    constraints : iterable of str, optional
+        Names of a minimal set of constraints in conflict, kept as the attribute `constraints`: if
+        any one of them is removed, the others can be satisfied. Other constraints may be in
+        conflict, too.
     """
 
     def __init__(self, message: str, constraints: Iterable[str] = ()):
@@ -53,33 +53,49 @@ class InfeasibleError(FloatbaseError):
 
 
 class SolverError(FloatbaseError):
-    """A solver gave up (iteration limit, cycling, not convex) although the problem was not shown to
-    be infeasible.
+    """A solver stopped without a solution, although the problem was not shown to be infeasible.
+
+    Reasons are the iteration limit, cycling, and a cost that is not convex.
     """
 
 
 class MissingDependencyError(FloatbaseError, ImportError):
-    """An optional dependency is not installed; the message names the extra that brings it."""
+    """An optional dependency is missing; the message names the extra that installs it."""
 
 
 class SimulationError(FloatbaseError):
-    """The physics cannot be built or stepped as requested."""
+    """The simulation cannot be built or stepped as requested."""
 
 
 class ViewerError(FloatbaseError):
-    """The picture cannot be made: port taken, no browser connected, …"""
+    """The viewer cannot do what was requested: port in use, no browser connected, …."""
 
 
 def require(module: str, extra: str) -> ModuleType:
     """Import an optional dependency, as in `cp = require("cvxpy", extra="course")`.
 
-    Raises `MissingDependencyError` where it is not installed.
+    Parameters
+    ----------
+    module : str
+        Name of the module.
+    extra : str
+        Extra of floatbase that installs it.
+
+    Returns
+    -------
+    module
+        The imported module.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the module is not installed.
     """
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
         if error.name != module.partition(".")[0]:
-            raise  # it is there, and lacks something itself
+            raise  # the module exists, but one of its own imports is missing
         raise MissingDependencyError(
             f"{module} is not installed. Install it with the extra {extra!r}: "
             f"pip install 'floatbase[{extra}]'."
@@ -87,8 +103,23 @@ def require(module: str, extra: str) -> ModuleType:
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
-    """An `UnknownNameError` that lists the names nearest to `name`, and all of them when there are
-    few.
+    """Make an `UnknownNameError` that lists similar names, and all names if there are few.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the named object, such as "frame".
+    name : object
+        Name that does not exist.
+    known : iterable of str
+        Names that exist.
+    hint : str, optional
+        Sentence at the end of the message.
+
+    Returns
+    -------
+    UnknownNameError
+        The exception, to be raised by the caller.
     """
     known = sorted(known)
     query = str(name).strip().lower()
@@ -96,9 +127,11 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
     close = [k for match in matches for k in known if k.lower() == match][:5] or [
         k for k in known if query in k.lower()
     ][:5]
-    parts = ["near names: " + ", ".join(close)] if close else []
+    parts = ["Similar names: " + ", ".join(close)] if close else []
     if not close or len(known) <= 6:
-        parts.append("known: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else ""))
+        parts.append(
+            "Available names: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
+        )
     return UnknownNameError(
-        f"unknown {kind} {name!r}; {'; '.join(parts)}." + (f" {hint}" if hint else "")
+        f"Unknown {kind} {name!r}. {'. '.join(parts)}." + (f" {hint}" if hint else "")
     )

@@ -1,4 +1,4 @@
-"""The laws of `Affine` and `Quadratic`: composition, stacking, pullback, minimisers."""
+"""Properties of `Affine` and `Quadratic`: composition, stacking, pullback, minimization."""
 
 from __future__ import annotations
 
@@ -141,14 +141,16 @@ def test_among_many_minimisers_the_smallest_is_given(seed: int, m: int, n: int) 
 
 @pytest.mark.parametrize(("curvature", "counts"), [(1e-10, True), (1e-13, False)])
 def test_what_counts_as_curvature_is_decided_in_one_place(curvature: float, counts: bool) -> None:
-    """A direction with a 1e-12th of the largest curvature or less is flat, for the minimiser and
-    for a partial one.
+    """A direction with at most 1e-12 of the largest curvature is flat, for the full minimum and for
+    a partial one.
     """
     cost = fb.Quadratic(np.diag([1.0, curvature]), np.array([0.0, -curvature]))
     over = cost.argmin_over(np.array([[0.0], [1.0]]))
     assert np.allclose(cost.minimiser(), [0.0, float(counts)])
     assert np.allclose(cost.argmin_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
-    assert np.allclose(over([3.0, 4.0]), [3.0, 1.0])  # alone it is the largest there is
+    assert np.allclose(
+        over([3.0, 4.0]), [3.0, 1.0]
+    )  # on its own, this curvature is the largest one
 
 
 def test_a_partial_minimum_is_the_least_of_all_points_that_keep_the_rest() -> None:

@@ -1,4 +1,4 @@
-"""Shared geometry, judged by finite differences, by samples and by Pinocchio."""
+"""Shared geometry, against finite differences, samples and Pinocchio."""
 
 from __future__ import annotations
 

@@ -19,12 +19,13 @@ import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from floatbase.errors import InputError
 from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
 from floatbase.lessons.publish.site import (
     add_links,
-    docstrings,
     mathml,
     prepare_lesson,
+    replace_site,
     run_lessons,
 )
 
@@ -164,6 +165,7 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any
     for path in pages(built):
         page.goto(path.as_uri())
         wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
+        wide += [f"{path.name}: {source[-60:]}" for source in page.evaluate(STRETCHED)]
     page.close()
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert (said, wide) == ([], [])
@@ -185,15 +187,65 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
     page.close()
 
 
+# addresses of images whose proportions are not their own
+STRETCHED = """() => [...document.images].filter((image) => {
+    const [width, height] = [image.clientWidth, image.clientHeight];
+    return height && Math.abs(width * image.naturalHeight / image.naturalWidth / height - 1) > .05;
+}).map((image) => image.src)"""
+SEARCHES = {
+    "install": "Installation and troubleshooting",
+    "jupyterhub": "Teaching with floatbase",
+    "friction cone": "06 · Friction cones",
+    "infeasible": "Whole-body controller",
+    "custom task": "Whole-body controller",
+    "urdf": "Your own robot",
+    "humanoid": "Walking",
+    "walking": "Walking",
+    "push recovery": "Push recovery and parameter sweeps",
+    "mp4": "Viewer in notebooks, pages and films",
+    "dark mode": "Viewer in notebooks, pages and films",
+    "contact forces": "Simulation and rollouts",
+    "numba cache": "Installation and troubleshooting",
+    "cite": "References",
+}
+
+
 @needs_chromium
-def test_search_finds_friction_cones(built: Path, browser: Any) -> None:
-    page = browser.new_page()
-    page.goto((built / "search.html").as_uri() + "?q=friction+cone")
-    page.locator("#search-results li a", has_text="06 · Friction cones").first.wait_for(
-        timeout=20_000
-    )
-    page.locator("#search-results li a", has_text="FrictionCone").first.wait_for(timeout=20_000)
+def test_search_lists_the_right_page_among_the_first_three(built: Path, browser: Any) -> None:
+    page, found = browser.new_page(), {}
+    results = page.locator("#search-results li > a")
+    for words in SEARCHES:
+        page.goto((built / "search.html").as_uri() + f"?q={words.replace(' ', '+')}")
+        results.first.wait_for(timeout=20_000)
+        page.wait_for_timeout(500)  # results are listed one after the other
+        found[words] = [text.split(" > ")[0].strip() for text in results.all_inner_texts()[:3]]
     page.close()
+    assert {
+        words: found[words] for words, title in SEARCHES.items() if title not in found[words]
+    } == {}
+
+
+def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
+    built, folder = tmp_path / "built", tmp_path / "gh-pages"
+    (built / "api").mkdir(parents=True)
+    (folder / ".git").mkdir(parents=True)
+    (folder / ".git" / "config").write_text("unpushed")
+    (folder / ".buildinfo").write_text("of another project")
+    for name in ("index.html", "api/old.html"):
+        (built / name).write_text("first")
+    replace_site(built, folder)
+    (built / "api/old.html").unlink()
+    (built / "index.html").write_text("second")
+    replace_site(built, folder)
+    assert (folder / "index.html").read_text() == "second"
+    assert not (folder / "api/old.html").exists()
+    assert (folder / ".git" / "config").read_text() == "unpushed"
+    assert (folder / ".buildinfo").read_text() == "of another project"
+    (built / "CNAME").write_text("ours")
+    (folder / "CNAME").write_text("x.org")
+    with pytest.raises(InputError, match="CNAME"):
+        replace_site(built, folder)
+    assert (folder / "CNAME").read_text() == "x.org"
 
 
 class NoPictures:
@@ -231,9 +283,11 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
     assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
     assert list(image.data) == ["image/png"]
     assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
-    assert "*a* or *b*" in asked.source and "(../run.md)" in asked.source
+    assert "*a* or *b*" in asked.source and "(../installation.md)" in asked.source
     assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
-    assert {check.cell_type, said.cell_type} == {"markdown"} and "(../run.md)" in check.source
+    assert {check.cell_type, said.cell_type} == {
+        "markdown"
+    } and "(../installation.md)" in check.source
     assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")
 
 
@@ -264,18 +318,6 @@ def test_links_leave_code_formulas_and_links_as_they_are() -> None:
         "[(26)](#eq-26)[(27)](#eq-27), [§4.1](#sec-4-1), [App. A](#app-a), [note "
         "12](#notes-of-the-document)"
     )
-
-
-def test_a_docstring_becomes_text_lists_and_links() -> None:
-    text = (
-        "(9) ζ of A * b_i by `Contacts`. mu: of friction. a, b: two\n    lines.\n\nx: no "
-        "parameter.\n\n    code = 1\n"
-    )
-    made = docstrings.to_restructured_text(text, ["mu", "a", "b"])
-    assert ":ref:`(9) <eq-9>`" in made
-    assert r"A \* b\_i" in made and ":py:obj:`Contacts <floatbase.dynamics.Contacts>`" in made
-    assert "* ``mu``: of friction.\n* ``a``, ``b``: two lines." in made
-    assert "\n\nx: no parameter." in made and "::\n\n    code = 1" in made
 
 
 def test_every_formula_of_the_course_becomes_mathml() -> None:

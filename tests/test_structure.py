@@ -34,12 +34,10 @@ LAYERS = (
     ("__main__",),
 )
 LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
-MAX_LINES = 400  # of a module
+MAX_LINES = 400  # of a module, without docstrings
 # modules that are still to be split
 TOO_LONG = {
-    "lessons/lesson03/exercises.py", "lessons/lesson05/exercises.py",
-    "lessons/lesson07/exercises.py", "lessons/lesson08/exercises.py", "qp/active_set.py",
-    "viewer/scene/painter.py", "viewer/viewer.py",
+    "viewer/viewer.py",
 }  # fmt: skip
 MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
@@ -218,12 +216,23 @@ def test_only_robot_state_and_standing_import_one_another() -> None:
     assert not others, "\n".join(others)
 
 
+def docstring_lines(tree: ast.Module) -> int:
+    """Count the lines of all docstrings of a module."""
+    strings = [
+        node.body[0]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node)
+    ]
+    return sum(1 + (string.end_lineno or 0) - string.lineno for string in strings)
+
+
 def test_modules_are_short_documented_and_finished() -> None:
     wrong = []
     for path in MODULES:
         source, name = path.read_text(encoding="utf-8"), path.relative_to(PACKAGE).as_posix()
-        if len(source.splitlines()) > MAX_LINES and name not in TOO_LONG:
-            wrong.append(f"{relative(path)} has {len(source.splitlines())} lines")
+        count = len(source.splitlines()) - docstring_lines(parsed(path))
+        if count > MAX_LINES and name not in TOO_LONG:
+            wrong.append(f"{relative(path)} has {count} lines without docstrings")
         if not ast.get_docstring(parsed(path)):
             wrong.append(f"{relative(path)} has no docstring")
         wrong += [

@@ -1,6 +1,4 @@
-"""Behaviours: controllers that step. Gaits, swings, plans of the centre of mass, footholds, `Walk`
-and `Stand`.
-"""
+"""Legged locomotion: gaits, swing paths, footholds, centre-of-mass plans, `Walk` and `Stand`."""
 
 from floatbase.behaviours.footholds import (
     capture_point,

@@ -1,4 +1,4 @@
-"""Where to step: the rules that `Walk` uses by default, as functions that can be exchanged."""
+"""Foothold rules: the neutral point, the capture point, and the step adjustment of `Walk`."""
 
 from __future__ import annotations
 
@@ -9,20 +9,38 @@ from floatbase._geometry import convex_hull, distance_to_polygon
 from floatbase._validation import Array, as_array, as_number, as_positive, read_only
 from floatbase.errors import InputError
 
-_MAX_EXPONENT = 50.0  # ω times a time: what grows by e^{50} is out of reach of any robot
+_MAX_EXPONENT = 50.0  # ω times a time: an error that grows by e^{50} is beyond any robot's reach
 
 
 def neutral_point(
     nominal_foothold: npt.ArrayLike, velocity: npt.ArrayLike, stance_time: float
 ) -> Array:
-    """Raibert's neutral point: the foothold, (2,), m, that the body passes in the middle of the
-    coming stance.
+    """Compute Raibert's neutral point: the body passes over it in the middle of the coming stance.
 
-    nominal_foothold: (2,), m, world, of the foot below the body at touch-down, as it stands.
-    velocity: (2,), m/s, world, of the body.
-    stance_time: s, for which the foot will stand.
+    Parameters
+    ----------
+    nominal_foothold : array_like, shape (2,)
+        Position of the foot below the body at touchdown, as in the standing posture, in the world
+        frame [m].
+    velocity : array_like, shape (2,)
+        Velocity of the body in the world frame [m/s].
+    stance_time : float
+        Duration of the coming stance [s].
 
-    Source: Raibert, Legged robots that balance, 1986.
+    Returns
+    -------
+    ndarray, shape (2,)
+        Foothold in the world frame [m].
+
+    Notes
+    -----
+    The rule is from [Raibert1986]_.
+
+    Examples
+    --------
+    >>> from floatbase.behaviours import neutral_point
+    >>> neutral_point([0.2, 0.1], [0.4, 0.0], 0.5)
+    array([0.3, 0.1])
     """
     nominal_foothold, velocity = (
         as_array("nominal_foothold", nominal_foothold, (2,), "m"),
@@ -35,20 +53,35 @@ def neutral_point(
 
 
 def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> Array:
-    """ξ = c + ċ / ω, shape (2,), m: where a linear inverted pendulum must step to come to rest.
+    """Compute the capture point ξ = c + ċ / ω, where a linear inverted pendulum can come to rest.
 
-    com, velocity: (2,) or (3,), m and m/s, world, of the centre of mass; heights do not count.
-    omega: 1/s, √(g / height).
+    The capture point is also the divergent component of motion (DCM): since ξ̇ = ω (ξ - p), it
+    moves away from the zero-moment point p.
 
-    It is the divergent component of motion, too: ξ̇ = ω (ξ - p), so it runs away from the ZMP p.
-    Sources: Pratt et al., Capture point, 2006; Englsberger, Ott, Albu-Schäffer, 2015.
+    Parameters
+    ----------
+    com : array_like, shape (2,) or (3,)
+        Centre of mass in the world frame [m]; its height is ignored.
+    velocity : array_like, shape (2,) or (3,)
+        Velocity of the centre of mass in the world frame [m/s]; its vertical component is ignored.
+    omega : float
+        Natural frequency of the pendulum, √(g / height) [1/s].
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Capture point in the world frame [m].
+
+    Notes
+    -----
+    The capture point is from [Pratt2006]_; for the DCM see [Englsberger2015]_.
     """
     c, v = _horizontal_part("com", com, "m"), _horizontal_part("velocity", velocity, "m/s")
     return read_only(c + v / as_positive("omega", omega, "1/s"))
 
 
 def _horizontal_part(name: str, vector: npt.ArrayLike, unit: str) -> Array:
-    """x and y of a vector of two or three."""
+    """Return x and y of a vector of two or three."""
     array = as_array(name, vector, (None,), unit)
     if len(array) not in (2, 3):
         raise InputError(
@@ -58,13 +91,35 @@ def _horizontal_part(name: str, vector: npt.ArrayLike, unit: str) -> Array:
 
 
 def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
-    """How far a point is inside the convex hull of the feet, m; negative: how far outside. Level
-    ground, seen from above.
+    """Compute how far a point is inside the support polygon, on level ground.
 
-    point: (2,), m, world, such as the capture point or the ZMP. feet: (n, 2), m, world, of all
-        points that touch. Both may have heights, which do not count.
-    On other ground the support region is another: `floatbase.friction.WrenchSet.support_region`,
-    whose corners fit, too.
+    The support polygon is the convex hull of the contact points, seen from above. On other ground,
+    the support region is a different one; the corners of
+    `floatbase.friction.WrenchSet.support_region` can then be given as `feet`.
+
+    Parameters
+    ----------
+    point : array_like, shape (2,) or (3,)
+        Point such as the capture point or the zero-moment point, in the world frame [m]; its height
+        is ignored.
+    feet : array_like, shape (n, 2) or (n, 3)
+        All contact points in the world frame [m]; heights are ignored.
+
+    Returns
+    -------
+    float
+        Distance from the edge, negative outside [m].
+
+    Raises
+    ------
+    InputError
+        If there are no contact points.
+
+    Examples
+    --------
+    >>> from floatbase.behaviours import support_margin
+    >>> support_margin([0.1, 0.0], [[-0.2, -0.3], [-0.2, 0.3], [0.2, -0.3], [0.2, 0.3]])
+    0.1
     """
     point, feet = _horizontal_part("point", point, "m"), as_array("feet", feet, (None, None), "m")
     if feet.shape[1] not in (2, 3):
@@ -72,7 +127,7 @@ def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
     feet = feet[:, :2]
     if not len(feet):
         raise InputError(
-            "a robot in the air has no support region: feet must hold one point at least."
+            "feet must hold at least one point, because a robot in the air has no support polygon."
         )
     return float(distance_to_polygon(point, convex_hull(feet)))
 
@@ -80,14 +135,30 @@ def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
 def step_adjustment(
     dcm_error: npt.ArrayLike, time_to_touchdown: float, omega: float, dead_zone: float = 0.0
 ) -> Array:
-    """e^{ω (land - t)} (ξ - ξ_planned): how far to shift a foothold, (2,), m, so that an error now
-    is caught at touch-down.
+    """Compute how far to shift a foothold so that a present error is corrected at touchdown.
 
-    dcm_error: ξ - ξ_planned, (2,), m, world, now.
-    time_to_touchdown: s, until the foot lands; the error grows by e^{ω time_to_touchdown} until
-        then.
-    omega: 1/s, √(g / height).
-    dead_zone: m; an error below it counts as none, and a larger one by what is beyond.
+    The shift is e^{ω (T - t)} (ξ - ξ_planned), with the divergent component of motion (DCM) ξ and
+    the time of touchdown T.
+
+    Parameters
+    ----------
+    dcm_error : array_like, shape (2,)
+        Present error ξ - ξ_planned of the DCM in the world frame [m].
+    time_to_touchdown : float
+        Time until the foot lands [s]. The error grows by e^{ω time_to_touchdown} until then.
+    omega : float
+        Natural frequency of the pendulum, √(g / height) [1/s].
+    dead_zone : float, optional
+        Errors below this length are ignored, and larger errors are reduced by it [m].
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Shift of the foothold in the world frame [m].
+
+    Notes
+    -----
+    For the dynamics of the DCM see [Englsberger2015]_.
     """
     error = as_array("dcm_error", dcm_error, (2,), "m")
     size = float(np.linalg.norm(error))

@@ -1,51 +1,79 @@
-"""`Gait`: which foot is in the air when."""
+"""`Gait`: a periodic contact schedule."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import floor, inf
 from types import MappingProxyType
 
 import numpy as np
 
-from floatbase._validation import Value, as_instance, as_integer, as_number, as_positive, as_string
+from floatbase._validation import (
+    Value,
+    as_instance,
+    as_integer,
+    as_number,
+    as_positive,
+    as_string,
+    checked,
+)
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot
 
-# s: times of a schedule that differ by less are the same; sums of periods round
+# s: times of a schedule that differ by less count as equal, because sums of periods are rounded
 TIME_TOLERANCE = 1e-9
-_MAX_PERIOD = 100.0  # s, of a period: more is a slip of units
-_MAX_PHASES = 1000  # asked for at once
+_MAX_PERIOD = 100.0  # s, of a period: a larger number must be in another unit
+_MAX_PHASES = 1000  # at most, in one call
 
 
 @dataclass(frozen=True, eq=False)
 class Gait(Value):
-    """A contact schedule: foot f is in the air for `swing` s from start + (n + offsets[f]) period
-    on, n = 0, 1, 2, …
+    """A periodic contact schedule: which foot is in the air at which time.
 
-    offsets: for each foot the part of the period at which it lifts, from 0 to 1; feet that are not
-        among them never lift.
-    period: s, from one lift-off of a foot to its next.
-    swing: s, for which a foot is in the air, less than the period.
-    start: s, before which no foot lifts.
-    stop: s, from which on no foot lifts any more; one that is in the air then still comes down.
-        None: it goes on.
+    Foot f lifts off at start + (n + offsets[f]) period for n = 0, 1, 2, ..., and stays in the air
+    for `swing`. `trot`, `crawl` and `walk` make the usual gaits.
 
-    `trot`, `crawl` and `walk` make the usual ones. Raises `InputError` for numbers that do not fit.
+    Parameters
+    ----------
+    offsets : dict of str to float
+        Lift-off of each foot as a fraction of the period, at least 0 and less than 1 [-]. Feet that
+        are not listed never lift off.
+    period : float
+        Time from one lift-off of a foot to its next [s].
+    swing : float
+        Time that a foot spends in the air, less than the period [s].
+    start : float, optional
+        Time before which no foot lifts off [s].
+    stop : float or None, optional
+        Time from which on no foot lifts off [s]; feet in the air at that time still come down. With
+        None, the gait does not stop.
+
+    Raises
+    ------
+    InputError
+        If an offset is out of range, or if the swing is as long as the period.
+
+    Examples
+    --------
+    >>> from floatbase.behaviours import Gait
+    >>> gait = Gait({"left": 0.0, "right": 0.5}, period=1.0, swing=0.4)
+    >>> gait.stance(0.2)
+    ('right',)
     """
 
     offsets: Mapping[str, float]
-    period: float
-    swing: float
-    start: float = 0.0
+    period: float = field(metadata=checked(as_positive, "s", maximum=_MAX_PERIOD))
+    swing: float = field(metadata=checked(as_positive, "s", maximum=_MAX_PERIOD))
+    start: float = field(default=0.0, metadata=checked(as_number, "s"))
     stop: float | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.offsets, Mapping) or not self.offsets:
             raise InputError(
-                'offsets must be a mapping from feet to parts of the period, such as {"left": 0.0, '
-                '"right": 0.5}.'
+                'offsets must map feet to fractions of the period, such as {"left": 0.0, "right": '
+                "0.5}."
             )
         offsets = {
             as_string("foot", foot): as_number(f"offset of {foot}", offset)
@@ -54,52 +82,96 @@ class Gait(Value):
         for foot, offset in offsets.items():
             if not 0.0 <= offset < 1.0:
                 raise InputError(
-                    f"the offset of {foot} is {offset:g}; it must be from 0 to less than 1."
+                    f"The offset of {foot} is {offset:g}; it must be at least 0 and less than 1."
                 )
         object.__setattr__(self, "offsets", MappingProxyType(offsets))
-        for name in ("swing", "period"):
-            object.__setattr__(
-                self, name, as_positive(name, getattr(self, name), "s", maximum=_MAX_PERIOD)
-            )
-        object.__setattr__(self, "start", as_number("start", self.start, "s"))
         if self.stop is not None:
             object.__setattr__(self, "stop", as_number("stop", self.stop, "s"))
         if self.swing > self.period - TIME_TOLERANCE:
             raise InputError(
-                f"swing is {self.swing:g} s of a period of {self.period:g} s; each foot must stand "
-                f"for a while."
+                f"swing is {self.swing:g} s; it must be shorter than the period of "
+                f"{self.period:g} s, so that each foot also stands."
             )
 
     @staticmethod
     def trot(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 1.0) -> Gait:
-        """Diagonal pairs of a quadruped in turns, with a pause on all feet after each swing; all
-        times in s.
+        """Return a trot, in which the diagonal pairs of a quadruped's feet swing alternately.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
+        swing : float, optional
+            Time that a foot spends in the air [s].
+        pause : float, optional
+            Time on all feet after each swing [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
         """
         front, hind = _front_and_hind_feet(robot)
-        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
+        step = _step_time(swing, pause)
         offsets = {front[0]: 0.0, hind[1]: 0.0, front[1]: 0.5, hind[0]: 0.5}
         return Gait({foot: offsets[foot] for foot in _foot_names(robot)}, 2.0 * step, swing, start)
 
     @staticmethod
     def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 1.0) -> Gait:
-        """One foot of a quadruped after the other, hind before front on each side, with a pause
-        after each; times in s.
+        """Return a crawl, in which a quadruped's feet swing one after the other.
+
+        On each side, the hind foot swings before the front foot.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
+        swing : float, optional
+            Time that a foot spends in the air [s].
+        pause : float, optional
+            Time on all feet after each swing [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
         """
         front, hind = _front_and_hind_feet(robot)
-        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
+        step = _step_time(swing, pause)
         offsets = {hind[0]: 0.0, front[0]: 0.25, hind[1]: 0.5, front[1]: 0.75}
         return Gait({foot: offsets[foot] for foot in _foot_names(robot)}, 4.0 * step, swing, start)
 
     @staticmethod
     def walk(robot: Robot, swing: float = 0.6, pause: float = 0.1, start: float = 1.0) -> Gait:
-        """The two feet of a biped in turns, with a pause on both after each swing; times in s."""
+        """Return a walk, in which a biped's feet swing alternately.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with two feet.
+        swing : float, optional
+            Time that a foot spends in the air [s].
+        pause : float, optional
+            Time on both feet after each swing [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
+        """
         names = _foot_names(robot)
         if len(names) != 2:
             raise InputError(
-                f"{robot.name} has {len(names)} feet; Gait.walk is for two. Gait.trot and "
-                f"Gait.crawl are for four."
+                f"{robot.name} has {len(names)} feet, but Gait.walk needs two. For four feet, use "
+                f"Gait.trot or Gait.crawl."
             )
-        step = as_positive("swing", swing, "s") + as_positive("pause", pause, "s", allow_zero=True)
+        step = _step_time(swing, pause)
         return Gait(dict(zip(names, (0.0, 0.5), strict=True)), 2.0 * step, swing, start)
 
     @property
@@ -108,8 +180,19 @@ class Gait(Value):
         return tuple(self.offsets)
 
     def swing_at(self, foot: str, t: float) -> tuple[float, float] | None:
-        """When a foot lifted and when it lands, s, if it is in the air at time t, s; None if it
-        stands.
+        """Return the swing of a foot that is in the air at a given time.
+
+        Parameters
+        ----------
+        foot : str
+            Name of the foot.
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        (float, float) or None
+            Times of lift-off and touchdown [s]; None if the foot stands.
         """
         t, first_lift_off = as_number("t", t, "s"), self._first_lift_off(foot)
         cycles = floor((t + TIME_TOLERANCE - first_lift_off) / self.period)
@@ -122,12 +205,34 @@ class Gait(Value):
         return (lift_off, lift_off + self.swing) if swinging else None
 
     def stance(self, t: float) -> tuple[str, ...]:
-        """The feet that stand at time t, s."""
+        """Return the feet that stand at a given time.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        tuple of str
+            Names of the feet.
+        """
         return tuple(foot for foot in self.offsets if self.swing_at(foot, t) is None)
 
     def next_swing(self, foot: str, t: float) -> tuple[float, float] | None:
-        """The first swing of a foot that begins at time t, s, or later, as (lift_off, touchdown),
-        s; None where there is none.
+        """Return the first swing of a foot that begins at a given time or later.
+
+        Parameters
+        ----------
+        foot : str
+            Name of the foot.
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        (float, float) or None
+            Times of lift-off and touchdown [s]; None if there are no more swings.
         """
         t, first_lift_off = as_number("t", t, "s"), self._first_lift_off(foot)
         lift_off = (
@@ -139,10 +244,21 @@ class Gait(Value):
     def phases(
         self, t: float, n: int, max_duration: float = 5.0
     ) -> list[tuple[float, float, tuple[str, ...]]]:
-        """The next n times of one stance from t on, as (begin, end, standing feet), s; one that
-        does not end is cut.
+        """Return the next periods of constant stance.
 
-        max_duration: s, after which a stance is cut, and the list ends.
+        Parameters
+        ----------
+        t : float
+            Time from which on to look [s].
+        n : int
+            Largest number of periods.
+        max_duration : float, optional
+            A stance that lasts longer is cut off at this duration, and the list ends there [s].
+
+        Returns
+        -------
+        list of (float, float, tuple of str)
+            Beginning, end [s] and standing feet of each period.
         """
         n, t, max_duration = (
             as_integer("n", n, 1, _MAX_PHASES),
@@ -160,8 +276,19 @@ class Gait(Value):
         return phases
 
     def starting_at(self, t: float) -> Gait:
-        """The same lift-offs, but for those before time t, s: what would be in the air then stands
-        until it lifts next.
+        """Return the same gait without the lift-offs before a given time.
+
+        A foot that would be in the air at that time stands until its next lift-off.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
         """
         if as_number("t", t, "s") <= self.start:
             return self
@@ -178,16 +305,17 @@ class Gait(Value):
         )
 
     def _allows_lift_off(self, time: float) -> bool:
+        """Return whether feet may lift off at a time [s]."""
         return self.stop is None or time < self.stop - TIME_TOLERANCE
 
     def _first_lift_off(self, foot: str) -> float:
-        """When a foot lifts first, s, if the gait goes on until then."""
+        """Return when a foot would first lift off if the gait did not stop [s]."""
         if not isinstance(foot, str) or foot not in self.offsets:
             raise unknown_name("foot", foot, self.offsets)
         return self.start + self.offsets[foot] * self.period
 
     def _next_contact_change(self, t: float) -> float:
-        """When a foot lifts or lands next after t, s."""
+        """Return when a foot next lifts off or lands after a time [s]."""
         times = [inf]
         for foot in self.offsets:
             current, upcoming = (
@@ -200,8 +328,10 @@ class Gait(Value):
 
 
 def check_always_supported(gait: Gait) -> None:
-    """Raise `InputError` for a gait of all feet that lifts them all at once: fewest stand when one
-    has just lifted.
+    """Raise `InputError` for a gait that has all feet in the air at some time.
+
+    All contacts are assumed to be feet of the gait. It suffices to check each lift-off: the fewest
+    feet stand when one has just lifted.
     """
     if not any(gait.next_swing(foot, gait.start) for foot in gait.feet):
         return
@@ -209,22 +339,31 @@ def check_always_supported(gait: Gait) -> None:
     for offset in gait.offsets.values():
         if not endless.stance(gait.start + (1.0 + offset) * gait.period):
             raise InputError(
-                f"this gait has all feet in the air at {offset:g} of its period; one must stand at "
-                f"any time, as running is not "
-                "built: give feet other offsets, or a shorter swing."
+                f"This gait has all feet in the air at the fraction {offset:g} of its period. At "
+                "least one foot must stand at any time, because running is not supported. Use "
+                "other offsets or a shorter swing."
             )
 
 
+def _step_time(swing: float, pause: float) -> float:
+    """Return the time of a swing and the pause after it [s], both checked."""
+    return as_positive("swing", swing, "s", maximum=_MAX_PERIOD) + as_positive(
+        "pause", pause, "s", allow_zero=True
+    )
+
+
 def _foot_names(robot: Robot) -> tuple[str, ...]:
+    """Return the names of a robot's feet."""
     return tuple(foot.frame for foot in as_instance("robot", robot, Robot).feet)
 
 
 def _front_and_hind_feet(robot: Robot) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The front feet and the hind feet of a quadruped, left before right."""
+    """Return the front feet and the hind feet of a quadruped, left before right."""
     names = _foot_names(robot)
     if len(names) != 4:
         raise InputError(
-            f"{robot.name} has {len(names)} feet; this gait is for four. Gait.walk is for two."
+            f"{robot.name} has {len(names)} feet, but this gait needs four. For two feet, use "
+            f"Gait.walk."
         )
     standing = robot.standing()
     positions = {name: standing.point(name) for name in names}
@@ -232,7 +371,7 @@ def _front_and_hind_feet(robot: Robot) -> tuple[tuple[str, str], tuple[str, str]
     rows = [sorted(pair, key=lambda name: -positions[name][1]) for pair in (by_x[:2], by_x[2:])]
     if not all(np.sign(positions[left][1]) > np.sign(positions[right][1]) for left, right in rows):
         raise InputError(
-            f"{robot.name} does not stand on two feet to the left and two to the right: make its "
-            f"Gait by offsets."
+            f"{robot.name} does not have two feet on the left and two on the right. Make its gait "
+            f"with Gait(offsets, …)."
         )
     return (rows[0][0], rows[0][1]), (rows[1][0], rows[1][1])

@@ -1,11 +1,9 @@
-"""`LIPM`: the centre of mass as a linear inverted pendulum above a zero-moment point (ZMP) that is
-planned ahead.
-"""
+"""`LIPM`: the linear inverted pendulum, with a zero-moment point (ZMP) that is planned ahead."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -17,48 +15,69 @@ from floatbase._validation import (
     as_number,
     as_positive,
     cached_property,
+    checked,
     read_only,
     short_repr,
 )
 from floatbase.errors import InputError
 
 ZMPSegment: TypeAlias = tuple[float, float, Array, Array]
-# ω times the length of a plan: e^{300} is a number still, and half a minute of any robot
+# ω times the length of a plan: e^{300} is still a finite number, and half a minute of any robot
 _MAX_EXPONENT = 300.0
-_MAX_GAP = 1e-6  # s: segments of a ZMP that are further apart are not one after the other
+_MAX_GAP = 1e-6  # s: segments of a ZMP that are further apart are not consecutive
 
 
 @dataclass(frozen=True, eq=False)
 class LIPM(Value):
-    """c̈ = ω² (c - p): the horizontal motion of a centre of mass c at constant height above a ZMP
-    p, in closed form.
+    """Linear inverted pendulum: horizontal motion of the centre of mass at constant height.
 
-    segments: of p, one after the other: (begin, end, p at begin, p at end), s and (2,) m, world; p
-        is linear in each. At the end of the last one the divergent component of motion (DCM) ξ = c
-        + ċ / ω is on p: the motion comes to rest.
-    com: (2,), m, world, where the centre of mass is at first. Its velocity follows: there is one
-        that stays bounded.
-    omega: 1/s, √(g / height).
+    The motion c̈ = ω² (c - p) of the centre of mass c above a planned zero-moment point (ZMP) p is
+    computed in closed form. The initial velocity is the only one for which the motion stays
+    bounded.
 
-    Sources: Kajita et al., 3D linear inverted pendulum mode, 2001; Englsberger, Ott, Albu-Schäffer,
-    3D walking based on the divergent component of motion, 2015. Raises `InputError` for segments
-    with gaps.
+    Parameters
+    ----------
+    segments : sequence of (float, float, array_like, array_like)
+        Consecutive segments (begin, end, p at begin, p at end) of the ZMP, with times [s] and
+        positions of shape (2,) in the world frame [m]. The ZMP is linear in each segment. At the
+        end of the last one, the divergent component of motion (DCM) ξ = c + ċ / ω equals p: the
+        motion comes to rest.
+    com : array_like, shape (2,)
+        Initial position of the centre of mass in the world frame [m].
+    omega : float
+        Natural frequency of the pendulum, √(g / height) [1/s].
+
+    Raises
+    ------
+    InputError
+        If the segments have gaps, or if the plan is too long.
+
+    Notes
+    -----
+    The model is the three-dimensional linear inverted pendulum mode of [Kajita2001]_. The
+    plan follows the DCM, as in [Englsberger2015]_; for the ZMP see [Vukobratovic2004]_.
+
+    Examples
+    --------
+    >>> from floatbase.behaviours import LIPM
+    >>> plan = LIPM([(0.0, 1.0, [0.0, 0.0], [0.0, 0.1])], com=[0.0, 0.0], omega=3.0)
+    >>> plan.zmp(0.5)
+    array([0.  , 0.05])
     """
 
     segments: Sequence[ZMPSegment]
-    com: Array
-    omega: float
+    com: Array = field(metadata=checked(as_array, (2,), "m"))
+    omega: float = field(metadata=checked(as_positive, "1/s"))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "com", as_array("com", self.com, (2,), "m"))
-        object.__setattr__(self, "omega", as_positive("omega", self.omega, "1/s"))
-        form = "a plan needs segments of the ZMP: [(begin, end, p at begin, p at end), …]"
+        super().__post_init__()
+        form = "segments must be a list [(begin, end, ZMP at begin, ZMP at end), …]"
         if not isinstance(self.segments, list | tuple) or not self.segments:
             raise InputError(f"{form}, not {short_repr(self.segments)}.")
         segments: list[ZMPSegment] = []
         for segment in self.segments:
             if not isinstance(segment, list | tuple) or len(segment) != 4:
-                raise InputError(f"{form}; one of them is {short_repr(segment)}.")
+                raise InputError(f"{form}, but one of its entries is {short_repr(segment)}.")
             begin, end, p0, p1 = segment
             begin, end = (
                 as_number("begin of a segment", begin, "s"),
@@ -66,8 +85,8 @@ class LIPM(Value):
             )
             if not end > begin or (segments and abs(segments[-1][1] - begin) > _MAX_GAP):
                 raise InputError(
-                    f"a segment of the ZMP goes from {begin:g} to {end:g} s; each must end later, "
-                    f"and the next begin there."
+                    f"A segment of the ZMP goes from {begin:g} to {end:g} s. Each segment must end "
+                    f"later than it begins, and begin where the one before ends."
                 )
             segments.append(
                 (begin, end, as_array("ZMP", p0, (2,), "m"), as_array("ZMP", p1, (2,), "m"))
@@ -75,14 +94,27 @@ class LIPM(Value):
         length = segments[-1][1] - segments[0][0]
         if self.omega * length > _MAX_EXPONENT:
             raise InputError(
-                f"a plan of {length:g} s is too long: omega times its length must be at most "
+                f"A plan of {length:g} s is too long. omega times its length must be at most "
                 f"{_MAX_EXPONENT:g}."
             )
         object.__setattr__(self, "segments", tuple(segments))
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
-        """Position, m, velocity, m/s, and acceleration, m/s², of the centre of mass, shape (2,)
-        each, at time t in s.
+        """Compute the motion of the centre of mass at a given time.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        position : ndarray, shape (2,)
+            Position in the world frame [m].
+        velocity : ndarray, shape (2,)
+            Velocity in the world frame [m/s].
+        acceleration : ndarray, shape (2,)
+            Acceleration in the world frame [m/s²].
         """
         p, slope, a, b = self._evaluate(t)
         return (
@@ -92,21 +124,43 @@ class LIPM(Value):
         )
 
     def dcm(self, t: float) -> Array:
-        """ξ = c + ċ / ω, shape (2,), m, at time t in s."""
+        """Compute the divergent component of motion ξ = c + ċ / ω at a given time.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            DCM in the world frame [m].
+        """
         p, slope, a, _ = self._evaluate(t)
         return read_only(p + slope / self.omega + 2.0 * a)
 
     def zmp(self, t: float) -> Array:
-        """p, shape (2,), m, at time t in s."""
+        """Return the zero-moment point at a given time.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            ZMP in the world frame [m].
+        """
         return read_only(self._evaluate(t)[0])
 
     @cached_property
     def _closed_form(self) -> tuple[tuple[float, Array, Array, Array, Array], ...]:
-        """Of each segment: begin, p there, its slope, and a and b of c = p + a e^{ω s} + b e^{-ω
-        s}, s = t - begin.
+        """Return begin, p there, its slope, and the coefficients a and b of each segment.
 
-        a comes from the end backwards, by the DCM, and b from the beginning forwards, by the CoM.
-        One more part goes on for ever from the end: the ZMP stays, and the CoM comes to it.
+        In a segment, c = p + a e^{ω s} + b e^{-ω s} with s = t - begin. The coefficient a is
+        computed backwards from the end, by the DCM, and b forwards from the beginning, by the CoM.
+        A last segment continues without an end: the ZMP does not move, and the CoM approaches it.
         """
         omega, xi, divergent = self.omega, self.segments[-1][3], []
         for begin, end, p0, p1 in reversed(self.segments):
@@ -123,8 +177,9 @@ class LIPM(Value):
         return *solutions, (end, last, np.zeros(2), np.zeros(2), c - last)
 
     def _evaluate(self, t: float) -> tuple[Array, Array, Array, Array]:
-        """p, its slope, and the rising and the falling part of c - p at time t; before the first
-        segment as at its begin.
+        """Return p, its slope, and the growing and the decaying part of c - p at time t.
+
+        Before the first segment, these are the values at its beginning.
         """
         t = max(as_number("t", t, "s"), self.segments[0][0])
         begin, p0, slope, a, b = next(

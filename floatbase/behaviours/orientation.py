@@ -1,6 +1,4 @@
-"""Orientations that are given as angles through time, with the velocity and acceleration that a
-task on them needs.
-"""
+"""Orientations given as angles over time, with the derivatives that an orientation task needs."""
 
 from __future__ import annotations
 
@@ -11,19 +9,29 @@ import pinocchio as pin
 
 from floatbase._validation import Array, as_callable
 
-# s, of the differences: their error is below 1e-5 of what a base does in a second
+# s, of the finite differences: their error is below 1e-5 of a base's motion in a second
 _DIFFERENCE_STEP = 1e-4
 
 
 def pitch_and_yaw(
     angles: Callable[[float], Array],
 ) -> Callable[[float], tuple[Array, Array, Array]]:
-    """Orientations with these angles of pitch and yaw, as `OrientationTask` takes them.
+    """Convert pitch and yaw angles over time to the target of an `OrientationTask`.
 
-    angles: angles(t) is (2,), rad, about the body's y axis after the turn about the world's z axis;
-        smooth in t, s.
-    Returns R (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of
-    t.
+    The derivatives are computed by finite differences.
+
+    Parameters
+    ----------
+    angles : callable
+        Called as angles(t) with the time t [s]. It returns pitch and yaw, shape (2,) [rad], and
+        must be smooth. Pitch is about the body's y axis, after the yaw rotation about the world's z
+        axis.
+
+    Returns
+    -------
+    callable
+        Function of t that returns the rotation matrix, shape (3, 3), the angular velocity, shape
+        (3,) [rad/s], and the angular acceleration, shape (3,) [rad/s²], all in the world frame.
     """
     as_callable("angles", angles, "angles(t)")
 

@@ -1,4 +1,4 @@
-"""`Planner`: where a `Walk` steps and how its centre of mass moves, from its state and its gait."""
+"""`Planner`: footholds and centre-of-mass motion of a `Walk`, from its state and its gait."""
 
 from __future__ import annotations
 
@@ -23,33 +23,40 @@ from floatbase.robots import State
 Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
 _PLANNED_PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
 _PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
-# s after which the height of a foot shows that of the ground: feet that aim where others just
-# touched climb
+# s after touchdown until the height of a foot is used as that of the ground: earlier heights make
+# the planned footholds climb
 _TOUCHDOWN_SETTLING_TIME = 0.05
-# s before the first lift-off and after the last landing in which the ZMP moves
+# s before the first lift-off and after the last touchdown in which the ZMP shifts
 _ZMP_SHIFT_TIME = 0.8
-# m of DCM error that a stance with area bears without moving a step: it would grow by up to e^{ω
-# 1.2 s}
+# m of DCM error that a stance with area tolerates without moving a step: the error would grow by up
+# to e^{ω 1.2 s}
 _DCM_DEAD_ZONE = 0.02
-# m by which steps have moved, from which on the path moves along, or the robot runs back to it and
-# falls
+# m: if steps were shifted by more, the path is shifted, too; otherwise the robot runs back to it
+# and falls
 _PATH_SHIFT_THRESHOLD = 0.05
-# part of its distance from the middle that a foot keeps to its own side: legs must not cross
+# fraction of its nominal distance from the middle that a foot keeps on its side: legs must not
+# cross
 _MIN_SIDE_FRACTION = 0.25
 
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What a `Walk` planned at one change of stance, or where it stood on and the plan came to its
-    end.
+    """What a `Walk` planned when its stance changed, or when it kept standing and its plan ended.
 
-    time: s.
-    stance: the feet that stand from then on.
-    feet: (3,) m, world, where each foot's frame stands or stood.
-    footholds: (3,) m, world, where each foot that is in the air, or lifts next, is to land, as
-        planned then.
-    plan: of the centre of mass.
-    swings: the paths of the feet that are in the air, as planned then.
+    Parameters
+    ----------
+    time : float
+        Time of the plan [s].
+    stance : tuple of str
+        Feet that stand from then on.
+    feet : dict of str to ndarray, shape (3,)
+        Position of each foot's frame, where it stands or last stood, in the world frame [m].
+    footholds : dict of str to ndarray, shape (3,)
+        Planned foothold of each foot that is in the air or lifts off next, in the world frame [m].
+    plan : LIPM
+        Plan of the centre of mass.
+    swings : dict of str to Swing
+        Planned paths of the feet in the air.
     """
 
     time: float
@@ -61,12 +68,26 @@ class StepPlan:
 
 
 class Planner:
-    """Plans footholds, swings and the centre of mass of a robot with some contacts.
+    """Planner of footholds, swings and the centre-of-mass motion.
 
-    standing_state: the robot's posture. clearance, reach: m, as of `Walk`.
-    nominal_feet: (3,) m, where each foot's frame is in the posture, from the middle of the feet on
-        the ground.
-    omega: 1/s, of the pendulum.
+    Parameters
+    ----------
+    contacts : Contacts
+        All the robot's contacts.
+    standing_state : State
+        State whose posture the robot keeps.
+    clearance : float
+        Height of the swings, as for `Walk` [m].
+    reach : float
+        Largest distance of a foothold from the nominal one, as for `Walk` [m].
+
+    Attributes
+    ----------
+    nominal_feet : dict of str to ndarray, shape (3,)
+        Position of each foot's frame in the standing posture, relative to the middle of the feet on
+        the ground [m].
+    omega : float
+        Natural frequency of the pendulum [1/s].
     """
 
     def __init__(self, contacts: Contacts, standing_state: State, clearance: float, reach: float):
@@ -84,7 +105,7 @@ class Planner:
         self.omega = sqrt(standing_state.robot.gravity / (standing_state.com[2] - ground))
 
     def start(self, state: State, gait: Gait, t: float) -> Reference:
-        """The reference from the measured state on: its path begins in the middle of the feet."""
+        """Return the reference for a measured state; its path begins in the middle of the feet."""
         yaw = yaw_of(state.frame_pose("base").rotation)
         feet = {name: state.point(name) for name in self.contacts.names}
         positions = [
@@ -111,9 +132,26 @@ class Planner:
         foothold: Callable[[str, float], npt.ArrayLike],
         yaw_at: Callable[[float], float],
     ) -> StepPlan:
-        """Another stance begins, or its plan ends: take the feet where they are, and plan anew.
+        """Plan anew from the feet's present positions, when the stance changes or its plan ends.
 
-        foothold: (foot, touchdown in s) -> (2,) m, world. yaw_at: t in s -> rad, of the path.
+        Parameters
+        ----------
+        ref : Reference
+            The reference, which is updated.
+        state : State
+            The measured state.
+        stance : tuple of str
+            Feet that stand from now on.
+        foothold : callable
+            Called as foothold(foot, touchdown) with the time of touchdown [s]; returns the
+            foothold, shape (2,), in the world frame [m].
+        yaw_at : callable
+            Called as yaw_at(t) with a time [s]; returns the yaw of the path [rad].
+
+        Returns
+        -------
+        StepPlan
+            The plan.
         """
         for foot in ref.stance or stance:
             if ref.time > ref.touchdown_times.get(foot, -inf) + _TOUCHDOWN_SETTLING_TIME:
@@ -127,7 +165,7 @@ class Planner:
             stance,
             {},
         )
-        if len(phases) == 1:  # it stands, and no end is in sight
+        if len(phases) == 1:  # it stands, with no end within the horizon
             ref.stance_interval, ref.replan_time = (begin, inf), until - _ZMP_SHIFT_TIME
         ref.fit_ground()
         ref.plan = LIPM(self._zmp_segments(ref, phases, foothold), state.com[:2], self.omega)
@@ -144,9 +182,7 @@ class Planner:
         return StepPlan(ref.time, stance, dict(ref.feet), dict(ref.footholds), ref.plan, swings)
 
     def adjust_footholds(self, ref: Reference, state: State) -> None:
-        """Shift the ends of the swings by what the DCM misses of the plan, as far as the legs
-        reach.
-        """
+        """Shift the ends of the swings by the error of the DCM, as far as the legs reach."""
         if not ref.swinging:
             return
         assert ref.plan is not None
@@ -154,7 +190,7 @@ class Planner:
         dead_zone = _DCM_DEAD_ZONE if len(ref.stance) > 2 or self.flat_feet else 0.0
         for touchdown in {
             each.path.touchdown for each in ref.swinging.values()
-        }:  # feet of a trot land together
+        }:  # two feet of a trot land together
             shift = step_adjustment(error, touchdown - ref.time, self.omega, dead_zone)
             com_at_touchdown = state.com[:2] + state.com_velocity[:2] * (touchdown - ref.time)
             for foot, each in ref.swinging.items():
@@ -165,7 +201,7 @@ class Planner:
                     each.path = each.path.with_end(ref.on_ground(foot, end))
 
     def _register_touchdowns(self, ref: Reference, state: State, feet: Sequence[str]) -> None:
-        """These feet have landed; the path moves along where they were moved far."""
+        """Register that feet have landed, and shift the path if the steps were shifted far."""
         offsets = []
         for foot in feet:
             each = ref.swinging.pop(foot)
@@ -177,7 +213,7 @@ class Planner:
         before, ref.step_offset = ref.step_offset, np.mean(offsets, axis=0)
         mean_offset = (
             before + ref.step_offset
-        ) / 2.0  # swinging legs sway the body to one side and to the other
+        ) / 2.0  # the mean of two steps, as swinging legs sway the body to both sides in turn
         if np.linalg.norm(mean_offset) > _PATH_SHIFT_THRESHOLD:
             ref.position = ref.position + mean_offset
 
@@ -187,8 +223,9 @@ class Planner:
         phases: Sequence[Phase],
         foothold: Callable[[str, float], npt.ArrayLike],
     ) -> list[ZMPSegment]:
-        """The ZMP of the coming phases: in the middle of the feet that stand, and shifting while
-        all stand.
+        """Return the ZMP of the next phases.
+
+        It is in the middle of the standing feet, and shifts while all feet stand.
         """
         centres = self._stance_centres(ref, phases, foothold)
         zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
@@ -200,12 +237,12 @@ class Planner:
                 segments.append((begin, end, goal, goal))
             elif end - begin <= _ZMP_SHIFT_TIME:
                 segments.append((begin, end, zmp, goal))
-            elif last:  # come to the middle, and stay
+            elif last:  # move to the middle, then stay
                 segments += [
                     (begin, begin + _ZMP_SHIFT_TIME, zmp, goal),
                     (begin + _ZMP_SHIFT_TIME, end, goal, goal),
                 ]
-            else:  # stay, then shift before the foot lifts
+            else:  # stay, then shift before the foot lifts off
                 segments += [
                     (begin, end - _ZMP_SHIFT_TIME, zmp, zmp),
                     (end - _ZMP_SHIFT_TIME, end, zmp, goal),
@@ -219,9 +256,7 @@ class Planner:
         phases: Sequence[Phase],
         foothold: Callable[[str, float], npt.ArrayLike],
     ) -> list[Array]:
-        """The middle of the feet that stand in each phase, (2,) m; finds the footholds of those
-        that swing.
-        """
+        """Return the middle of the standing feet in each phase, (2,) [m], and set new footholds."""
         feet, centres = dict(ref.feet), []
         for begin, end, names in phases:
             stance = [
@@ -242,13 +277,14 @@ class Planner:
         return centres
 
     def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
-        """Where a foot carries best, (2,) m: the middle of a sole, below the centre of a ball.
-        position: (3,) m, of its frame.
+        """Return the best centre of pressure of a foot whose frame is at `position`, (2,) [m].
+
+        It is the middle of a sole, or the point below the centre of a ball.
         """
         contact = self.contacts.friction_contact(foot)
         to_ground = (
             getattr(contact, "radius", 0.0) * contact.normal
-        )  # a ball touches there however it is turned
+        )  # a ball touches the ground there in any orientation
         offset = (
             contact.positions(self.standing_state).mean(axis=0)
             - self.standing_state.point(foot)
@@ -257,9 +293,7 @@ class Planner:
         return position[:2] + rotated_by_yaw(offset[:2], yaw) - to_ground[:2]
 
     def _clamp_to_reach(self, yaw: float, foot: str, end: Array, body: Array) -> Array:
-        """The foothold nearest to `end`, (2,) m, that the leg reaches from the body, (2,) m, and
-        that is on the foot's side.
-        """
+        """Return the foothold nearest to `end`, (2,) [m], in reach and on the foot's own side."""
         nominal = self.nominal_feet[foot][:2]
         offset = rotated_by_yaw(end - body, -yaw) - nominal
         position = nominal + offset * min(1.0, self.reach / (hypot(*offset) or 1.0))
@@ -268,5 +302,6 @@ class Planner:
         return body + rotated_by_yaw(position, yaw)
 
     def _nominal_rotation(self, foot: str) -> Array:
+        """Return the rotation of a foot in the standing posture."""
         rotation: Array = self.standing_state.frame_pose(foot).rotation
         return rotation

@@ -1,6 +1,4 @@
-"""What the tasks of a `Walk` follow: the body's path, the plan of the centre of mass, the swings,
-the ramps of the loads.
-"""
+"""Targets of a `Walk`'s tasks: body path, centre of mass, swings, and bounds of normal forces."""
 
 from __future__ import annotations
 
@@ -22,13 +20,21 @@ Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, accelerati
 UNBOUNDED = 1e6  # N: a bound that no robot of the catalogue reaches
 _MAX_ACCELERATION = 1.0  # m/s² and rad/s²: a jump of the desired velocity makes robots fall
 _ZERO = frozen(np.zeros(3))
-_RANK_TOLERANCE = 1e-3  # part of the feet's extent: what is thinner shows no slope
+_RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
 
 
 @dataclass
 class SwingState:
-    """A foot in the air: its path now, (3,) m where it was planned to land at first, and its yaw,
-    rad, at both ends.
+    """State of a foot in the air.
+
+    Parameters
+    ----------
+    path : Swing
+        Its present path.
+    planned_end : ndarray, shape (3,)
+        Where it was first planned to land, in the world frame [m].
+    yaws : (float, float)
+        Its yaw at lift-off and at touchdown [rad].
     """
 
     path: Swing
@@ -38,28 +44,51 @@ class SwingState:
 
 @dataclass
 class Reference:
-    """All that a `Walk` remembers from one tick to the next, and what it makes of that.
+    """State of a `Walk` between control steps, and the targets that follow from it.
 
-    nominal_state: the robot's posture.
-    nominal_feet: (3,) m, where each foot's frame is in it, from the middle of the feet on the
-        ground.
-    requested_gait, gait: the gait that was asked for, and what is walked by: that without the
-        lift-offs that were over; no gait is asked for any more while feet come down for another.
-    start_time, time: s, of the first and of the last tick.
-    position, yaw: (2,) m, world, and rad, where the body is to be then.
-    velocity: (3,) of the path: forwards, to the left, m/s, and yaw, rad/s, on their way to the
-        desired ones.
-    feet: (3,) m, world, of each foot's frame, where it stands or stood.
-    touchdown_times: s, when each foot landed last.
-    swinging: the feet in the air.
-    footholds: (3,) m, world, where those that are in the air, or lift next, are to land.
-    stance, stance_interval: the feet that stand, and from when until when, s; inf where no end was
-        in sight.
-    replan_time: s, when to plan anew though the stance stays.
-    step_offset: (2,) m, by which the last step was moved.
-    ground_height: (2,) m, world, to the height of the ground there, (1,) m; 0 is that below the
-        posture.
-    plan: of the centre of mass.
+    Parameters
+    ----------
+    nominal_state : State
+        State whose posture the robot keeps.
+    nominal_feet : dict of str to ndarray, shape (3,)
+        Position of each foot's frame in that posture, relative to the middle of the feet on the
+        ground [m].
+    requested_gait : Gait or None
+        The requested gait; None while feet come down before the gait changes.
+    gait : Gait
+        The gait in use: the requested one without the lift-offs that were over.
+    start_time : float
+        Time of the first control step [s].
+    time : float
+        Time of the last control step [s].
+    position : ndarray, shape (2,)
+        Desired position of the body at that time, in the world frame [m].
+    yaw : float
+        Desired yaw of the body at that time [rad].
+    feet : dict of str to ndarray, shape (3,)
+        Position of each foot's frame, where it stands or last stood, in the world frame [m].
+    velocity : ndarray, shape (3,)
+        Velocity of the path, forwards and to the left [m/s], and yaw rate [rad/s]; it approaches
+        the desired velocity.
+    touchdown_times : dict of str to float
+        Time of each foot's last touchdown [s].
+    swinging : dict of str to SwingState
+        The feet in the air.
+    footholds : dict of str to ndarray, shape (3,)
+        Planned foothold of each foot that is in the air or lifts off next, in the world frame [m].
+    stance : tuple of str
+        Feet that stand.
+    stance_interval : (float, float)
+        Beginning and end of the stance [s]; inf if no end is known.
+    replan_time : float
+        Time at which to plan anew even if the stance does not change [s].
+    step_offset : ndarray, shape (2,)
+        Shift of the last step, in the world frame [m].
+    ground_height : Affine
+        Map from a horizontal position, shape (2,), in the world frame to the height of the ground,
+        shape (1,), relative to the ground below the standing posture [m].
+    plan : LIPM or None
+        Plan of the centre of mass.
     """
 
     nominal_state: State
@@ -83,8 +112,25 @@ class Reference:
     plan: LIPM | None = None
 
     def predict(self, desired: Array, begin: float, t: float) -> tuple[Array, float, Array]:
-        """Place, (2,) m, yaw and velocity, (3,), of the path at t in s, with a desired velocity
-        (3,) from `begin` on.
+        """Predict the path for a desired velocity.
+
+        Parameters
+        ----------
+        desired : ndarray, shape (3,)
+            Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
+        begin : float
+            Time from which on it is desired [s].
+        t : float
+            Time of the prediction [s].
+
+        Returns
+        -------
+        position : ndarray, shape (2,)
+            Position in the world frame [m].
+        yaw : float
+            Yaw [rad].
+        velocity : ndarray, shape (3,)
+            Velocity, forwards and to the left [m/s], and yaw rate [rad/s].
         """
         time = max(0.0, t - max(self.time, begin))
         change = desired - self.velocity
@@ -98,8 +144,10 @@ class Reference:
         )
 
     def fit_ground(self) -> None:
-        """Lay the ground as a plane through the feet; a slope that they do not show, as across a
-        line, counts as none.
+        """Fit a plane to the feet as the ground.
+
+        If the feet show no slope in some direction, for example because they are on a line, the
+        plane is level in that direction.
         """
         heights = np.array(
             [self.feet[foot][2] - nominal[2] for foot, nominal in self.nominal_feet.items()]
@@ -112,19 +160,15 @@ class Reference:
         self.ground_height = Affine(slope[None], [heights.mean() - slope @ centroid])
 
     def on_ground(self, foot: str, xy: Array) -> Array:
-        """Where a foot's frame is when it stands at (2,) m; (3,) m, world."""
+        """Return the position of a foot's frame, (3,), if it stands at a place (2,) [m]."""
         return np.array([*xy, self.nominal_feet[foot][2] + self._ground_height(xy)])
 
     def _ground_height(self, xy: Array) -> float:
-        """Of the ground at (2,) m: `ground_height`, without its checks, as it is asked several
-        times a tick.
-        """
+        """Return the ground's height at (2,) [m]: `ground_height` without its checks, for speed."""
         return float(self.ground_height.A[0] @ xy + self.ground_height.b[0])
 
     def com_target(self, t: float) -> Motion:
-        """Target of the centre of mass at t in s: the plan, at the posture's height above the
-        ground.
-        """
+        """Return the target of the centre of mass at t [s]: the plan, at the posture's height."""
         assert self.plan is not None
         x, v, a = self.plan(t)
         slope = self.ground_height.A[0]
@@ -136,19 +180,19 @@ class Reference:
         )
 
     def base_target(self, t: float) -> Motion:
-        """Target of the base's rotation at t in s: as in the posture, turned by the path's yaw."""
+        """Return the target of the base's rotation at t [s]: the posture's, at the path's yaw."""
         yaw = self.yaw + self.velocity[2] * (t - self.time)
         rotation = frozen(rotation_z(yaw) @ self.nominal_state.frame_pose("base").rotation)
         return rotation, frozen(np.array([0.0, 0.0, self.velocity[2]])), _ZERO
 
     def foot_target(self, foot: str, t: float) -> Motion:
-        """Target of a foot in the air at t in s; where it stands otherwise."""
+        """Return the target position of a foot at t [s], in the air or where it stands."""
         if foot in self.swinging:
             return self.swinging[foot].path(t)
         return self.feet[foot], np.zeros(3), np.zeros(3)
 
     def foot_rotation_target(self, foot: str, t: float) -> Motion:
-        """Target rotation of a flat foot in the air at t [s]: flat, and turning with the path."""
+        """Return the target rotation of a flat foot at t [s]: flat, and turning with the path."""
         flat, each = self.nominal_state.frame_pose(foot).rotation, self.swinging.get(foot)
         if each is None:
             return rotation_z(self.yaw) @ flat, np.zeros(3), np.zeros(3)
@@ -159,10 +203,10 @@ class Reference:
         return rotation_z(first + part[2]) @ flat, rate, acceleration
 
     def normal_force_bound(self, foot: str, t: float, ramp: float, full_load: float) -> float:
-        """Bound of a normal force, N, at t in s: it falls from `full_load` to 0 in `ramp` s before
-        the foot lifts, and rises after.
+        """Return the upper bound of a normal force while all feet stand [N].
 
-        All feet stand; the time that they do is long enough for both, or each takes half of it.
+        It falls from `full_load` to 0 within `ramp` [s] before the foot lifts off, and rises
+        likewise after touchdown. If the stance is too short for both, each takes half of it.
         """
         begin, end = self.stance_interval
         ramp = min(ramp, (end - begin) / 2.0)
@@ -179,11 +223,11 @@ class Reference:
 
 
 def rotated_by_yaw(vector: Array, yaw: float) -> Array:
-    """A horizontal vector, (2,), turned to the left by yaw, rad."""
+    """Return a horizontal vector, (2,), rotated to the left by a yaw angle [rad]."""
     c, s = cos(yaw), sin(yaw)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
 def yaw_of(rotation: Array) -> float:
-    """How far a rotation, (3, 3), turns to the left, rad."""
+    """Return the yaw angle, to the left, of a rotation matrix [rad]."""
     return float(np.arctan2(rotation[1, 0], rotation[0, 0]))

@@ -1,4 +1,4 @@
-"""`Stand`: stands, and steps when it must."""
+"""`Stand`: a controller that stands, and steps if it must."""
 
 from __future__ import annotations
 
@@ -18,23 +18,42 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 
-_STOP_SPEED = 0.1  # m/s of the centre of mass, below which it stops stepping
-# m by which other feet must be nearer to the capture point for the gait to begin with those that
-# then lift
+_STOP_SPEED = 0.1  # m/s of the centre of mass, below which the robot stops stepping
+# m by which another start of the gait must increase the capture point's margin to be preferred
 _MIN_MARGIN_GAIN = 0.05
 
 
 class Stand(Walk):
-    """Stands where it is; with a `stepping_gait` it walks in place once the capture point comes
-    near the edge of the feet, until slow.
+    """A controller that stands, and walks in place after a disturbance.
 
-    It begins where in its period the feet that stay can stop the capture point: those that it runs
-    away from lift first.
+    With a `stepping_gait`, it starts to step when the capture point comes near the edge of the
+    support polygon, and stops once the robot is slow. The gait begins at the point of its period at
+    which the standing feet can best stop the capture point: feet from which the capture point moves
+    away lift off first.
 
-    robot, contacts, options: as for `Walk`.
-    stepping_gait: the gait to step by, such as `Gait.trot(robot)`, whose start and stop do not
-        count; None to stand only.
-    margin: m, from the capture point to the edge of the support region, below which it steps.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        All its contacts, as for `Walk`.
+    stepping_gait : Gait, optional
+        The gait for stepping, such as `Gait.trot(robot)`; its start and stop are ignored. Without
+        it, the robot never steps.
+    margin : float, optional
+        Distance of the capture point from the edge of the support polygon below which the robot
+        steps [m].
+    **options : object
+        Options of `Walk`, except `velocity`, `yaw_rate` and `gait`.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, or if an option is unknown.
+
+    Notes
+    -----
+    The capture point is from [Pratt2006]_.
     """
 
     def __init__(
@@ -60,8 +79,8 @@ class Stand(Walk):
         )
         if {"velocity", "yaw_rate", "gait"} & set(options):
             raise InputError(
-                "a Stand goes nowhere, and has no velocity, yaw_rate or gait: give it a "
-                "stepping_gait, or make a Walk."
+                "Stand has no options velocity, yaw_rate and gait, because it stays in place. Use "
+                "stepping_gait, or use Walk."
             )
         super().__init__(robot, contacts, self._standing_gait, **options)
         if stepping_gait is not None and len(stepping_gait.feet) == len(contacts):
@@ -69,12 +88,25 @@ class Stand(Walk):
 
     @property
     def stepping(self) -> bool:
-        """Whether it steps now."""
+        """Whether the robot is stepping now."""
         return self.gait is not self._standing_gait
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time
-        t in s.
+        """Compute the command of one control step.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+        t : float, optional
+            The time [s].
+
+        Returns
+        -------
+        Command
+            Joint torques, with the planned accelerations and contact forces.
         """
         t = as_number("t", t, "s")
         if self.stepping_gait is not None and self._continues(t):
@@ -82,11 +114,12 @@ class Stand(Walk):
         return super().__call__(q, v, t)
 
     def _initialize(self, state: State, t: float) -> None:
+        """Start by standing in the measured state."""
         self.gait = self._standing_gait
         super()._initialize(state, t)
 
     def _update_stepping(self, state: State, t: float, stepping_gait: Gait) -> None:
-        """Begin to step, or end it."""
+        """Begin to step, or stop stepping."""
         ref = self._ref
         if not self.stepping:
             dcm = capture_point(state.com, state.com_velocity, self.omega)
@@ -100,9 +133,7 @@ class Stand(Walk):
             self.gait = self._standing_gait
 
     def _best_start(self, stepping_gait: Gait, state: State, dcm: Array) -> Gait:
-        """The gait, begun where in its period the feet that stay are clearly nearer to the capture
-        point, (2,) m.
-        """
+        """Return the gait, begun where its stance feet are clearly nearer to the capture point."""
         from_zero = replace(stepping_gait, start=0.0, stop=None)
         first, *others = (
             from_zero.starting_at(offset * stepping_gait.period)

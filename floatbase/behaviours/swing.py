@@ -2,67 +2,108 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_number, as_positive, read_only
+from floatbase._geometry import minimum_jerk
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_number,
+    as_positive,
+    checked,
+    read_only,
+)
 from floatbase.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
 class Swing(Value):
-    """A foot's path from start to end, at rest at both: minimum jerk, and a bump of `height`
-    upwards.
+    """Path of a foot through the air: minimum jerk from start to end, plus a bump upwards.
 
-    start, end: (3,), m, world.
-    lift_off, touchdown: s, when it begins and ends.
-    height: m, of the bump, half-way.
+    The foot is at rest at both ends. `with_end` can change its target in every control step.
 
-    It may be aimed elsewhere at every tick, by `with_end`. Raises `InputError` for numbers that do
-    not fit.
+    Parameters
+    ----------
+    start : array_like, shape (3,)
+        Position at lift-off, in the world frame [m].
+    end : array_like, shape (3,)
+        Position at touchdown, in the world frame [m].
+    lift_off : float
+        Time of lift-off [s].
+    touchdown : float
+        Time of touchdown, later than `lift_off` [s].
+    height : float, optional
+        Height of the bump, half-way [m].
+
+    Examples
+    --------
+    >>> from floatbase.behaviours import Swing
+    >>> swing = Swing([0.0, 0.0, 0.0], [0.2, 0.0, 0.0], lift_off=0.0, touchdown=1.0)
+    >>> position, velocity, acceleration = swing(0.5)
+    >>> position
+    array([0.1 , 0.  , 0.05])
     """
 
-    start: Array
-    end: Array
-    lift_off: float
-    touchdown: float
-    height: float = 0.05
+    start: Array = field(metadata=checked(as_array, (3,), "m"))
+    end: Array = field(metadata=checked(as_array, (3,), "m"))
+    lift_off: float = field(metadata=checked(as_number, "s"))
+    touchdown: float = field(metadata=checked(as_number, "s"))
+    height: float = field(default=0.05, metadata=checked(as_positive, "m", allow_zero=True))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", as_array("start", self.start, (3,), "m"))
-        object.__setattr__(self, "end", as_array("end", self.end, (3,), "m"))
-        for name in ("lift_off", "touchdown"):
-            object.__setattr__(self, name, as_number(name, getattr(self, name), "s"))
-        object.__setattr__(self, "height", as_positive("height", self.height, "m", allow_zero=True))
+        super().__post_init__()
         if not self.touchdown > self.lift_off:
             raise InputError(
-                f"the foot lifts at {self.lift_off:g} s and lands at {self.touchdown:g} s; it must "
-                f"land later."
+                f"touchdown is {self.touchdown:g} s; it must be later than lift_off, "
+                f"{self.lift_off:g} s."
             )
 
     def with_end(self, end: npt.ArrayLike) -> Swing:
-        """The same path to another end, (3,), m, world; cheap enough for the loop."""
+        """Return the same path to another end; it is fast enough for a control loop.
+
+        Parameters
+        ----------
+        end : array_like, shape (3,)
+            Position at touchdown, in the world frame [m].
+
+        Returns
+        -------
+        Swing
+            The new path.
+        """
         other = object.__new__(Swing)
         vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
         return other
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
-        """Position, m, velocity, m/s, and acceleration, m/s², shape (3,) each, at time t in s; at
-        rest before and after.
+        """Compute the motion of the foot at a given time; it is at rest before and after the swing.
 
-        With u from 0 to 1: start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵), and 64 u³ (1 - u)³ height
-        upwards.
+        With the phase u from 0 to 1, the position is start + (end - start) (10 u³ - 15 u⁴ + 6 u⁵),
+        plus 64 u³ (1 - u)³ height upwards.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        position : ndarray, shape (3,)
+            Position in the world frame [m].
+        velocity : ndarray, shape (3,)
+            Velocity in the world frame [m/s].
+        acceleration : ndarray, shape (3,)
+            Acceleration in the world frame [m/s²].
         """
         T = self.touchdown - self.lift_off
         u = min(max((as_number("t", t, "s") - self.lift_off) / T, 0.0), 1.0)
         w = u * (1.0 - u)
-        path_derivatives = (
-            u**3 * (10.0 - 15.0 * u + 6.0 * u * u),
-            30.0 * w * w / T,
-            60.0 * w * (1.0 - 2.0 * u) / T**2,
-        )
+        fraction, rate, acceleration = minimum_jerk(u)
+        path_derivatives = fraction, rate / T, acceleration / T**2
         height_derivatives = (
             64.0 * w**3,
             192.0 * w * w * (1.0 - 2.0 * u) / T,

@@ -1,5 +1,7 @@
-"""`Walk`: a controller that steps. It plans footholds and a pendulum at each change of stance, and
-serves them by (26)(27).
+"""`Walk`: a walking controller.
+
+It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan by
+the whole-body controller, eqs. (26), (27).
 """
 
 from __future__ import annotations
@@ -13,7 +15,15 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_callable, as_instance, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_callable,
+    as_instance,
+    as_number,
+    as_positive,
+    refuse_new_attributes,
+)
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.lipm import LIPM
@@ -28,47 +38,82 @@ from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTas
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
-_RESTART_GAP = 0.2  # s without a tick, after which another controller may have moved the robot
+_RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-_RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force a ramp comes down from
-_MAX_SPEED = 10.0  # m/s and rad/s: more is a slip of units
+_RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at which a ramp begins
+_MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
 class Walk:
-    """Walks by a gait at a velocity: a controller like any other, for `fb.rollout`,
-    `LiveSimulation`, `fb.sweep` and `fb.push_recovery`.
+    """A controller that walks with a given gait and velocity.
 
-    At each change of stance it takes the feet where they are, plans the next footholds
-    (`neutral_point`) and a linear inverted pendulum above them (`LIPM`), from where the centre of
-    mass is. At each tick it moves the ends of the swings by `step_adjustment`, as far as the legs
-    reach. One `WholeBodyController` for each stance does the rest; where no forces hold the feet,
-    they give way. When the clock goes back, or 0.2 s ahead at once, it begins anew from the
-    measured state.
+    It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
+    `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
+    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
+    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
+    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
+    forces can hold the feet, their contacts become soft.
 
-    robot: the robot; its feet are point feet or flat feet.
-    contacts: all its contacts; `Contacts.feet(robot)` fits.
-    gait: when each foot is in the air; may be set while it walks: no foot lifts by the former one
-        any more, and the new one takes over when all stand. Lift-offs that were over before are
-        left out. At least one foot must stand at any time.
-    velocity: (2,) m/s, forwards and to the left, of the body; may be set while it walks, and is
-        approached by 1 m/s².
-    yaw_rate: rad/s, to the left; as velocity.
-    clearance: m, how high feet are lifted.
-    reach: m, how far a foot may land from where it would stand below the body; 0.2 by default, 0.3
-        for flat feet.
-    ramp: s, in which a foot is unloaded before it lifts, and loaded after it landed, as far as all
-        feet stand then; a max_normal_force among the options takes its place.
-    foothold: (foot, touchdown in s, walk) -> (2,) m, world: where a foot should land, before
-        adjustments; `neutral_point` below the body by default.
-    gains: of its tasks; `Gains.for_contacts(contacts)` by default.
-    options: more arguments of `fb.WholeBodyController`, such as facets.
+    If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
+    the measured state. A controller that wraps it needs an attribute `contacts` with the present
+    value of `Walk.contacts`.
 
-    At velocity (0, 0) it marches on the spot; `walk.gait = dataclasses.replace(walk.gait,
-    stop=walk.time)` makes it stand. `stance`, `footholds`, `swings`, `plan` and
-    `history` tell what it is doing. A controller of your own around it needs its `contacts`, as
-    they are at each tick. Raises `InputError` for arguments that do not fit.
+    Parameters
+    ----------
+    robot : Robot
+        The robot; its feet are point feet or flat feet.
+    contacts : Contacts
+        All its contacts, such as `Contacts.feet(robot)`.
+    gait : Gait
+        The contact schedule; at least one foot must stand at any time. It can be set while walking:
+        feet no longer lift off by the former gait, and the new gait begins once all feet stand,
+        without its earlier lift-offs.
+    velocity : array_like, shape (2,), optional
+        Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
+        and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it stand, set
+        `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
+    yaw_rate : float, optional
+        Desired yaw rate, to the left [rad/s]. It can be set while walking, and is approached at 1
+        rad/s².
+    clearance : float, optional
+        Height of the swings [m].
+    reach : float, optional
+        Largest distance of a foothold from the nominal one below the body [m]; by default 0.2, or
+        0.3 with flat feet.
+    ramp : float, optional
+        Time in which a foot is unloaded before lift-off, and loaded after touchdown, if all feet
+        stand meanwhile [s]. The option `max_normal_force` replaces the ramps.
+    foothold : callable, optional
+        Called as foothold(foot, touchdown, walk) with the time of touchdown [s]. It returns the
+        foothold before adjustments, shape (2,), in the world frame [m]. The default is
+        `raibert_foothold`.
+    gains : Gains, optional
+        Gains of the tasks; by default `Gains.for_contacts(contacts)`.
+    **options : object
+        Further options of `fb.WholeBodyController`, such as `facets`.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, or if an option is unknown.
+
+    Notes
+    -----
+    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion,
+    see [Englsberger2015]_.
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> from floatbase.behaviours import Gait, Walk
+    >>> robot = fb.load("go2")
+    >>> walk = Walk(robot, fb.Contacts.feet(robot), Gait.trot(robot), velocity=(0.3, 0.0))
+    >>> walk
+    Walk(go2, 4 feet, 0.3 and 0 m/s)
     """
+
+    __setattr__ = refuse_new_attributes
 
     def __init__(
         self,
@@ -105,7 +150,7 @@ class Walk:
         check_options(type(self).__name__, options)
         self._limits = WholeBodyController(
             robot, contacts, (), **options
-        ).limits  # what does not fit is told now
+        ).limits  # reports wrong options now
         self._options, self._standing_state = options, robot.standing()
         self._single_contacts = {contact.name: Contacts([contact]) for contact in contacts}
         self._planner = Planner(contacts, self._standing_state, self._clearance, self._reach)
@@ -118,22 +163,22 @@ class Walk:
 
     @property
     def clearance(self) -> float:
-        """m, how high feet are lifted."""
+        """Height of the swings [m]."""
         return self._clearance
 
     @property
     def reach(self) -> float:
-        """m, how far a foot may land from where it would stand below the body."""
+        """Largest distance of a foothold from the nominal one below the body [m]."""
         return self._reach
 
     @property
     def ramp(self) -> float:
-        """s, in which a foot is unloaded or loaded."""
+        """Time in which a foot is unloaded or loaded [s]."""
         return self._ramp
 
     @property
     def foothold(self) -> Foothold:
-        """Where a foot should land."""
+        """Function that returns the foothold of a foot."""
         return self._foothold
 
     @property
@@ -143,17 +188,17 @@ class Walk:
 
     @property
     def omega(self) -> float:
-        """1/s, of the pendulum."""
+        """Natural frequency of the pendulum [1/s]."""
         return self._planner.omega
 
     @property
     def history(self) -> deque[StepPlan]:
-        """Plans of the last changes of stance."""
+        """Plans of the last 500 changes of stance."""
         return self._history
 
     @property
     def gait(self) -> Gait:
-        """When each foot is in the air, as it was set last."""
+        """The contact schedule that was set last."""
         return self._gait
 
     @gait.setter
@@ -165,17 +210,18 @@ class Walk:
 
     @property
     def velocity(self) -> Array:
-        """(2,) m/s, forwards and to the left, that is desired."""
+        """Desired velocity, forwards and to the left, shape (2,) [m/s]."""
         return self._velocity
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = as_array("velocity", velocity, (2,), "m/s")
-        as_number("speed", float(np.linalg.norm(self._velocity)), "m/s", maximum=_MAX_SPEED)
+        velocity = as_array("velocity", velocity, (2,), "m/s")
+        as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+        self._velocity = velocity
 
     @property
     def yaw_rate(self) -> float:
-        """rad/s, to the left, that is desired."""
+        """Desired yaw rate, to the left [rad/s]."""
         return self._yaw_rate
 
     @yaw_rate.setter
@@ -184,56 +230,89 @@ class Walk:
 
     @property
     def time(self) -> float | None:
-        """s, of the last tick; None before the first."""
+        """Time of the last control step [s]; None before the first."""
         return self._ref.time if self._reference else None
 
     @property
     def stance(self) -> tuple[str, ...]:
-        """The feet that stand now."""
+        """Names of the feet that stand now."""
         return self._ref.stance if self._reference else self._all_contacts.names
 
     @property
     def contacts(self) -> Contacts:
-        """The contacts of the present stance."""
+        """Contacts of the present stance."""
         controller = self._controllers.get(self.stance)
         return self._all_contacts if controller is None else controller.contacts
 
     @property
     def footholds(self) -> dict[str, Array]:
-        """Where each foot that is in the air, or lifts next, is to land: (3,) m, world, of its
-        frame.
-        """
+        """Foothold of each foot in the air or next to lift off, shape (3,), world frame [m]."""
         ends = {foot: path.end for foot, path in self.swings.items()}
         return self._ref.footholds | ends if self._reference else {}
 
     @property
     def swings(self) -> dict[str, Swing]:
-        """The paths of the feet that are in the air."""
+        """Paths of the feet in the air."""
         if self._reference is None:
             return {}
         return {foot: each.path for foot, each in self._reference.swinging.items()}
 
     @property
     def plan(self) -> LIPM | None:
-        """The plan of the centre of mass, horizontally; None before the first tick."""
+        """Plan of the centre of mass's horizontal motion; None before the first control step."""
         return self._ref.plan if self._reference else None
 
     def nominal_foothold(self, foot: str, t: float) -> Array:
-        """Where a foot would stand below the body at time t in s, (2,) m, world, if the desired
-        velocity goes on.
+        """Return where a foot would stand below the body, if the desired velocity does not change.
+
+        Parameters
+        ----------
+        foot : str
+            Name of the foot.
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            Position of the foot's frame in the world frame [m].
         """
-        foot = self._all_contacts[foot].name  # an `UnknownNameError` tells what there is
+        foot = self._all_contacts[foot].name  # an `UnknownNameError` lists the names
         position, yaw, _ = self._path_at(as_number("t", t, "s"))
         return position + rotated_by_yaw(self._planner.nominal_feet[foot][:2], yaw)
 
     def velocity_at(self, t: float) -> Array:
-        """The body's velocity at time t in s, (2,) m/s, world, if the desired one goes on."""
+        """Predict the body's velocity, if the desired velocity does not change.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            Velocity in the world frame [m/s].
+        """
         _, yaw, velocity = self._path_at(as_number("t", t, "s"))
         return rotated_by_yaw(velocity[:2], yaw)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time
-        t in s.
+        """Compute the command of one control step.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+        t : float, optional
+            The time [s].
+
+        Returns
+        -------
+        Command
+            Joint torques, with the planned accelerations and contact forces.
         """
         state, t = State(self.robot, q, as_array("v", v, (self.robot.nv,))), as_number("t", t, "s")
         if not self._continues(t):
@@ -250,12 +329,16 @@ class Walk:
 
     @property
     def _ref(self) -> Reference:
+        """Reference, which exists from the first control step on."""
         if self._reference is None:
-            raise InputError("A Walk has no path before its first walk(q, v, t), as in a rollout.")
+            raise InputError(
+                "A Walk has no path before its first control step. Call walk(q, v, t) first, as a "
+                "rollout does."
+            )
         return self._reference
 
     def _continues(self, t: float) -> bool:
-        """Whether time t, s, follows the last tick; else it begins anew."""
+        """Return whether a time [s] follows the last control step, so that the walk continues."""
         ref = self._reference
         return (
             ref is not None
@@ -264,13 +347,15 @@ class Walk:
         )
 
     def _clear(self) -> None:
+        """Discard the controllers, the reference and the history."""
         self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         self._reference = None
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _path_at(self, t: float) -> tuple[Array, float, Array]:
-        """Place, yaw and velocity of the path at t; it stands before the first foot lifts, and once
-        none does any more.
+        """Return position, yaw and velocity of the path at t [s].
+
+        The path does not move before the first lift-off, and after the last touchdown.
         """
         ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
         walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)
@@ -279,8 +364,9 @@ class Walk:
         )
 
     def _update_gait(self, t: float) -> None:
-        """Where another gait is asked for, walk by that once all feet stand; those in the air come
-        down as they were to.
+        """Change to a newly requested gait once all feet stand.
+
+        Feet that are in the air come down as planned.
         """
         ref = self._ref
         if ref.requested_gait is not None and vars(self._gait) == vars(ref.requested_gait):
@@ -296,23 +382,26 @@ class Walk:
         self._history.clear()
 
     def _foothold_at(self, foot: str, touchdown: float) -> npt.ArrayLike:
+        """Return the foothold of a foot, (2,) [m], that lands at a time [s]."""
         return self._foothold(foot, touchdown, self)
 
     def _yaw_at(self, t: float) -> float:
+        """Return the path's yaw [rad] at t [s]."""
         return self._path_at(t)[1]
 
     def _stance_at(self, t: float) -> tuple[str, ...]:
+        """Return the contacts that stand at t [s]."""
         gait = self._ref.gait
         swinging = {foot for foot in gait.feet if gait.swing_at(foot, t)}
         return tuple(name for name in self._all_contacts.names if name not in swinging)
 
     def _stance_controller(self) -> WholeBodyController:
-        """The controller of the present stance, made when it is first needed."""
+        """Return the controller of the present stance, which is made when first needed."""
         stance = self._ref.stance
         if stance not in self._controllers:
             arguments: dict[str, Any] = {
                 "max_normal_force": self._normal_force_bounds(stance),
-                "on_infeasible": "soften",  # torques and friction may not hold the feet
+                "on_infeasible": "soften",  # torques and friction may be unable to hold the feet
                 **self._options,
             }
             self._controllers[stance] = WholeBodyController(
@@ -321,7 +410,7 @@ class Walk:
         return self._controllers[stance]
 
     def _tasks(self, stance: Sequence[str]) -> list[Task]:
-        """The tasks of a stance; their targets follow the reference."""
+        """Return the tasks of a stance, with targets that follow the reference."""
         (com, com_weight), (base, base_weight) = self.gains.com, self.gains.base
         (swing, swing_weight), (posture, posture_weight) = self.gains.swing, self.gains.posture
         tasks: list[Task] = [
@@ -341,22 +430,23 @@ class Walk:
         return tasks
 
     def _foot_target(self, foot: str, t: float) -> Motion:
+        """Return the target position of a foot at t [s]."""
         return self._ref.foot_target(foot, t)
 
     def _foot_rotation_target(self, foot: str, t: float) -> Motion:
+        """Return the target rotation of a flat foot at t [s]."""
         return self._ref.foot_rotation_target(foot, t)
 
     def _normal_force_bounds(
         self, stance: Sequence[str]
     ) -> dict[str, Callable[[float], float]] | None:
-        """Bounds of the normal force of each point while all feet stand, for ramps; None where a
-        foot is in the air.
-        """
+        """Return ramps for the normal force of each point if all feet stand, otherwise None."""
         if self.ramp == 0.0 or len(stance) < len(self._all_contacts) or len(stance) < 2:
             return None
         return {foot: partial(self._normal_force_bound, foot) for foot in self._all_contacts.names}
 
     def _normal_force_bound(self, foot: str, t: float) -> float:
+        """Return the upper bound of the normal force of each point of a foot at t [s], in N."""
         full_load = (
             _RAMP_LOAD_FACTOR
             * self.robot.weight
@@ -367,7 +457,7 @@ class Walk:
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Copies and pickles begin anew: controllers are made again, and nothing is remembered."""
+        """Return the state of a copy or pickle, without controllers and memory: it starts anew."""
         return {
             key: value
             for key, value in vars(self).items()
@@ -387,8 +477,25 @@ class Walk:
 
 
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
-    """The foothold, (2,) m, of a foot that lands at `touchdown` s: `neutral_point` below the body
-    on its path.
+    """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
+
+    Parameters
+    ----------
+    foot : str
+        Name of the foot.
+    touchdown : float
+        Time at which the foot lands [s].
+    walk : Walk
+        The walk.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Foothold in the world frame [m].
+
+    Notes
+    -----
+    The rule is from [Raibert1986]_.
     """
     gait = walk.gait
     return neutral_point(

@@ -1,5 +1,6 @@
-"""Constrained equations of motion and the space of motions they leave (§2 and App. A of the course
-text).
+"""Constrained equations of motion and the space of motions that they allow.
+
+Section 2 and Appendix A of the course text.
 """
 
 from floatbase.dynamics.constraint_rank import (

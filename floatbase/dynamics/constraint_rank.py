@@ -1,5 +1,6 @@
-"""Which directions of motion the contacts of (7) resolve: the one place that decides the rank of A
-and J.
+"""Directions of motion that the contacts resolve.
+
+This module alone decides the rank of A and J in eq. (7).
 """
 
 from __future__ import annotations
@@ -13,27 +14,35 @@ from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
 
-# part of A's largest singular value below which a motion is not held: angles err by 1e-4 rad
+# fraction of A's largest singular value below which a direction is not constrained: joint angles
+# have errors of 1e-4 rad
 CONSTRAINT_RANK_TOLERANCE = 1e-4
-# 1/s: rows of (5) may disagree by this for each m/s that contacts move: 1 m/s² for 1 cm/s of slip
+# 1/s: allowed inconsistency of the rows of eq. (5) per m/s of contact velocity: 1 m/s² for 1 cm/s
+# of slip
 CONSTRAINT_NOISE = 100.0
-# part of J that may lie beside A's rows: rounding leaves 1e-14, contacts that do not fit leave all
+# fraction of J that may lie outside the row space of A: rounding leaves 1e-14, an inconsistent
+# contact leaves all of it
 _FIT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSpace(Value):
-    """The contacts of (7) along the directions that they resolve: r independent motions and the
-    forces that hold them.
+    """The contacts along the r independent directions of motion that they resolve.
 
-    The rank r is decided here, once, for everything that follows (`contact_space`).
+    `contact_space` decides the rank r once, for all other functions.
 
-    A, b: (r, nv), orthonormal, and (r,): this A q̈ = b stands for that of (7), in the least-squares
-        sense where the rows of its A are inconsistent.
-    force_map: (k, r), the smallest λ that gives q̈ a part along the rows of A: A M⁻¹ Jᵀ force_map =
-        1.
-    null_forces: (k, k - r), orthonormal, forces that the resolved motions do not feel; null(Jᵀ),
-        but for directions that A resolves badly.
+    Parameters
+    ----------
+    A : ndarray, shape (r, nv)
+        Orthonormal rows. A q̈ = b with this A and b replaces that of eq. (7), in the least-squares
+        sense if the rows of eq. (7) are inconsistent.
+    b : ndarray, shape (r,)
+        Right-hand side for these rows [m/s², rad/s²].
+    force_map : ndarray, shape (k, r)
+        Maps a change of A q̈ to the smallest λ that causes it: A M⁻¹ Jᵀ force_map = 1.
+    null_forces : ndarray, shape (k, k - r)
+        Orthonormal columns that span the forces without effect on the resolved motions. They span
+        null(Jᵀ), except for directions that A resolves poorly.
     """
 
     A: Array
@@ -43,32 +52,52 @@ class ContactSpace(Value):
 
     @property
     def r(self) -> int:
-        """rank J, as far as the contacts resolve it."""
+        """Rank of J, counting only the resolved directions."""
         return int(self.A.shape[0])
 
 
 def contact_space(eom: EquationsOfMotion) -> ContactSpace:
-    """The resolved part of the contacts of (7), by singular values of A (tolerance
-    `CONSTRAINT_RANK_TOLERANCE`).
+    """Compute the resolved part of the contacts from the singular values of A.
 
-    Where J loses rank (solo8 on four feet), nearby states have a singular value σ that measured
-    angles and velocities cannot tell from 0, and ζ would multiply their noise in b by 1/σ². Such a
-    direction is left out: no row holds it, no force is spent on it. Newton's law still holds
-    exactly. A q̈ - b is off by at most σ |q̈| beside the part of b that A cannot meet. Raises
-    `InputError` when forces and rows of a contact do not fit each other.
+    Directions whose singular value is at most `CONSTRAINT_RANK_TOLERANCE` times the largest are
+    left out.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    ContactSpace
+        The independent rows, the forces that enforce them, and the forces without effect.
+
+    Raises
+    ------
+    InputError
+        If the rows A and the Jacobian J of a contact are inconsistent.
+
+    Notes
+    -----
+    Near a state where J loses rank (solo8 on four feet), A has a singular value σ that cannot be
+    told from 0 with measured angles and velocities. The map ζ would multiply their noise in b by
+    1/σ². Such a direction is left out: no row constrains it, and no force acts along it. Newton's
+    law still holds exactly. A q̈ - b is off by at most σ |q̈|, in addition to the part of b that A
+    cannot meet.
     """
     U, s, A = _resolved(eom)
     U_A, w, Vt_A = np.linalg.svd(A @ np.linalg.solve(eom.M, eom.J.T))
     force_rank = int(np.sum(w > RANK_TOLERANCE * w.max(initial=0.0)))
     if force_rank < w.size:
         raise InputError(
-            f"the contacts hold {w.size} directions of motion, but forces reach {force_rank}: A "
-            f"and J do not fit."
+            f"A and J of the contacts are inconsistent: rank(A) is {w.size}, but rank(A M⁻¹ Jᵀ) is "
+            f"{force_rank}. Every constrained direction needs a force that can act along it."
         )
     outside = eom.J - eom.J @ np.linalg.pinv(eom.A, rcond=RANK_TOLERANCE) @ eom.A
     if np.max(np.abs(outside), initial=0.0) > _FIT_TOLERANCE * np.max(np.abs(eom.J), initial=0.0):
         raise InputError(
-            "forces act along motions that the contacts do not hold: A and J do not fit."
+            "A and J of the contacts are inconsistent: some forces act along directions that A "
+            "does not constrain. The rows of J must lie in the row space of A."
         )
     return ContactSpace(
         A=read_only(A),
@@ -79,15 +108,28 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
 
 
 def resolved_constraint(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """A, shape (m, nv), and b, shape (m,), m/s², of (5) without the directions that A resolves
-    badly (see `contact_space`).
+    """Compute A and b without the directions that A resolves poorly.
+
+    `contact_space` explains which directions are left out.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    A : ndarray, shape (m, nv)
+        Matrix of eq. (5), of reduced rank if a direction was left out.
+    b : ndarray, shape (m,)
+        Right-hand side [m/s², or rad/s² for angular rows].
     """
     U, s, Vt = _resolved(eom)
     return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
 
 
 def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
-    """U, s, Vt of A's singular value decomposition, without directions that A resolves badly."""
+    """Compute the singular value decomposition of A without the poorly resolved directions."""
     as_instance("eom", eom, EquationsOfMotion)
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
     r = int(np.sum(s > CONSTRAINT_RANK_TOLERANCE * s.max(initial=0.0)))

@@ -1,6 +1,4 @@
-"""Constraints beyond feet: any A q̈ = b (5), with time (note 6), and the rolling wheel as the
-nonholonomic case (6).
-"""
+"""Constraints other than feet: general linear constraints A q̈ = b and the rolling wheel."""
 
 from __future__ import annotations
 
@@ -19,68 +17,118 @@ from floatbase._validation import (
     as_integer,
     as_positive,
     as_string,
+    checked,
     cross,
     short_repr,
     unit_vector,
 )
-from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact, check_contact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact
 from floatbase.errors import InputError
 from floatbase.robots import State
 
-_MAX_ROWS = 1000  # of one constraint
-# sine of the angle between axle and normal; below it rounding alone chooses the lowest point
+_MAX_ROWS = 1000  # limit for a single constraint
+# sine of the angle between axle and normal below which rounding decides the lowest point
 _MIN_TILT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class LinearConstraint(Value):
-    """(5) Any constraint A(q, q̇, t) q̈ = b(q, q̇, t), time included (note 6 of the course text).
+    """A general constraint A(q, q̇, t) q̈ = b(q, q̇, t), which may depend on time.
 
-    Holonomic constraints φ(q, t) = 0 give A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t², nonholonomic ones g(q,
-    q̇) = 0 give (6). The constraint's force is Aᵀ λ with one multiplier λ for each row, in the
-    row's own unit; it has no point and no friction cone. Something must give that force, such as a
-    hinge or a rope: a controller counts on it. What the motors alone should bring about is a task,
-    or a pair of `floatbase.control.LinearInequality`.
+    A holonomic constraint φ(q, t) = 0 has A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t². A nonholonomic
+    constraint g(q, q̇) = 0 leads to eq. (6). The constraint force is Aᵀ λ, with one multiplier λ for
+    each row in the unit of that row. It has no point of application and no friction cone.
 
-    A contact like others: `contacts + fb.Contacts([constraint])`.
+    Something physical must supply the force, such as a hinge or a rope, because a controller relies
+    on it. If the motors alone are to bring a motion about, use a task or a pair of
+    `floatbase.control.LinearInequality` instead.
 
-    name: in messages and as the contact's name.
-    m: number of rows.
-    function: function of (state, t in s) that gives A, shape (m, nv), and b, shape (m,).
+    Combine a constraint with other contacts by `contacts + fb.Contacts([constraint])`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the contact, also used in messages.
+    m : int
+        Number of rows, from 1 to 1000.
+    function : callable
+        Called as `function(state, t)` with the time t [s]. It returns A, shape (m, nv), and b,
+        shape (m,).
+
+    Notes
+    -----
+    [FBR]_, eq. (5). Note 6 of the course text covers constraints that depend on time.
     """
 
-    name: str
-    m: int
-    function: Callable[[State, float], tuple[Array, Array]]
+    name: str = field(metadata=checked(as_string))
+    m: int = field(metadata=checked(as_integer, 1, _MAX_ROWS, "the number of rows"))
+    function: Callable[[State, float], tuple[Array, Array]] = field(
+        metadata=checked(as_callable, "function(state, t)")
+    )
     jacobian_is_constraint: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        as_string("name of a constraint", self.name)
-        object.__setattr__(
-            self, "m", as_integer(f"m of {self.name}, its number of rows,", self.m, 1, _MAX_ROWS)
-        )
-        as_callable(f"function of {self.name}", self.function, "function(state, t)")
+    def _label(self) -> str:
+        """Return the name of this constraint in messages about its fields."""
+        return f"constraint {short_repr(self.name)}"
 
     @property
     def k(self) -> int:
-        """One multiplier for each row."""
+        """Number of multipliers, one for each row."""
         return self.m
 
     @property
     def row_names(self) -> tuple[str, ...]:
-        """row 0, row 1, …"""
+        """Names of the rows: "row 0", "row 1", …."""
         return tuple(f"row {i}" for i in range(self.m))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """A itself, shape (m, nv): the constraint's force is Aᵀ λ."""
+        """Compute the Jacobian of the constraint force Aᵀ λ, which is A itself.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (m, nv)
+            The matrix A.
+        """
         return self.constraint(state, t)[0]
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) A, shape (m, nv), and b, shape (m,), checked."""
+        """Evaluate A and b and check their shapes.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        A : ndarray, shape (m, nv)
+            Matrix of the constraint rows.
+        b : ndarray, shape (m,)
+            Right-hand side, in the units of the rows.
+
+        Raises
+        ------
+        InputError
+            If the function does not return A and b of these shapes.
+
+        Notes
+        -----
+        [FBR]_, eq. (5).
+        """
         result = self.function(state, t)
         if not isinstance(result, tuple | list) or len(result) != 2:
             raise InputError(
-                f"function of {self.name} must give A and b of A q̈ = b, not {short_repr(result)}."
+                f"function of {self.name} must return the two arrays A and b of A q̈ = b, not "
+                f"{short_repr(result)}."
             )
         A, b = result
         return as_array(f"A of {self.name}", A, (self.m, state.robot.nv)), as_array(
@@ -90,62 +138,90 @@ class LinearConstraint(Value):
 
 @dataclass(frozen=True, eq=False)
 class RollingWheel(SinglePointContact):
-    """(6) A wheel or disc that rolls on a plane without slipping: the nonholonomic case.
+    """A wheel or disc that rolls on a plane without slipping, a nonholonomic constraint.
 
-    g(q, q̇) = v_c + ω × (-r u) = 0: the point of the wheel that touches the ground is at rest,
-    where c is the wheel's centre and u the unit vector in the wheel's plane that points up from the
-    contact. Along the normal this is the derivative of a position constraint, the height of the
-    centre. In the ground it is not: where the wheel can go is not limited, only how. Differentiated
-    once, A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
+    The point of the wheel that touches the ground is at rest: g(q, q̇) = v_c + ω × (-r u) = 0. Here
+    v_c is the velocity of the wheel's centre, and u is the unit vector in the wheel's plane that
+    points up from the contact. Along the normal, this is the derivative of a position constraint on
+    the height of the centre. Along the ground it is not: the wheel can reach every place, but it
+    cannot move sideways. Differentiating once gives A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
 
-    frame: name of the wheel's frame; its origin is the centre.
-    axis: the axle, shape (3,), in the frame; it is scaled to unit length.
-    radius: m.
-    normal: shape (3,), world, out of the ground; it is scaled to unit length.
-    mu: coefficient of friction.
+    Parameters
+    ----------
+    frame : str
+        Name of the wheel's frame. Its origin is the centre of the wheel.
+    axis : array_like, shape (3,)
+        Direction of the axle in the wheel's frame, dimensionless; it is scaled to unit length.
+    radius : float
+        Radius of the wheel [m].
+    normal : array_like, shape (3,), optional
+        Normal of the ground in the world frame, pointing out of the ground; it is scaled to unit
+        length.
+    mu : float, optional
+        Coefficient of friction, dimensionless.
 
-    `positions` and `constraint` raise `InputError` for a wheel that lies flat: it has no lowest
-    point.
+    Raises
+    ------
+    InputError
+        By `positions`, `jacobian` and `constraint`, if the wheel lies flat on its side: then it has
+        no single lowest point.
+
+    Notes
+    -----
+    [FBR]_, eq. (6).
     """
 
-    axis: Array
-    radius: float
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
+    axis: Array = field(metadata=checked(unit_vector))
+    radius: float = field(metadata=checked(as_positive, "m"))
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
     jacobian_is_constraint: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        check_contact(self)
-        object.__setattr__(self, "axis", unit_vector(f"axis of {self.frame}", self.axis))
-        object.__setattr__(self, "radius", as_positive(f"radius of {self.frame}", self.radius, "m"))
-
     def slip(self, state: State) -> Array:
-        """g(q, q̇), shape (3,), m/s, world: the velocity of the touching point, zero when the wheel
-        rolls.
+        """Compute the velocity g(q, q̇) of the touching point, zero when the wheel rolls.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Slip velocity in the world frame [m/s].
         """
         return self.jacobian(state) @ state.v
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """-r u, where u is the normal laid into the wheel's plane, which turns with the axle."""
+        """Return -r u and its derivative; u is the normal projected into the wheel's plane."""
         n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
         axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
         if length < _MIN_TILT:
             raise InputError(
-                f"wheel {self.frame} lies flat on its side; it has no single lowest point to roll "
-                f"on."
+                f"The wheel {self.frame} lies flat on its side, so it has no single lowest point "
+                f"to roll on. Tilt the wheel, or use another contact for it."
             )
         u, w_rate = w / length, -(n @ axle_rate) * axle - (n @ axle) * axle_rate
         return -self.radius * u, -self.radius / length * (w_rate - u * (u @ w_rate))
 
 
 def fixed_frame(frame: str) -> LinearConstraint:
-    """A frame welded to the world: six rows, (5) with A = J and b = -J̇ q̇; λ is the wrench of the
-    bolts, N and N·m, world.
+    """Fix a frame to the world with six rows, A = J and b = -J̇ q̇ of eq. (5).
 
-    With a floating base bolted by it, λ is what the course text's Figure 1 (left) calls the
-    reaction of the ground.
+    The multipliers λ are the wrench that holds the frame. For the base of a floating-base robot,
+    this wrench is the ground reaction in Figure 1 (left) of the course text.
+
+    Parameters
+    ----------
+    frame : str
+        Name of the frame.
+
+    Returns
+    -------
+    LinearConstraint
+        The constraint "bolts of …", whose λ is force [N] and moment [N·m] in world axes.
     """
     return LinearConstraint(
         f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame)
@@ -153,8 +229,24 @@ def fixed_frame(frame: str) -> LinearConstraint:
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
-    """A frame's origin driven with a given acceleration (3,), m/s², world, as a function of t: A q̈
-    = b(q, q̇, t) (note 6).
+    """Prescribe the acceleration of a frame's origin as a function of time.
+
+    Parameters
+    ----------
+    frame : str
+        Name of the frame.
+    acceleration : callable
+        Called as `acceleration(t)` with the time t [s]. It returns the acceleration in the world
+        frame, shape (3,) [m/s²].
+
+    Returns
+    -------
+    LinearConstraint
+        The constraint "drive of …" with three rows, A q̈ = b(q, q̇, t).
+
+    Notes
+    -----
+    Note 6 of the course text.
     """
     as_callable("acceleration", acceleration, "acceleration(t)")
     return LinearConstraint(
@@ -162,14 +254,16 @@ def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearCo
     )
 
 
-# with names, so that they can be pickled
+# module-level functions, so that constraints can be pickled
 def _fixed_frame_rows(frame: str, state: State, t: float) -> tuple[Array, Array]:
+    """Compute A and b of a fixed frame."""
     return state.frame_jacobian(frame), -state.frame_drift(frame)
 
 
 def _moving_frame_rows(
     frame: str, acceleration: Callable[[float], Array], state: State, t: float
 ) -> tuple[Array, Array]:
+    """Compute A and b of a frame with a prescribed acceleration."""
     return state.frame_jacobian(frame)[:3], as_array(
         "acceleration", acceleration(t), (3,)
     ) - state.frame_drift(frame)[:3]

@@ -1,4 +1,4 @@
-"""One contact: the motion that it constrains and the points where its forces act (§2.1, (5))."""
+"""A single contact: the motion that it constrains and the points where its forces act."""
 
 from __future__ import annotations
 
@@ -14,145 +14,234 @@ from floatbase._validation import (
     as_array,
     as_positive,
     as_string,
+    checked,
     cross,
     read_only,
+    short_repr,
     unit_vector,
 )
 from floatbase.robots import State
 from floatbase.robots._checks import as_corners
 
 UP = read_only([0.0, 0.0, 1.0])
-DEFAULT_MU = 0.7  # coefficient of friction where none is given: rubber on dry concrete
+DEFAULT_MU = 0.7  # default coefficient of friction: rubber on dry concrete
 
 
 @runtime_checkable
 class MotionConstraint(Protocol):
-    """What `Contacts` are made of: rows A q̈ = b of (5), and the forces Jᵀ λ that hold them.
+    """An element of `Contacts`: rows A q̈ = b and the forces Jᵀ λ that enforce them.
 
-    name: in messages, active rows and pictures.
-    k: number of force components.
-    row_names: one for each row of (5).
-
-    A class whose J is A by definition may say so by a class attribute of its own,
-    `jacobian_is_constraint = True`: it is then asked once. Derived classes do not inherit it.
+    User-defined constraints implement this protocol. A class with J = A by definition may set the
+    class attribute `jacobian_is_constraint = True`, so that only `constraint` is called. Derived
+    classes do not inherit this attribute.
     """
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name in messages, in the names of active rows, and in pictures."""
+
     @property
-    def k(self) -> int: ...
+    def k(self) -> int:
+        """Number of force components."""
+
     @property
-    def row_names(self) -> tuple[str, ...]: ...
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the m rows of the constraint."""
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """J of (4): Jᵀ λ is the generalised force of λ at time t, s; shape (k, nv)."""
+        """Compute the matrix J whose transpose maps λ to generalized forces.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (k, nv)
+            Jacobian J of eq. (4).
+        """
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) The rows A, shape (m, nv), and b, shape (m,), of A q̈ = b at time t, s."""
+        """Compute A and b of the rows A q̈ = b, eq. (5).
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        A : ndarray, shape (m, nv)
+            Matrix of the constraint rows.
+        b : ndarray, shape (m,)
+            Right-hand side [m/s², or rad/s² for angular rows].
+        """
 
 
 @runtime_checkable
 class FrictionContact(MotionConstraint, Protocol):
-    """A constraint whose forces act at points, each inside a friction cone.
+    """A constraint whose forces act at points, each with a friction cone.
 
-    Forces are what the ground does to the robot, world-aligned, three numbers a point, stacked in
-    order.
-
-    mu: coefficient of friction.
-    normal: unit normal out of the ground, shape (3,), world.
-    point_names: one for each point that carries a force.
+    λ holds the forces of the ground on the robot in world axes [N], three numbers for each point,
+    stacked in the order of the points.
     """
 
     @property
-    def mu(self) -> float: ...
+    def mu(self) -> float:
+        """Coefficient of friction, dimensionless."""
+
     @property
-    def normal(self) -> Array: ...
+    def normal(self) -> Array:
+        """Unit normal pointing out of the ground, shape (3,), world frame."""
+
     @property
-    def point_names(self) -> tuple[str, ...]: ...
+    def point_names(self) -> tuple[str, ...]:
+        """Names of the n points that carry a force."""
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m, with n = len(point_names)."""
+        """Compute the positions of the points.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Positions in the world frame [m], with n = len(point_names).
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class SinglePointContact(Value):
-    """What contacts at one point of a frame's body share; `_arm` says where the point is and how it
-    moves on the body.
+    """Base of contacts at one point of a body.
+
+    Derived classes implement `_arm`, which gives the contact point and its motion on the body.
     """
 
-    frame: str
+    frame: str = field(metadata=checked(as_string))
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
 
+    def _label(self) -> str:
+        """Return the name of this contact in messages about its fields."""
+        return f"contact {short_repr(self.frame)}"
+
     @property
     def name(self) -> str:
-        """The frame's name."""
+        """Name of the contact, which is that of its frame."""
         return self.frame
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """The frame's name: one point."""
+        """Name of the single contact point, which is that of the frame."""
         return (self.frame,)
 
     def positions(self, state: State) -> Array:
-        """World position of the contact point, shape (1, 3), m."""
+        """Compute the position of the contact point.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (1, 3)
+            Position in the world frame [m].
+        """
         return read_only([state.point(self.frame) + self._arm(state)[0]])
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """Jacobian of the body's point at the contact, shape (3, nv), world-aligned."""
+        """Compute the Jacobian of the body point at the contact.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s]; without effect here.
+
+        Returns
+        -------
+        ndarray, shape (3, nv)
+            Maps v to the velocity of the body point in world axes.
+        """
         return self._jacobian(state, self._arm(state)[0])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) A = J and b = -J̇ q̇, shapes (3, nv) and (3,), m/s², where J q̇ = v_frame + ω × arm."""
+        """Compute A = J and b = -J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s]; without effect here.
+
+        Returns
+        -------
+        A : ndarray, shape (3, nv)
+            Jacobian of the body point at the contact, in world axes.
+        b : ndarray, shape (3,)
+            Right-hand side [m/s²].
+        """
         arm, arm_rate = self._arm(state)
         drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
         return self._jacobian(state, arm), read_only(b)
 
     def _jacobian(self, state: State, arm: Array) -> Array:
+        """Compute the Jacobian of the body point at `arm` from the frame's origin."""
         J = state.frame_jacobian(self.frame)
         return read_only(J[:3] - pin.skew(arm) @ J[3:])
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """From the frame's origin to the contact point, m, and its derivative, m/s; shapes (3,),
-        world.
+        """Return the vector from the frame's origin to the contact point, and its derivative.
+
+        Both have shape (3,) and are in world axes [m] and [m/s].
         """
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
 class PointContact(SinglePointContact):
-    """A point of the robot that does not move on the ground: A = J, b = -J̇ q̇ (5).
+    """A point or ball foot that does not slip on the ground, with A = J and b = -J̇ q̇ of eq. (5).
 
-    The contact point is the lowest point of a ball: centre - radius · normal. As the ball rolls,
-    that point moves on the ball, which b takes into account.
+    The contact point is the lowest point of the ball, centre - radius · normal. As the ball rolls,
+    the contact point moves on the ball; b accounts for this motion.
 
-    frame: name of the frame that carries the point.
-    normal: shape (3,), world, out of the ground; it is scaled to unit length.
-    mu: coefficient of friction.
-    radius: of the ball, m; 0 for a point of the frame's body.
-    centre: of the ball, shape (3,), m, in the frame.
+    Parameters
+    ----------
+    frame : str
+        Name of the frame that carries the point.
+    normal : array_like, shape (3,), optional
+        Normal of the ground in the world frame, pointing out of the ground; it is scaled to unit
+        length.
+    mu : float, optional
+        Coefficient of friction, dimensionless.
+    radius : float, optional
+        Radius of the ball [m]; 0 for a point of the body.
+    centre : array_like, shape (3,), optional
+        Centre of the ball in the frame [m].
     """
 
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
-    radius: float = 0.0
-    centre: Array = field(default_factory=lambda: np.zeros(3))
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
+    radius: float = field(default=0.0, metadata=checked(as_positive, "m", allow_zero=True))
+    centre: Array = field(
+        default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
+    )
     jacobian_is_constraint: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        check_contact(self)
-        object.__setattr__(
-            self,
-            "radius",
-            as_positive(f"radius of {self.frame}", self.radius, "m", allow_zero=True),
-        )
-        object.__setattr__(
-            self, "centre", as_array(f"centre of {self.frame}", self.centre, (3,), "m")
-        )
-
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """R c - r n. Only R c turns with the foot, the contact point stays below the centre."""
+        """Return R c - r n and its derivative; the contact point stays below the centre."""
         to_centre = state.frame_pose(self.frame).rotation @ self.centre
         return to_centre - self.radius * self.normal, cross(
             state.frame_velocity(self.frame)[3:], to_centre
@@ -161,22 +250,32 @@ class PointContact(SinglePointContact):
 
 @dataclass(frozen=True, eq=False)
 class FlatFootContact(Value):
-    """A foot with area that neither moves nor turns: 6 motion rows, and forces at its corners (note
-    9 of the course text).
+    """A foot with area that neither moves nor turns, with forces at its corners.
 
-    The frame's six rows hold the motion and the corners only carry forces. Twelve rows for the
-    motion of the corners would have rank 6, and would be inconsistent when the foot turns.
+    The six rows of the frame constrain the motion, and the corners only carry forces. Twelve rows
+    for the motion of four corners would have rank 6, and would be inconsistent when the foot turns.
 
-    frame: name of the foot's frame.
-    corners: shape (n, 3), m, in the frame.
-    normal: shape (3,), world, out of the ground; it is scaled to unit length.
-    mu: coefficient of friction.
+    Parameters
+    ----------
+    frame : str
+        Name of the foot's frame.
+    corners : array_like, shape (n, 3)
+        Corners of the sole in the foot's frame [m]; at least three, not on one line.
+    normal : array_like, shape (3,), optional
+        Normal of the ground in the world frame, pointing out of the ground; it is scaled to unit
+        length.
+    mu : float, optional
+        Coefficient of friction, dimensionless.
+
+    Notes
+    -----
+    Note 9 of the course text.
     """
 
-    frame: str
+    frame: str = field(metadata=checked(as_string))
     corners: Array
-    normal: Array = field(default_factory=lambda: UP)
-    mu: float = DEFAULT_MU
+    normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
+    mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
     row_names: ClassVar[tuple[str, ...]] = (
         "x",
         "y",
@@ -187,48 +286,121 @@ class FlatFootContact(Value):
     )  # world-aligned
 
     def __post_init__(self) -> None:
-        check_contact(self)
+        super().__post_init__()
         object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
+
+    def _label(self) -> str:
+        """Return the name of this contact in messages about its fields."""
+        return f"contact {short_repr(self.frame)}"
 
     @property
     def name(self) -> str:
-        """The frame's name."""
+        """Name of the contact, which is that of its frame."""
         return self.frame
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """The corners: frame name and number."""
+        """Names of the corners, made of the frame's name and a number."""
         return tuple(f"{self.frame} corner {i}" for i in range(len(self.corners)))
 
     @property
     def k(self) -> int:
-        """3 for each corner."""
+        """Number of force components, three for each corner."""
         return 3 * len(self.corners)
 
     def positions(self, state: State) -> Array:
-        """World positions of the corners, shape (n, 3), m."""
+        """Compute the positions of the corners.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Positions in the world frame [m].
+        """
         return read_only([state.point(self.frame, corner) for corner in self.corners])
 
     def force_generator_matrix(self, state: State) -> Array:
-        """Corner forces to their wrench at the frame's origin, (6, k), N, N·m, world axes: J =
-        force_generator_matrixᵀ A.
+        """Compute the matrix that maps corner forces to their wrench at the frame's origin.
+
+        The Jacobian of the corners is J = Gᵀ A, where G is this matrix.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (6, k)
+            Maps forces in world axes [N] to force [N] and moment [N·m] in world axes.
         """
         return grasp_matrix(self.corners @ state.frame_pose(self.frame).rotation.T, np.zeros(3))
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """Jacobian of the corners, shape (k, nv), world-aligned; its rank is at most 6."""
+        """Compute the Jacobian of the corners, whose rank is at most 6.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s]; without effect here.
+
+        Returns
+        -------
+        ndarray, shape (k, nv)
+            Maps v to the velocities of the corners in world axes.
+        """
         return read_only(self.force_generator_matrix(state).T @ state.frame_jacobian(self.frame))
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) The frame's six rows and -J̇ q̇, shapes (6, nv) and (6,), m/s² and rad/s²."""
+        """Compute A, the six rows of the frame's Jacobian, and b = -J̇ q̇.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s]; without effect here.
+
+        Returns
+        -------
+        A : ndarray, shape (6, nv)
+            Jacobian of the frame in world axes, linear rows first.
+        b : ndarray, shape (6,)
+            Right-hand side [m/s², rad/s²].
+
+        Notes
+        -----
+        [FBR]_, eq. (5).
+        """
         return state.frame_jacobian(self.frame), read_only(-state.frame_drift(self.frame))
 
 
 def grasp_matrix(points: Array, reference_point: Array) -> Array:
-    """(20)(21) G_f above G_τ, shape (6, 3n): forces at points, shape (n, 3), m, to their wrench
-    about a point, shape (3,).
+    """Compute the matrix that maps forces at points to their wrench about a reference point.
 
-    Known as the grasp matrix in manipulation. N and N·m, world.
+    It stacks G_f above G_τ, and is known as the grasp matrix in manipulation.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 3)
+        Points where the forces act, in the world frame [m].
+    reference_point : array_like, shape (3,)
+        Point about which moments are taken, in the world frame [m].
+
+    Returns
+    -------
+    ndarray, shape (6, 3n)
+        Maps the stacked forces [N] to force [N] and moment [N·m], all in world axes.
+
+    Notes
+    -----
+    [FBR]_, eqs. (20), (21).
     """
     points, reference_point = (
         as_array("points", points, (None, 3), "m"),
@@ -236,12 +408,3 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
     )
     blocks = [np.vstack([np.eye(3), pin.skew(point - reference_point)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))
-
-
-def check_contact(contact: FrictionContact) -> None:
-    """Check a contact's friction coefficient and normal; scale the normal to unit length."""
-    as_string("frame of a contact", contact.name)
-    object.__setattr__(contact, "normal", unit_vector(f"normal of {contact.name}", contact.normal))
-    object.__setattr__(
-        contact, "mu", as_positive(f"friction coefficient mu of {contact.name}", contact.mu)
-    )

@@ -1,4 +1,4 @@
-"""The set of all contacts of a robot, stacked in order (§2.1)."""
+"""All contacts and constraints of a robot, stacked in order."""
 
 from __future__ import annotations
 
@@ -33,17 +33,36 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 
 PerFoot: TypeAlias = float | Sequence[float] | Array | Mapping[str, float]
-_FRICTION_PARTS = ("mu", "normal", "point_names", "positions")  # all of them, or none
-_HINT = "fb.Contacts.points(robot, frames=[…]) makes them from names"
+_FRICTION_PARTS = ("mu", "normal", "point_names", "positions")  # a contact has all or none
+_HINT = "fb.Contacts.points(robot, frames=[…]) makes contacts from names of frames"
 Normals: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(Value):
-    """Contacts and other constraints stacked in order; none at all for free flight. `only`,
-    `without` and `+` make new ones.
+    """The contacts and other constraints of a robot, stacked in order.
 
-    Raises `InputError` for a name that stands twice.
+    Without any contact the robot is in free flight. The object is immutable: `only`, `without` and
+    `+` make new ones. `contacts[name]` gives one contact, and iteration gives all of them.
+
+    Parameters
+    ----------
+    items : sequence of MotionConstraint
+        Contacts and other constraints, in the order of their forces in λ.
+
+    Raises
+    ------
+    InputError
+        If an item is not a contact, or if two contacts have the same name.
+
+    Examples
+    --------
+    >>> robot = fb.load("go2")
+    >>> contacts = fb.Contacts.points(robot, mu=0.6)
+    >>> contacts
+    Contacts(FL_foot, FR_foot, RL_foot, RR_foot; k=12)
+    >>> contacts.without("FL_foot").k
+    9
     """
 
     _example = "fb.Contacts.points(robot)"
@@ -52,27 +71,28 @@ class Contacts(Value):
     def __post_init__(self) -> None:
         if not isinstance(self.items, Sequence) or isinstance(self.items, str):
             raise InputError(
-                f"Contacts takes a list of contacts, not {short_repr(self.items)}; {_HINT}."
+                f"Contacts needs a list of contacts, not {short_repr(self.items)}. {_HINT}."
             )
         object.__setattr__(self, "items", tuple(self.items))
         for contact in self.items:
             if isinstance(contact, type) or not isinstance(contact, MotionConstraint):
-                raise InputError(f"{short_repr(contact)} is no contact; {_HINT}.")
-            lacks = [part for part in _FRICTION_PARTS if not hasattr(contact, part)]
-            if 0 < len(lacks) < len(_FRICTION_PARTS):
+                raise InputError(f"{short_repr(contact)} is not a contact. {_HINT}.")
+            missing = [part for part in _FRICTION_PARTS if not hasattr(contact, part)]
+            if 0 < len(missing) < len(_FRICTION_PARTS):
                 raise InputError(
-                    f"contact {contact.name!r} has friction but no {' and no '.join(lacks)}; see "
+                    f"Contact {contact.name!r} has only some of the attributes of a contact with "
+                    f"friction. Add the missing {', '.join(missing)}; see "
                     f"floatbase.dynamics.FrictionContact."
                 )
         duplicates = sorted({name for name in self.names if self.names.count(name) > 1})
         if duplicates:
             raise InputError(
-                f"contact {duplicates[0]!r} stands twice in the list; each name may stand once."
+                f"Duplicate contact name {duplicates[0]!r}. Contact names must be unique."
             )
 
     @staticmethod
     def none() -> Contacts:
-        """No contacts: free flight."""
+        """Make an empty set of contacts, for free flight."""
         return Contacts([])
 
     @staticmethod
@@ -82,15 +102,34 @@ class Contacts(Value):
         frames: Sequence[str] | None = None,
         normals: Normals = None,
     ) -> Contacts:
-        """Point contacts at the robot's feet. A flat foot touches at the middle of its corners;
-        `flat_feet` uses its area.
+        """Make point contacts at the robot's feet or at other frames.
 
-        robot: as from `fb.load`.
-        mu: coefficient of friction: one number for all, (n,) in the order of the frames, or a
-            mapping from frame to number, 0.7 where it has none.
-        frames: names of the frames that touch; all feet by default.
-        normals: world, out of the ground: (3,) for all, (n, 3) in the order of the frames, or a
-            mapping from frame to (3,); straight up by default.
+        A flat foot touches the ground at the middle of its corners; `flat_feet` uses its area.
+
+        Parameters
+        ----------
+        robot : Robot
+            Robot, such as `fb.load("go2")`.
+        mu : float, array_like of shape (n,), or mapping of str to float, optional
+            Coefficient of friction, dimensionless: one number for all, one for each frame in
+            order, or a mapping from frame names, with 0.7 for frames that it does not name.
+        frames : sequence of str, optional
+            Names of the frames in contact; all feet by default.
+        normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
+            Normals in the world frame, pointing out of the ground: one for all, one for each frame
+            in order, or a mapping from frame names to shape (3,). The default is straight up.
+
+        Returns
+        -------
+        Contacts
+            One point contact for each frame.
+
+        Raises
+        ------
+        InputError
+            If the robot has no feet and `frames` is not given.
+        UnknownNameError
+            If `frames`, `mu` or `normals` has a name that does not exist.
         """
         return Contacts(
             [
@@ -106,23 +145,56 @@ class Contacts(Value):
         frames: Sequence[str] | None = None,
         normals: Normals = None,
     ) -> Contacts:
-        """Flat-foot contacts at the robot's feet with area; arguments as for `points`."""
+        """Make flat-foot contacts, with forces at the corners of each foot.
+
+        Parameters
+        ----------
+        robot : Robot
+            Robot with flat feet, such as `fb.load("talos")`.
+        mu : float, array_like of shape (n,), or mapping of str to float, optional
+            Coefficient of friction, dimensionless, as for `points`.
+        frames : sequence of str, optional
+            Names of the feet in contact; all feet by default.
+        normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
+            Normals in the world frame, pointing out of the ground, as for `points`.
+
+        Returns
+        -------
+        Contacts
+            One flat-foot contact for each foot.
+
+        Raises
+        ------
+        InputError
+            If one of the feet has no area.
+        """
         feet = _selected_feet(robot, frames, mu, normals)
         for foot, *_ in feet:
             if not foot.is_flat:
                 hint = (
-                    "use fb.Contacts.points, or load the robot with "
+                    "Use fb.Contacts.points, or load the robot with "
                     "feet=[floatbase.robots.Foot(frame, corners=…)]"
                 )
-                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot; {hint}.")
+                raise InputError(f"{foot.frame} of {robot.name} is not a flat foot. {hint}.")
         return Contacts([_make_contact(*foot_data) for foot_data in feet])
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """All feet of the robot as they are, flat ones with their corners, the others as points;
-        none where it has none.
+        """Make contacts of all feet, flat ones with their corners and the others as points.
 
-        mu, normals: as for `points`.
+        Parameters
+        ----------
+        robot : Robot
+            Robot, such as `fb.load("talos")`. A robot without feet gets no contacts.
+        mu : float, array_like of shape (n,), or mapping of str to float, optional
+            Coefficient of friction, dimensionless, as for `points`.
+        normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
+            Normals in the world frame, pointing out of the ground, as for `points`.
+
+        Returns
+        -------
+        Contacts
+            One contact for each foot.
         """
         return Contacts(
             [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]
@@ -137,14 +209,12 @@ class Contacts(Value):
 
     @cached_property
     def friction_contacts(self) -> tuple[FrictionContact, ...]:
-        """Those whose forces act at points, inside friction cones; the others are constraints like
-        `LinearConstraint`.
-        """
+        """Contacts whose forces act at points with friction cones, unlike a `LinearConstraint`."""
         return tuple(c for c in self.items if isinstance(c, FrictionContact))
 
     @cached_property
     def point_names(self) -> tuple[str, ...]:
-        """Names of the points that carry forces, n of them, three entries of λ each."""
+        """Names of the n points that carry forces, with three entries of λ each."""
         return tuple(name for contact in self.friction_contacts for name in contact.point_names)
 
     @property
@@ -154,26 +224,24 @@ class Contacts(Value):
 
     @cached_property
     def k(self) -> int:
-        """Length of λ."""
+        """Length of λ, three for each point and one for each row of a `LinearConstraint`."""
         return sum(contact.k for contact in self.items)
 
     @cached_property
     def normals(self) -> Array:
-        """Normal of each point, shape (n, 3), world."""
+        """Ground normals at the points, unit vectors of shape (n, 3), world frame."""
         return read_only(
             np.reshape([c.normal for c in self.friction_contacts for _ in c.point_names], (-1, 3))
         )
 
     @cached_property
     def mus(self) -> Array:
-        """Coefficient of friction of each point, shape (n,)."""
+        """Coefficient of friction at each point, shape (n,), dimensionless."""
         return read_only([c.mu for c in self.friction_contacts for _ in c.point_names])
 
     @cached_property
     def point_force_indices(self) -> npt.NDArray[np.intp]:
-        """Which entries of λ are forces at points, shape (3 n,): all but those of a
-        `LinearConstraint`.
-        """
+        """Entries of λ that are forces at points, as indices, shape (3n,)."""
         friction = {contact.name for contact in self.friction_contacts}
         entries = np.flatnonzero(
             [contact.name in friction for contact in self.items for _ in range(contact.k)]
@@ -182,8 +250,19 @@ class Contacts(Value):
         return entries
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m: where soles touch, for a ball foot one
-        radius below its centre.
+        """Compute the positions of the contact points.
+
+        The contact point of a ball foot lies one radius below its centre.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Positions in the world frame [m].
         """
         as_instance("state", state, State)
         return read_only(
@@ -191,7 +270,20 @@ class Contacts(Value):
         )
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """J of (4), shape (k, nv), at time t, s."""
+        """Compute the stacked Jacobian J of eq. (4).
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time at which moving constraints are evaluated [s].
+
+        Returns
+        -------
+        ndarray, shape (k, nv)
+            Jacobian of the contact points in world axes; Jᵀ λ is the generalized contact force.
+        """
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         return self._stacked(
@@ -199,7 +291,26 @@ class Contacts(Value):
         )
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) A, shape (m, nv), and b, shape (m,), at time t, s."""
+        """Compute the stacked rows A q̈ = b that the contacts impose on the motion.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time at which moving constraints are evaluated [s].
+
+        Returns
+        -------
+        A : ndarray, shape (m, nv)
+            Matrix of the constraint rows.
+        b : ndarray, shape (m,)
+            Right-hand side [m/s², or rad/s² for angular rows].
+
+        Notes
+        -----
+        [FBR]_, eq. (5).
+        """
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [tuple(map(read_only, contact.constraint(state, t))) for contact in self.items]
@@ -207,7 +318,7 @@ class Contacts(Value):
         return self._stacked(state, [part[0] for part in parts]), read_only(b)
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
-        """J of (4) with A and b of (5)."""
+        """Compute J, A and b, evaluating each contact once where J equals A."""
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
@@ -224,46 +335,114 @@ class Contacts(Value):
         )
 
     def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
+        """Stack rows of length nv; without contacts there are none."""
         return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
 
     def force_slice(self, name: str) -> slice:
-        """Which entries of λ belong to a contact."""
+        """Return the slice of λ that belongs to one contact.
+
+        Parameters
+        ----------
+        name : str
+            Name of the contact.
+
+        Returns
+        -------
+        slice
+            Entries of λ.
+        """
         contact = self[name]
         start = sum(before.k for before in self.items[: self.names.index(name)])
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
-        """The force of one contact among λ, shape (3,), N, world: for a flat foot the resultant of
-        its corners.
+        """Return the force of one contact, for a flat foot the resultant of its corner forces.
 
-        forces: λ, shape (k,), or (n, k) for n of them, which gives (n, 3). Raises
-            `UnknownNameError` for a name that is no
-        contact's, `InputError` for a contact whose forces do not act at points.
+        Parameters
+        ----------
+        forces : array_like, shape (k,) or (n, k)
+            Contact forces λ in world axes [N], or n rows of them.
+        name : str
+            Name of the contact.
+
+        Returns
+        -------
+        ndarray, shape (3,) or (n, 3)
+            Force of the ground on the robot at this contact, in world axes [N].
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no contact with this name.
+        InputError
+            If the forces of this contact do not act at points.
         """
         part = self.force_slice(self.friction_contact(name).name)
         stacked = numeric_copy(forces)
         if stacked is None or stacked.ndim not in (1, 2) or stacked.shape[-1] != self.k:
             got = f"is {short_repr(forces)}" if stacked is None else f"has shape {stacked.shape}"
-            raise InputError(f"forces {got}; {self!r} takes ({self.k},) or (n, {self.k}) (N).")
+            raise InputError(
+                f"forces {got}, but {self!r} needs shape ({self.k},) or (n, {self.k}) [N]."
+            )
         return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
 
     def friction_contact(self, name: str) -> FrictionContact:
-        """The contact of this name. Raises `InputError` for one without contact points."""
+        """Return a contact whose forces act at points.
+
+        Parameters
+        ----------
+        name : str
+            Name of the contact.
+
+        Returns
+        -------
+        FrictionContact
+            The contact of this name.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no contact with this name.
+        InputError
+            If the forces of this contact do not act at points.
+        """
         contact = self[name]
         if not isinstance(contact, FrictionContact):
             raise InputError(
-                f"the forces of {name} do not act at points, so they add up to no force; see "
-                f"force_slice."
+                f"The forces of {name} do not act at points, so they have no resultant. Use "
+                f"force_slice to get their entries of λ."
             )
         return contact
 
     def only(self, *names: str) -> Contacts:
-        """The contacts of these names, in the order they have here."""
+        """Select contacts by name.
+
+        Parameters
+        ----------
+        *names : str
+            Names of the contacts to keep.
+
+        Returns
+        -------
+        Contacts
+            The contacts with these names, in the order of this object.
+        """
         chosen = [self[name].name for name in names]
         return Contacts([contact for contact in self.items if contact.name in chosen])
 
     def without(self, *names: str) -> Contacts:
-        """The contacts but those of these names."""
+        """Leave contacts out by name.
+
+        Parameters
+        ----------
+        *names : str
+            Names of the contacts to leave out.
+
+        Returns
+        -------
+        Contacts
+            The other contacts, in the order of this object.
+        """
         dropped = [self[name].name for name in names]
         return Contacts([contact for contact in self.items if contact.name not in dropped])
 
@@ -277,7 +456,7 @@ class Contacts(Value):
             [
                 *self.items,
                 *as_instance(
-                    "what is added to Contacts", other, Contacts, "fb.Contacts([contact])"
+                    "the right-hand side of Contacts + …", other, Contacts, "fb.Contacts([contact])"
                 ).items,
             ]
         )
@@ -295,25 +474,48 @@ class Contacts(Value):
 def constraint_and_jacobian(
     contact: MotionConstraint, state: State, t: float
 ) -> tuple[Array, Array, Array]:
-    """A, shape (m, nv), and b, shape (m,), of (5) and J, shape (k, nv), of (4) of one contact;
-    read-only, at time t in s.
+    """Compute A and b of eq. (5) and J of eq. (4) of one contact, and check their shapes.
 
-    Raises `InputError` for other shapes.
+    Parameters
+    ----------
+    contact : MotionConstraint
+        Contact or other constraint.
+    state : State
+        State of the robot.
+    t : float
+        Time [s].
+
+    Returns
+    -------
+    A : ndarray, shape (m, nv)
+        Matrix of the constraint rows, read-only.
+    b : ndarray, shape (m,)
+        Right-hand side [m/s², or rad/s² for angular rows], read-only.
+    J : ndarray, shape (k, nv)
+        Jacobian of the forces in world axes, read-only.
+
+    Raises
+    ------
+    InputError
+        If an array has another shape.
     """
-    A, b = map(read_only, contact.constraint(state, t))  # user code may write to its arrays again
+    A, b = map(
+        read_only, contact.constraint(state, t)
+    )  # copied, since user code may reuse its arrays
     is_A = vars(type(contact)).get("jacobian_is_constraint", False)
     J = A if is_A else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv
     if A.shape != (m, nv) or b.shape != (m,) or J.shape != (contact.k, nv):
-        required = f"they must have ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
+        required = f"they must have shapes ({m}, {nv}), ({m},) and ({contact.k}, {nv})"
         raise InputError(
-            f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}; "
+            f"A, b and J of {contact.name!r} have shapes {A.shape}, {b.shape} and {J.shape}, but "
             f"{required}."
         )
     return A, b, J
 
 
 def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
+    """Make the contact of a foot: a point if it has no corners or `flat` is False."""
     if flat and foot.corners is not None:
         return FlatFootContact(foot.frame, foot.corners, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
@@ -322,7 +524,7 @@ def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> Fr
 def _selected_feet(
     robot: Robot, frames: Sequence[str] | None, mu: PerFoot, normals: Normals
 ) -> list[tuple[Foot, float, Array]]:
-    """The feet that touch, each with its coefficient of friction and its normal."""
+    """Return the feet in contact, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
     feet = (
         robot.feet
@@ -331,8 +533,8 @@ def _selected_feet(
     )
     if not feet:
         raise InputError(
-            f'{robot.name} has no feet; name the frames that touch: frames=["…"] (robot.frames '
-            f"lists them)."
+            f'{robot.name} has no feet. Name the frames in contact, frames=["…"]; robot.frames '
+            f"lists all names."
         )
     names = [foot.frame for foot in feet]
     normals = UP if normals is None else normals
@@ -349,16 +551,14 @@ def _selected_feet(
 def _per_name(
     argument: str, value: Any, names: Sequence[str], default: Any, shape: tuple[int, ...] = ()
 ) -> list[Any]:
-    """One value of this shape for each name: the same for all, one after the other, or by name with
-    a default.
-    """
+    """Return one value for each name: the same for all, in order, or by name with a default."""
     if isinstance(value, Mapping):
         for name in set(value) - set(names):
             raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
     if isinstance(value, Sequence) and value and all(isinstance(entry, str) for entry in value):
         raise InputError(
-            f"{argument} must be numbers, not {short_repr(value)}; names of frames go to "
+            f"{argument} must be numbers, not {short_repr(value)}. Pass names of frames as "
             f"frames=[…]."
         )
     numeric = numeric_copy(value)

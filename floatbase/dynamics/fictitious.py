@@ -1,6 +1,4 @@
-"""h taken apart: gravity, centrifugal and Coriolis forces, and what a turning frame makes of
-straight paths (App. A).
-"""
+"""Gravity, centrifugal and Coriolis forces, and fictitious forces in a rotating frame."""
 
 from __future__ import annotations
 
@@ -18,18 +16,26 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.robots import State
 
 VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
-# rad between two points of the grid on which the turning is added up: 1e-10 rad off after a turn
+# rad per step of the integrated rotation: the error is 1e-10 rad after a full turn
 _MAX_ROTATION_STEP = 0.01
-_MAX_STEPS = 100_000  # between two times: 160 turns, and some seconds of computing
+_MAX_STEPS = 100_000  # between two times: 160 turns, which take some seconds to compute
 
 
 @dataclass(frozen=True, eq=False)
 class BiasForces(Value):
-    """h = gravity g(q) + centrifugal (terms in v_i²) + coriolis (terms in v_i v_j, i ≠ j), each
-    (nv,), N and N·m as h.
+    """The bias forces h, split into gravity, centrifugal and Coriolis forces.
 
-    Which is which, and how large, depends on the coordinates: see `bias_forces`. Source: [FBR],
-    Appendix A.
+    The split between centrifugal and Coriolis forces depends on the coordinates, and so does their
+    size; see `bias_forces`.
+
+    Parameters
+    ----------
+    gravity : ndarray, shape (nv,)
+        Gravity forces g(q) [N, N·m].
+    centrifugal : ndarray, shape (nv,)
+        Terms in v_i² [N, N·m].
+    coriolis : ndarray, shape (nv,)
+        Terms in v_i v_j with i ≠ j [N, N·m].
     """
 
     gravity: Array
@@ -38,24 +44,42 @@ class BiasForces(Value):
 
     @property
     def fictitious(self) -> Array:
-        """The part due to motion along coordinates that curve or turn, shape (nv,): C v."""
+        """Sum C v of centrifugal and Coriolis forces, shape (nv,) [N, N·m]."""
         return read_only(self.centrifugal + self.coriolis)
 
     @property
     def total(self) -> Array:
-        """h(q, v), shape (nv,), for the axes that the parts are for."""
+        """Sum h(q, v) of all three, shape (nv,), for the same axes as the parts [N, N·m]."""
         return read_only(self.gravity + self.centrifugal + self.coriolis)
 
 
 def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasForces:
-    """App. A: h(q, v) taken apart. The velocity part is Σ_ij Γ_ij v_i v_j; moving one coordinate
-    alone gives Γ_ii.
+    """Split h(q, v) into gravity, centrifugal and Coriolis forces.
 
-    axes: of the base's velocity, acceleration, force and moment: its own, as in v, which turn and
-        so have m ω × v_lin as a Coriolis force; or the world's. A robot without a floating base has
-        the same parts in both.
+    The velocity-dependent part is Σ_ij Γ_ij v_i v_j. A motion of one coordinate alone gives Γ_ii.
 
-    Raises `InputError` for other axes.
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    axes : {"base", "world"}, optional
+        Axes of the velocity, acceleration, force and moment of the base. The axes of the base, as
+        in v, rotate, and so h includes the Coriolis force m ω × v_lin. With a fixed base, the
+        result is the same for both.
+
+    Returns
+    -------
+    BiasForces
+        The three parts of h, each of shape (nv,) [N, N·m].
+
+    Raises
+    ------
+    UnknownNameError
+        If `axes` is neither "base" nor "world".
+
+    Notes
+    -----
+    [FBR]_, App. A.
     """
     as_instance("state", state, State)
     if not isinstance(axes, str) or axes not in ("base", "world"):
@@ -66,9 +90,7 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
 
     def moving(v: Array) -> Array:
-        """Σ_ij Γ_ij u_i u_j for the coordinates u with v = T u: q̈ = T u̇ + Ṫ u, and forces turn
-        with Tᵀ.
-        """
+        """Compute Σ_ij Γ_ij u_i u_j for u with v = T u: q̈ = T u̇ + Ṫ u, and Tᵀ maps forces."""
         turning = (
             state.M[:, :3] @ np.cross(v[:3], v[3:6])
             if axes == "world" and state.robot.is_floating
@@ -84,7 +106,7 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
 
 
 def _world_to_base_axes(state: State) -> Array:
-    """T with v = T u, shape (nv, nv), orthogonal: u has the base's velocity in world axes."""
+    """Compute the orthogonal T with v = T u, where u has the velocity of the base in world axes."""
     T = np.eye(state.robot.nv)
     if state.robot.is_floating:
         T[:3, :3] = T[3:6, 3:6] = state.frame_pose("base").rotation.T
@@ -92,10 +114,24 @@ def _world_to_base_axes(state: State) -> Array:
 
 
 def coriolis_matrix(state: State) -> Array:
-    """App. A: C(q, v), shape (nv, nv), with C v = centrifugal + Coriolis forces and Ṁ - 2 C
-    skew-symmetric.
+    """Compute the Coriolis matrix C(q, v).
 
-    Many matrices satisfy the first; this one, Pinocchio's, satisfies both.
+    C v is the sum of centrifugal and Coriolis forces, and Ṁ - 2 C is skew-symmetric. Many matrices
+    have the first property; the one returned here, from Pinocchio, has both.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+
+    Returns
+    -------
+    ndarray, shape (nv, nv)
+        Coriolis matrix; C v is in [N, N·m].
+
+    Notes
+    -----
+    [FBR]_, App. A. Pinocchio computes the matrix [Carpentier2019]_.
     """
     as_instance("state", state, State)
     model = state.robot.model
@@ -104,16 +140,26 @@ def coriolis_matrix(state: State) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class RotatingFrameView(Value):
-    """A free particle as one who rides on a turning frame sees it; a row for each time.
+    """The motion of a free particle in a rotating frame, with one row for each time.
 
-    All but `rotation` is in the turning frame's coordinates, shape (n, 3). Source: [FBR], Appendix
-    A.
+    The three accelerations together explain the curved path of the particle in the frame.
 
-    time: (n,) s.
-    rotation: (n, 3, 3), R_world_frame.
-    position, velocity: of the particle, m and m/s.
-    centrifugal, coriolis, euler: -ω × (ω × p), -2 ω × ṗ and -ω̇ × p, m/s²: the accelerations that
-        explain the curved path.
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Times [s].
+    rotation : ndarray, shape (n, 3, 3)
+        Rotation matrices from the frame to the world.
+    position : ndarray, shape (n, 3)
+        Position p of the particle, in the rotating frame [m].
+    velocity : ndarray, shape (n, 3)
+        Velocity ṗ relative to the rotating frame, in its axes [m/s].
+    centrifugal : ndarray, shape (n, 3)
+        Centrifugal acceleration -ω × (ω × p), in the rotating frame [m/s²].
+    coriolis : ndarray, shape (n, 3)
+        Coriolis acceleration -2 ω × ṗ, in the rotating frame [m/s²].
+    euler : ndarray, shape (n, 3)
+        Euler acceleration -ω̇ × p, in the rotating frame [m/s²].
     """
 
     time: Array
@@ -126,9 +172,7 @@ class RotatingFrameView(Value):
 
     @property
     def acceleration(self) -> Array:
-        """The particle's acceleration as the frame sees it, shape (n, 3), m/s²: p̈ is all
-        fictitious.
-        """
+        """Acceleration p̈ in the rotating frame, all of it fictitious, shape (n, 3) [m/s²]."""
         return read_only(self.centrifugal + self.coriolis + self.euler)
 
 
@@ -139,28 +183,51 @@ def view_from_rotating_frame(
     velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
     omega_rate: VectorOrFunction | None = None,
 ) -> RotatingFrameView:
-    """App. A: a particle that no force acts on, moving straight in the world, seen from a frame
-    that turns.
+    """Describe the straight path of a free particle in a rotating frame.
 
-    time: (n,) s, rising; the frame's axes are the world's at time[0], its origin stays at the
-        world's.
-    omega: (3,) rad/s, world, angular velocity of the frame: a constant, or a function of the time
-        in s.
-    position: (3,) m, world, of the particle at time[0].
-    velocity: (3,) m/s, world, of the particle.
-    omega_rate: (3,) rad/s², world, derivative of omega; zero for a constant, and needed for a
-        function.
+    No force acts on the particle. The axes of the frame are those of the world at `time[0]`, and
+    its origin stays at the origin of the world.
 
-    Raises `InputError` for times that do not rise, wrong shapes and an ω(t) without its rate.
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Increasing times [s].
+    omega : array_like, shape (3,), or callable
+        Angular velocity of the frame, in world axes [rad/s]: a constant, or a function of the time
+        [s] that returns shape (3,).
+    position : array_like, shape (3,)
+        Position of the particle at `time[0]`, in the world frame [m].
+    velocity : array_like, shape (3,), optional
+        Velocity of the particle, in the world frame [m/s].
+    omega_rate : array_like, shape (3,), or callable, optional
+        Time derivative of `omega`, in world axes [rad/s²]. It is zero for a constant `omega`, and
+        required if `omega` is a function.
+
+    Returns
+    -------
+    RotatingFrameView
+        Position, velocity and fictitious accelerations in the rotating frame at each time.
+
+    Raises
+    ------
+    InputError
+        If the times do not increase, if the frame turns more than about 160 times between two of
+        them,
+        or if `omega` is a function and `omega_rate` is missing.
+
+    Notes
+    -----
+    [FBR]_, App. A.
     """
     time = as_array("time", time, (None,), "s")
     if time.size < 1 or np.any(np.diff(time) <= 0.0):
         raise InputError(
-            "time must hold at least one instant, and each must come after the one before."
+            "time must contain at least one value, and its values must increase strictly."
         )
     if callable(omega) and omega_rate is None:
         raise InputError(
-            "omega is a function of time; give its derivative too, omega_rate=lambda t: …, rad/s²."
+            "omega is a function of time, so its derivative is needed as well. Pass "
+            "omega_rate=lambda t: … [rad/s²]."
         )
     omega_at, omega_rate_at = (
         _as_function("omega", omega),
@@ -172,7 +239,7 @@ def view_from_rotating_frame(
         as_array("velocity", velocity, (3,), "m/s"),
     )
     world = [[start + (t - time[0]) * v, v, omega_at(t), omega_rate_at(t)] for t in time]
-    p, v_rotated, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the frame's axes
+    p, v_rotated, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the axes of the frame
     p_rate = v_rotated - np.cross(w, p)
     return RotatingFrameView(
         time=time,
@@ -186,7 +253,7 @@ def view_from_rotating_frame(
 
 
 def _as_function(name: str, value: VectorOrFunction) -> Callable[[float], Array]:
-    """The value as a checked function of time."""
+    """Return the value as a checked function of time."""
     if callable(value):
         as_callable(name, value, f"{name}(t)")
         return lambda t: as_array(f"{name} at {t:g} s", value(t), (3,))
@@ -195,10 +262,10 @@ def _as_function(name: str, value: VectorOrFunction) -> Callable[[float], Array]
 
 
 def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
-    """R(t) with Ṙ = [ω] R and R = 1 at time[0], shape (n, 3, 3), in small turns by ω at two Gauss
-    points (Magnus series).
+    """Integrate Ṙ = [ω] R from R = 1 at time[0] with a Magnus method of fourth order.
 
-    Of fourth order. Source: Iserles et al., Lie-group methods, Acta Numerica, 2000.
+    It evaluates ω at two Gauss points per step. Source: Iserles et al., Lie-group methods, Acta
+    Numerica, 2000.
     """
     R = np.empty((time.size, 3, 3))
     R[0] = np.eye(3)
@@ -207,8 +274,9 @@ def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
         steps = int(np.ceil(max_speed * (end - begin) / _MAX_ROTATION_STEP)) + 1
         if steps > _MAX_STEPS:
             raise InputError(
-                f"from {begin:g} s to {end:g} s the frame turns by {steps * _MAX_ROTATION_STEP:g} "
-                f"rad; use a shorter time."
+                f"From {begin:g} s to {end:g} s the frame turns by {steps * _MAX_ROTATION_STEP:g} "
+                f"rad, but at most {_MAX_STEPS * _MAX_ROTATION_STEP:g} rad are allowed between two "
+                f"times. Use a shorter time or add times in between."
             )
         dt = (end - begin) / steps
         R[i + 1] = R[i]

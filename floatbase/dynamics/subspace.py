@@ -1,5 +1,6 @@
-"""Which accelerations, torques and forces go together: ζ, η, C, B, their spaces and dimensions
-(8)-(14), (16), (17).
+"""Feasible accelerations, torques and contact forces: the maps ζ and η, and the spaces of C and B.
+
+Section 2.2 of the course text.
 """
 
 from __future__ import annotations
@@ -25,25 +26,62 @@ from floatbase.linear_algebra import null_space, rank
 
 
 def delassus_matrix(eom: EquationsOfMotion) -> Array:
-    """(8) A M⁻¹ Jᵀ, shape (m, k): how the contacts' accelerations answer to their forces.
+    """Compute A M⁻¹ Jᵀ, the change of the contact accelerations per contact force.
 
-    For points J M⁻¹ Jᵀ, known as the Delassus matrix; its inverse, where there is one, is the
-    inertia that contacts feel.
+    For point contacts it is J M⁻¹ Jᵀ, known as the Delassus matrix. Its inverse, if it exists, is
+    the apparent inertia at the contacts.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    ndarray, shape (m, k)
+        A M⁻¹ Jᵀ [m/s² per N, and accordingly for other rows].
+
+    Notes
+    -----
+    [FBR]_, eq. (8).
     """
     as_instance("eom", eom, EquationsOfMotion)
     return read_only(eom.A @ np.linalg.solve(eom.M, eom.J.T))
 
 
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
-    """(9) ζ: τ -> λ, from (8) A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ).
+    """Compute the affine map ζ from joint torques τ to contact forces λ.
 
-    Maps shape (d,), N·m, to (k,), N, world. λ is unique where J has full row rank k; elsewhere
-    (solo8 on four feet, corners of a flat foot) this is the smallest λ, as the pseudo-inverse has
-    it. Directions of motion that the contacts resolve worse than `CONSTRAINT_RANK_TOLERANCE` count
-    as not held, see `contact_space`. Source: [FBR], §2.2.1.
+    It solves A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ). λ is unique if J has full row rank k. Otherwise
+    (solo8 on four feet, or the corners of a flat foot) the map gives the λ of smallest norm, as the
+    pseudo-inverse does. Directions of motion that the contacts resolve worse than
+    `CONSTRAINT_RANK_TOLERANCE` count as unconstrained; see `contact_space`.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    Affine
+        ζ, from τ, shape (d,) [N·m], to λ, shape (k,), in world axes [N].
+
+    Notes
+    -----
+    [FBR]_, eq. (9). Eq. (8) is the linear system that ζ solves.
+
+    Examples
+    --------
+    >>> robot = fb.load("go2")
+    >>> eom = fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot))
+    >>> zeta = forces_from_torques(eom)
+    >>> forces = zeta(np.zeros(robot.d))
+    >>> forces.shape
+    (12,)
     """
     space = contact_space(eom)
-    # what forces must add to q̈ along the resolved rows: b - A M⁻¹ (S τ - h)
+    # the acceleration that forces must add along the resolved rows: b - A M⁻¹ (S τ - h)
     required_acceleration = Affine(
         -space.A @ np.linalg.solve(eom.M, eom.S), space.b + space.A @ np.linalg.solve(eom.M, eom.h)
     )
@@ -51,16 +89,48 @@ def forces_from_torques(eom: EquationsOfMotion) -> Affine:
 
 
 def accelerations_from_torques(eom: EquationsOfMotion) -> Affine:
-    """(14) η: τ -> q̈ = M⁻¹ (S τ + Jᵀ ζ(τ) - h), shape (d,) to (nv,). Right whether or not λ is
-    unique. Source: §3.
+    """Compute the affine map η from joint torques τ to the acceleration q̈.
+
+    η(τ) = M⁻¹ (S τ + Jᵀ ζ(τ) - h), with ζ of `forces_from_torques`. q̈ is unique even where λ is
+    not.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    Affine
+        η, from τ, shape (d,) [N·m], to q̈, shape (nv,) [m/s², rad/s²]: the base in its own frame,
+        then the joints.
+
+    Notes
+    -----
+    [FBR]_, eq. (14).
     """
     as_instance("eom", eom, EquationsOfMotion)
     return _acceleration_map(eom, Affine.identity(eom.d), forces_from_torques(eom))
 
 
 def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(10) C, shape (m, d + k), and its right-hand side b + A M⁻¹ h, shape (m,): C (τ, λ) = b + A
-    M⁻¹ h.
+    """Compute the matrix C and the right-hand side of C (τ, λ) = b + A M⁻¹ h.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    C : ndarray, shape (m, d + k)
+        C = [A M⁻¹ S, A M⁻¹ Jᵀ].
+    a : ndarray, shape (m,)
+        Right-hand side b + A M⁻¹ h [m/s², or rad/s² for angular rows].
+
+    Notes
+    -----
+    [FBR]_, eq. (10).
     """
     as_instance("eom", eom, EquationsOfMotion)
     C = np.hstack([eom.A @ np.linalg.solve(eom.M, eom.S), delassus_matrix(eom)])
@@ -68,15 +138,48 @@ def torque_force_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 
 def torque_force_space(eom: EquationsOfMotion) -> Affine:
-    """(11)(24) All (τ, λ) that go together: β -> C† a + V⊥ β, a = b + A M⁻¹ h, with blocks "tau"
-    and "forces".
+    """Compute the space of all pairs (τ, λ) that satisfy the equations of motion.
+
+    The pairs are C† a + V⊥ β with a = b + A M⁻¹ h and orthonormal V⊥, for every β.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    Affine
+        Map from β to (τ, λ), with blocks "tau", shape (d,) [N·m], and "forces", shape (k,), in
+        world axes [N].
+
+    Notes
+    -----
+    [FBR]_, eqs. (11), (24).
     """
     as_instance("eom", eom, EquationsOfMotion)
     return _orthonormalised(_torque_force_map(eom))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(12) B, shape (nv + m, nv + d + k), and (-h, b), with B (q̈, τ, λ) = (-h, b)."""
+    """Compute the matrix B and the right-hand side of B (q̈, τ, λ) = (-h, b).
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    B : ndarray, shape (nv + m, nv + d + k)
+        B = [[M, -S, -Jᵀ], [A, 0, 0]].
+    right_hand_side : ndarray, shape (nv + m,)
+        -h [N, N·m], followed by b [m/s², or rad/s² for angular rows].
+
+    Notes
+    -----
+    [FBR]_, eq. (12).
+    """
     as_instance("eom", eom, EquationsOfMotion)
     B = np.block([[eom.M, -eom.S, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.d + eom.k))]])
     return read_only(B), read_only(np.concatenate([-eom.h, eom.b]))
@@ -84,9 +187,21 @@ def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class FeasibleSpace(Value):
-    """(13)(16)(17) All (q̈, τ, λ) that satisfy (7), as the map β -> v + V⊥ β with orthonormal V⊥.
+    """The space of all (q̈, τ, λ) that satisfy the equations of motion, as the map β -> v + V⊥ β.
 
-    eom: the equations (7). map: `Affine` with blocks "qdd", "tau", "forces". Source: [FBR], §2.2.2.
+    The columns of V⊥ are orthonormal, and v is the point of smallest norm. Calling the object with
+    β gives the tuple (q̈, τ, λ).
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+    map : Affine
+        Map from β to the stacked (q̈, τ, λ), with blocks "qdd", "tau" and "forces".
+
+    Notes
+    -----
+    [FBR]_, eqs. (13), (16), (17).
     """
 
     _example = "fb.feasible_space(eom)"
@@ -95,29 +210,61 @@ class FeasibleSpace(Value):
 
     @property
     def dimension(self) -> int:
-        """Length of β: d + k - rank J; d where J has full rank."""
+        """Length of β, which is d + k - rank J, and d if J has full row rank."""
         return self.map.n_in
 
     @cached_property
     def qdd(self) -> Affine:
-        """(17) β -> q̈, (dimension,) to (nv,), m/s² and rad/s²: base in the base frame, then
-        joints.
+        """Map from β, shape (dimension,), to q̈, shape (nv,) [m/s², rad/s²].
+
+        The base part of q̈ is in the base frame; the joints follow.
+
+        Notes
+        -----
+        [FBR]_, eq. (17).
         """
         return self.map["qdd"]
 
     @cached_property
     def tau(self) -> Affine:
-        """(17) β -> τ, (dimension,) to (d,), N·m."""
+        """Map from β, shape (dimension,), to τ, shape (d,) [N·m].
+
+        Notes
+        -----
+        [FBR]_, eq. (17).
+        """
         return self.map["tau"]
 
     @cached_property
     def forces(self) -> Affine:
-        """(17) β -> λ, (dimension,) to (k,), N, world, ordered as the contacts' points."""
+        """Map from β, shape (dimension,), to λ, shape (k,), in world axes [N].
+
+        The forces are in the order of the contact points.
+
+        Notes
+        -----
+        [FBR]_, eq. (17).
+        """
         return self.map["forces"]
 
     def coordinates(self, qdd: npt.ArrayLike, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
-        """The β of a feasible (q̈, τ, λ), or of the feasible point nearest to one that is not;
-        shape (dimension,).
+        """Compute the coordinates β of a feasible (q̈, τ, λ).
+
+        For an infeasible (q̈, τ, λ), the result belongs to the nearest feasible point.
+
+        Parameters
+        ----------
+        qdd : array_like, shape (nv,)
+            Acceleration q̈ [m/s², rad/s²]: the base in its own frame, then the joints.
+        tau : array_like, shape (d,)
+            Joint torques τ [N·m, or N for prismatic joints].
+        forces : array_like, shape (k,) or (k / 3, 3)
+            Contact forces λ in world axes [N].
+
+        Returns
+        -------
+        ndarray, shape (dimension,)
+            Coordinates β.
         """
         eom = self.eom
         parts = [
@@ -128,17 +275,38 @@ class FeasibleSpace(Value):
         return self.map.A.T @ (np.concatenate(parts) - self.map.b)
 
     def __call__(self, beta: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """(q̈, τ, λ) at β, shape (dimension,)."""
+        """Return (q̈, τ, λ) at β, shape (dimension,)."""
         beta = as_array("beta", beta, (self.dimension,))
         return self.qdd(beta), self.tau(beta), self.forces(beta)
 
 
 def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
-    """(13) The space of all motions that the robot and its contacts allow at this state: v + V⊥ β.
+    """Compute the space v + V⊥ β of all (q̈, τ, λ) that the robot and its contacts allow.
 
-    The columns of V⊥ span the null space of B and v is its pseudo-inverse solution. They are found
-    from the resolved part of the contacts (`contact_space`): the same space as by the SVD of B, and
-    one of bounded numbers where J nearly loses rank.
+    The columns of V⊥ span the null space of B, and v is the pseudo-inverse solution. Both are
+    computed from the resolved part of the contacts; see `contact_space`. The result is the same
+    space as from the SVD of B, but its numbers stay bounded where J nearly loses rank.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    FeasibleSpace
+        The space with coordinates β.
+
+    Notes
+    -----
+    [FBR]_, eq. (13).
+
+    Examples
+    --------
+    >>> robot = fb.load("go2")
+    >>> eom = fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot))
+    >>> feasible_space(eom).dimension
+    12
     """
     as_instance("eom", eom, EquationsOfMotion)
     torque_force = _torque_force_map(eom)
@@ -152,36 +320,76 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
 
 
 def internal_forces(eom: EquationsOfMotion) -> Array:
-    """Forces between the contacts that move nothing once torques balance them: orthonormal columns
-    of null(J_bᵀ), (k, n).
+    """Compute the internal forces, which move nothing once joint torques balance them.
 
-    J_b holds the base columns of J. Such a λ is balanced by τ = -J_jᵀ λ, where J_j holds the joint
-    columns. n = k - rank J_b: 6 for four point feet. With a fixed base every λ is internal. Where J
-    has full rank torques can bring all of them about without moving anything: ζ answers -J_jᵀ λ
-    with λ. Where J loses rank (solo8 on four feet) the k - r directions of null(Jᵀ) are among them;
-    no torques can bring those about, which leaves rank J - rank J_b to torques.
+    They are null(J_bᵀ), where J_b holds the base columns of J. The torques τ = -J_jᵀ λ balance such
+    a λ, where J_j holds the joint columns of J. With a fixed base, every λ is internal.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    ndarray, shape (k, n)
+        Orthonormal columns that span the internal forces, with n = k - rank J_b. For four point
+        feet n = 6.
+
+    Notes
+    -----
+    If J has full row rank, torques can produce all internal forces without moving anything:
+    the change -J_jᵀ λ of the torques changes ζ(τ) by λ. If J loses rank (solo8 on four feet), the
+    k - rank J directions of null(Jᵀ) are among the internal forces. No torques can produce those,
+    which leaves rank J - rank J_b directions to the torques.
     """
     as_instance("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)
 
 
 def undetermined_forces(eom: EquationsOfMotion) -> Array:
-    """Forces that change nothing at all, orthonormal columns of null(Jᵀ), shape (k, k - rank J):
-    why λ may not be unique.
+    """Compute the contact forces without any effect, null(Jᵀ), which make λ non-unique.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    ndarray, shape (k, k - rank J)
+        Orthonormal columns that span these forces.
     """
     return contact_space(eom).null_forces
 
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Sizes, ranks and dimensions of (7) at one state, by singular values.
+    """Sizes, ranks and dimensions of the equations of motion at one state.
 
-    nv, d, k: lengths of q̈, τ, λ.
-    rank_J, rank_J_base: ranks of J and of its base columns J_b.
-    null_B, null_C: dimensions of the null spaces of (12) and (10), both d + k - rank J.
-    internal: dimension of null(J_bᵀ), of which torques choose internal - undetermined.
-    undetermined: dimension of null(Jᵀ).
-    rank_V_qdd: how many of the directions of β move the robot at all: d - rank J + rank J_b.
+    Parameters
+    ----------
+    nv : int
+        Length of q̈.
+    d : int
+        Length of τ.
+    k : int
+        Length of λ.
+    rank_J : int
+        Rank of J.
+    rank_J_base : int
+        Rank of J_b, the base columns of J.
+    null_B : int
+        Dimension of the null space of B, eq. (12), which is d + k - rank J.
+    null_C : int
+        Dimension of the null space of C, eq. (10), which is d + k - rank J.
+    internal : int
+        Dimension of null(J_bᵀ), the internal forces. Torques control `internal - undetermined` of
+        them.
+    undetermined : int
+        Dimension of null(Jᵀ), the forces without effect.
+    rank_V_qdd : int
+        Number of independent directions of β that change q̈, which is d - rank J + rank J_b.
     """
 
     nv: int
@@ -197,10 +405,21 @@ class Dimensions:
 
 
 def dimensions(eom: EquationsOfMotion) -> Dimensions:
-    """Counts every dimension of §2.2 at this state.
+    """Compute every size, rank and dimension of the equations of motion from singular values.
 
-    `contact_space` decides the rank of J. B and C are counted by their own singular values, with
-    the resolved rows and their forces in place of A and J; the dimension of null(Jᵀ) is added.
+    `contact_space` decides the rank of J. The null spaces of B and C come from their own singular
+    values, with the resolved rows and their forces in place of A and J. The dimension of null(Jᵀ)
+    is then added.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    Dimensions
+        The numbers at this state, as in section 2.2 of the course text.
     """
     as_instance("eom", eom, EquationsOfMotion)
     space = contact_space(eom)
@@ -223,7 +442,7 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
 
 
 def _torque_force_map(eom: EquationsOfMotion) -> Affine:
-    """(τ, z) -> (τ, λ): the smallest λ for τ, and any of the undetermined ones with it."""
+    """Compute the map (τ, z) -> (τ, λ): the smallest λ for τ plus undetermined forces."""
     minimum_norm, null_forces = forces_from_torques(eom), undetermined_forces(eom)
     tau = Affine.linear(np.eye(eom.d, eom.d + null_forces.shape[1]))
     return Affine.stack(
@@ -232,12 +451,12 @@ def _torque_force_map(eom: EquationsOfMotion) -> Affine:
 
 
 def _acceleration_map(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Affine:
-    """(4) q̈ = M⁻¹ (S τ + Jᵀ λ - h) of τ and λ that depend on something."""
+    """Compute q̈ = M⁻¹ (S τ + Jᵀ λ - h) for τ and λ that are maps of the same variable."""
     A = np.linalg.solve(eom.M, eom.S @ tau.A + eom.J.T @ forces.A)
     return Affine(A, np.linalg.solve(eom.M, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
 
 
 def _orthonormalised(f: Affine) -> Affine:
-    """The values of f as v + V⊥ β: V⊥ orthonormal, v the smallest of them."""
+    """Write the values of f as v + V⊥ β with orthonormal V⊥ and the smallest v."""
     V = np.linalg.qr(f.A)[0]
     return Affine(V, f.b - V @ (V.T @ f.b), f.blocks)

@@ -1,4 +1,4 @@
-"""Friction cones, polyhedra and the wrenches that a stance can produce (§4.2)."""
+"""Friction cones, their polyhedral approximations, and the wrenches that a stance can produce."""
 
 from floatbase.friction.cones import (
     Decomposition,

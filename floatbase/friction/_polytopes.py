@@ -1,8 +1,7 @@
-"""Geometry of cones and polytopes that `wrenches` needs: facets from rays, vertices from farthest
-points.
+"""Geometry of cones and polytopes: facets from rays, vertices from extreme points.
 
-qhull only says which rays or points belong to a facet; its numbers are computed again, so that its
-tolerances do not stay.
+qhull only determines which rays or points belong to a facet. The numbers are computed again, so
+that its tolerances do not remain.
 """
 
 from __future__ import annotations
@@ -21,27 +20,27 @@ from floatbase.qp._linear_programs import linear_program
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-# part of the size below which a set is flat, a point on a facet: above a linear program's rounding
+# of a friction polyhedron: they miss the cone by 5e-6 of μ, which is never known as accurately
+MAX_FACETS = 1000
+# fraction of the size below which a set is flat or a point lies on a facet: above a linear
+# program's rounding
 _FLATNESS_TOLERANCE = 1e-9
-# of looking for farther points; each adds one at least, and the stances of the course need about
-# ten
+# searches for farther points; each adds at least one, and the stances of the course need about ten
 _MAX_ROUNDS = 200
-_QHULL_TOLERANCE = 1e-8  # part of the size by which qhull's facets may miss the points on them
-# singular value, of the largest, below which rays are too nearly dependent to fix a facet
+_QHULL_TOLERANCE = 1e-8  # fraction of the size by which qhull's facets may miss their points
+# fraction of the largest singular value; below it, rays are too dependent to determine a facet
 _SLIVER_TOLERANCE = 1e-7
-_SAME_DIRECTION = 1e-6  # rad, normals nearer than this are one: qhull's triangles of one facet
-_DIGITS = 9  # to which the equations of qhull's triangles of one facet agree
+_SAME_DIRECTION = 1e-6  # rad, closer normals are one: qhull's triangles of one facet
+_DIGITS = 9  # digits to which the equations of qhull's triangles of one facet agree
 
 
 def cone_face_matrix(rays: Array) -> tuple[Array, Array]:
-    """The cone {Σ w_j ray_j, w ≥ 0} as rows: (G, E) with G x ≤ 0 and E x = 0, each row of unit
-    length.
+    """Return the cone {Σ w_j ray_j, w ≥ 0} as rows (G, E) of unit length with G x ≤ 0 and E x = 0.
 
-    rays: shape (n, N), one ray a column. E, shape (n - r, n), spans the directions that no ray
-        reaches, r being the rays'
-    rank. Where the cone contains whole lines G is zero along them. Source: facets of a cone are
-    facets of its cross-section, whose convex hull qhull finds (Barber, Dobkin, Huhdanpaa, The
-    Quickhull algorithm for convex hulls, 1996).
+    rays: shape (n, N), one ray per column. E, shape (n - r, n), spans the directions that no ray
+    reaches, where r is the rank of the rays. If the cone contains whole lines, G is zero along
+    them. The facets of a cone are the facets of its cross-section, whose convex hull qhull finds
+    (Barber, Dobkin, Huhdanpaa, The Quickhull algorithm for convex hulls, 1996).
     """
     rays = rays / np.linalg.norm(rays, axis=0)  # length does not matter in a cone
     span, E = _span(rays)
@@ -55,16 +54,13 @@ def cone_face_matrix(rays: Array) -> tuple[Array, Array]:
 
 
 def polytope_vertices(support_point: Callable[[Array], Array], n: int, size: float) -> Array:
-    """The vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n), from its farthest
-    points.
+    """Return the vertices of a bounded convex polytope in R^n, n ≤ 3, shape (k, n).
 
-    support_point: direction (n,) -> a point of the set with the largest direction · x. size: a
-        length of the set; 1e-9 of it
-    counts as zero. The hull of the known points grows at each of its facets until no point lies
-    beyond any: the answer is exact. In the plane the vertices come counter-clockwise. A flat set
-    gives one point, the two ends of a segment, or a polygon in space.
-    Source: Bretl and Lall, Testing static equilibrium for legged robots, IEEE Transactions on
-    Robotics, 2008.
+    support_point: function that maps a direction, shape (n,), to a point of the set with the
+    largest direction · x. size: a length of the set; 1e-9 of it counts as zero. The convex hull of
+    the known points grows at each of its facets until no point lies beyond any of them, so the
+    answer is exact. In the plane the vertices are in counter-clockwise order. A flat set gives one
+    point, the two ends of a segment, or a polygon in space. The method is that of [BretlLall2008]_.
     """
     tolerance = _FLATNESS_TOLERANCE * size
     basis, points = _affine_hull(support_point, n, tolerance)
@@ -86,22 +82,21 @@ def polytope_vertices(support_point: Callable[[Array], Array], n: int, size: flo
             return origin + flat[_hull_vertices(hull, flat, normals, offsets, tolerance)] @ basis.T
         flat = np.vstack([flat[hull.vertices], candidates[beyond]])
     raise SolverError(
-        f"the vertices of a polytope were not all found in {_MAX_ROUNDS} rounds; {len(flat)} are "
-        f"known."
+        f"Only {len(flat)} vertices of a polytope were found in {_MAX_ROUNDS} rounds, and some are "
+        f"missing."
     )
 
 
 def _span(rays: Array) -> tuple[Array, Array]:
-    """Orthonormal bases of what the rays span, shape (n, r), and of the rest, as rows, shape (n -
-    r, n).
-    """
+    """Return orthonormal bases of the rays' span, (n, r), and its complement, (n - r, n)."""
     U, _, _, rank = svd_with_rank(rays)
     return U[:, :rank], U[:, rank:].T
 
 
 def _supporting_direction(rays: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """A c with c · ray ≥ 0 for every ray, = 0 only for rays on lines of the cone, and which these
-    are.
+    """Return a c with c · ray ≥ 0 for all rays, and which rays lie on lines of the cone.
+
+    c · ray = 0 only for the rays on lines.
     """
     n, N = rays.shape
     result = linear_program(
@@ -113,7 +108,10 @@ def _supporting_direction(rays: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
 
 
 def _pointed_face_matrix(rays: Array, c: Array) -> Array:
-    """Rows of a pointed cone of full dimension, shape (facets, n); c · ray > 0 for all rays."""
+    """Return the rows of a full-dimensional pointed cone, shape (facets, n).
+
+    c · ray > 0 for all rays.
+    """
     n = len(rays)
     if n == 0:
         return np.zeros((0, 0))
@@ -134,8 +132,9 @@ def _pointed_face_matrix(rays: Array, c: Array) -> Array:
 
 
 def _facet_through(rays: Array, chosen: list[int]) -> Array | None:
-    """The unit row that is 0 on the rays chosen and ≤ 0 on the others; None where they do not fix
-    it (a sliver).
+    """Return the unit row that is 0 on the chosen rays and ≤ 0 on the others.
+
+    Returns None if the chosen rays do not determine the row (a sliver).
     """
     U, s, _ = np.linalg.svd(rays[:, chosen])
     if np.sum(s > _SLIVER_TOLERANCE * s[0]) != len(rays) - 1:
@@ -148,8 +147,9 @@ def _facet_through(rays: Array, chosen: list[int]) -> Array | None:
 def _affine_hull(
     support_point: Callable[[Array], Array], n: int, tolerance: float
 ) -> tuple[Array, Array]:
-    """An orthonormal basis of the directions in which the set extends, shape (n, r), and points
-    that show it.
+    """Return an orthonormal basis, (n, r), of the directions in which the set extends, and points.
+
+    The points are those found in these directions.
     """
     basis, flat, points = np.zeros((n, 0)), np.zeros((n, 0)), []
     while basis.shape[1] + flat.shape[1] < n:
@@ -166,25 +166,27 @@ def _affine_hull(
         else:
             step -= basis @ (basis.T @ step)
             basis = np.hstack([basis, (step / np.linalg.norm(step))[:, None]])
-    # the plane's own axes where nothing is flat, so that counter-clockwise stays so
+    # the original axes if the set is not flat, so that the order stays counter-clockwise
     return np.eye(n) if basis.shape[1] == n else basis, np.array(points)
 
 
 def _hull(points: Array) -> ConvexHull:
-    from scipy.spatial import ConvexHull, QhullError  # slow to load, and no controller needs it
+    """Return qhull's convex hull of points."""
+    from scipy.spatial import ConvexHull, QhullError  # slow to load; no controller needs it
 
     try:
         return ConvexHull(points)
     except QhullError as error:
         raise SolverError(
-            f"qhull found no hull of {len(points)} points in R^{points.shape[1]}: {error}"
+            f"qhull cannot compute the convex hull of {len(points)} points in R^{points.shape[1]}: "
+            f"{error}"
         ) from None
 
 
 def _hull_vertices(
     hull: ConvexHull, points: Array, normals: Array, offsets: Array, tolerance: float
 ) -> list[int]:
-    """Which points are vertices: those where facets of enough different directions meet."""
+    """Return the indices of the vertices: points where facets of enough directions meet."""
     indices: list[int] = []
     for i in hull.vertices:
         facet_normals = normals[np.abs(normals @ points[i] + offsets) <= tolerance]

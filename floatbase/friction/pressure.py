@@ -1,6 +1,4 @@
-"""Where the ground pushes: centre of pressure, and the wrench that a sole's corners make (note 9 of
-the course text).
-"""
+"""Centre of pressure and total wrench of contact forces."""
 
 from __future__ import annotations
 
@@ -16,59 +14,94 @@ from floatbase.robots import State
 def contact_wrench(
     state: State, contacts: Contacts, forces: npt.ArrayLike, reference_point: npt.ArrayLike
 ) -> Array:
-    """Σ f_i and Σ (x_i - reference_point) × f_i of contact forces, shape (6,), N and N·m, world:
-    (20) and (21) about any point.
+    """Return the total force and moment of contact forces about a point.
 
-    state: where the robot is.
-    contacts: those whose forces are summed; `contacts.only("left_sole_link")` for one sole.
-    forces: λ of these contacts, shape (k,) or (k / 3, 3), N, world.
-    reference_point: shape (3,), m, world, such as the middle of a sole,
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts whose forces are summed, such as `contacts.only("left_sole_link")` for one sole.
+    forces : array_like, shape (k,) or (k / 3, 3)
+        Forces λ of these contacts in the world frame [N].
+    reference_point : array_like, shape (3,)
+        Point about which the moment is taken, in the world frame [m], such as the middle of a sole,
         `state.point("left_sole_link")`.
 
-    Four corners have twelve numbers and make six: what is left of their forces, null of this map,
-    nobody can measure by the motion of a rigid sole. Raises `InputError` for contacts whose forces
-    do not act at points.
+    Returns
+    -------
+    ndarray, shape (6,)
+        Force Σ f_i [N] and moment Σ (x_i - reference_point) × f_i [N·m], in world axes.
+
+    Raises
+    ------
+    InputError
+        If forces of the contacts do not act at points.
+
+    Notes
+    -----
+    These are eqs. (20) and (21) about any point. The four corner forces of a sole have twelve
+    components but only six effects on the robot. The remaining six components lie in the null space
+    of this map, so the motion of a rigid sole does not reveal them.
     """
     points, flat = _points_and_forces(state, contacts, forces)
-    return read_only(grasp_matrix(points, reference_point) @ flat)  # type: ignore[arg-type]  # it is checked there
+    return read_only(grasp_matrix(points, reference_point) @ flat)  # type: ignore[arg-type]  # grasp_matrix checks it
 
 
 def centre_of_pressure(state: State, contacts: Contacts, forces: npt.ArrayLike) -> Array:
-    """Σ (n_i · f_i) x_i / Σ n_i · f_i: the mean of the contact points, weighted by their normal
-    forces, shape (3,), m, world.
+    """Return the centre of pressure of contact forces.
 
-    About it the forces of a sole have no tangential moment: from the wrench (f, τ) about a point x
-    on a level sole it is x + (-τ_y, τ_x, 0) / f_z. Of all contacts on level ground it is the
-    zero-moment point (ZMP). It is inside the convex hull of the points as long as none of them
-    pulls.
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts that are taken together, such as `contacts.only("left_sole_link")` for one sole.
+    forces : array_like, shape (k,) or (k / 3, 3)
+        Forces λ of these contacts in the world frame [N].
 
-    state, contacts, forces: as for `contact_wrench`.
+    Returns
+    -------
+    ndarray, shape (3,)
+        Mean of the contact points weighted by their normal forces, Σ (n_i · f_i) x_i / Σ n_i · f_i,
+        in the world frame [m].
 
-    Raises `InputError` where the normal forces add up to none. Source: Sardain and Bessonnet,
-    Forces acting on a biped robot: center of pressure - zero moment point, 2004.
+    Raises
+    ------
+    InputError
+        If forces of the contacts do not act at points, or if the normal forces do not add up to a
+        positive number.
+
+    Notes
+    -----
+    About this point, the forces of a sole have no tangential moment. If the wrench about a point x
+    of a level sole is (f, τ), the centre of pressure is x + (-τ_y, τ_x, 0) / f_z. For all contacts
+    on level ground it is the zero-moment point (ZMP) [Vukobratovic2004]_. It lies in the convex
+    hull of the points as long as none of them pulls. See also Sardain and Bessonnet, Forces acting
+    on a biped robot: center of pressure - zero moment point, 2004.
     """
     points, flat = _points_and_forces(state, contacts, forces)
     normal = np.sum(contacts.normals * flat.reshape(-1, 3), axis=1)
     total = float(normal.sum())
     if not total > _MIN_TOTAL_FORCE:
         raise InputError(
-            f"the normal forces add up to {total:g} N; without pressure there is no centre of "
-            f"pressure."
+            f"The normal forces add up to {total:g} N. A centre of pressure exists only if the "
+            f"sum is positive."
         )
     return read_only(normal @ points / total)
 
 
-_MIN_TOTAL_FORCE = 1e-9  # N: rounding of forces that carry nothing
+_MIN_TOTAL_FORCE = 1e-9  # N: rounding of forces that are zero
 
 
 def _points_and_forces(
     state: State, contacts: Contacts, forces: npt.ArrayLike
 ) -> tuple[Array, Array]:
-    """Where the forces act, (n, 3), and the forces, (3 n,)."""
+    """Return where the forces act, (n, 3), and the forces, (3 n,)."""
     as_instance("contacts", contacts, Contacts)
     if contacts.k != 3 * contacts.n_points:
         raise InputError(
-            f"the forces of {contacts!r} do not all act at points: choose those that do, "
-            f"contacts.only(…)."
+            f"Not all forces of {contacts!r} act at points. Select the contacts whose forces do "
+            f"with contacts.only(…)."
         )
     return contacts.positions(as_instance("state", state, State)), as_forces(forces, contacts.k)

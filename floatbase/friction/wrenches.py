@@ -1,17 +1,14 @@
-"""The wrenches that a stance can produce: the sum of its friction cones (28) by (20) and (21), and
-slices of it.
+"""The set of wrenches that a stance can produce: the sum of its friction cones, and slices of it.
 
-A wrench is w = (f_c, τ_c), shape (6,): the total contact force, N, and its moment about the centre
-of mass, N·m, both in world axes: τ_c = Σ (x_i - x_c) × f_i.
-
-Sources: [FBR], §3.1 and §4.2; Caron, Pham and Nakamura, Leveraging cone double description for
-multi-contact stability of humanoids, RSS 2015.
+A wrench is w = (f_c, τ_c), shape (6,): the total contact force [N] and its moment about the centre
+of mass [N·m], both in world axes, with τ_c = Σ (x_i - x_c) × f_i. Sources: [FBR]_, §3.1 and §4.2;
+[Caron2015]_.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,6 +22,7 @@ from floatbase._validation import (
     as_integer,
     as_positive,
     cached_property,
+    checked,
     numeric_copy,
     read_only,
 )
@@ -35,72 +33,85 @@ from floatbase.friction.cones import FrictionPolyhedron
 from floatbase.qp._linear_programs import INFEASIBLE, UNBOUNDED, linear_program
 from floatbase.robots import State
 
-# N, by which `contains` lets contact forces pass their facets: what a linear program leaves
+# N, by which `contains` lets contact forces exceed their facets: a linear program's residual
 TOLERANCE = 1e-6
-_MAX_DIRECTIONS = 3600  # a tenth of a degree apart; each takes a linear program
+_MAX_DIRECTIONS = 3600  # a tenth of a degree apart; each needs a linear program
 
 
 @dataclass(frozen=True, eq=False)
 class WrenchSet(Value):
-    """(20)(21)(28) All wrenches Σ_i (f_i, (x_i - x_c) × f_i), f_i in its friction polyhedron: the
-    contact wrench cone (CWC).
+    """Contact wrench cone: all wrenches that a stance can produce within its friction polyhedra.
 
-    `wrench_set` makes it from a state and its contacts. The torque limits of the joints do not
-    enter.
+    The set is {Σ_i (f_i, (x_i - x_c) × f_i)} with each f_i in its polyhedron. `wrench_set` makes it
+    from a state and its contacts. Torque limits of the joints are not included.
 
-    points: x_i, shape (P, 3), m, world.
-    cones: a `FrictionPolyhedron` for each point.
-    reference_point: x_c, shape (3,), m, world.
-    weight: of the robot, N; (0, 0, weight) is the force that `moment_vertices` and `support_region`
-        assume.
-    max_normal_force: shape (P,), N, +inf where there is no limit. Without limits the set is a cone;
-        with a limit on every point it is bounded.
+    Parameters
+    ----------
+    points : array_like, shape (P, 3)
+        Contact points x_i in the world frame [m].
+    cones : sequence of FrictionPolyhedron
+        One polyhedron for each point.
+    reference_point : array_like, shape (3,)
+        Reference point x_c of the moments in the world frame [m].
+    weight : float
+        Weight of the robot [N]. `moment_vertices` and `support_region` assume the force (0, 0,
+        weight).
+    max_normal_force : array_like, shape (P,)
+        Limit of the normal force at each point, +inf for none [N]. Without limits the set is a
+        cone; with a limit at every point it is bounded.
+
+    Raises
+    ------
+    InputError
+        If there is no point, if the numbers of points, cones and limits differ, or if a limit is
+        not positive.
+
+    Notes
+    -----
+    [FBR]_, eqs. (20), (21), (28). The contact wrench cone is described in [Caron2015]_.
     """
 
-    points: Array
+    points: Array = field(metadata=checked(as_array, (None, 3), "m"))
     cones: tuple[FrictionPolyhedron, ...]
-    reference_point: Array
-    weight: float
+    reference_point: Array = field(metadata=checked(as_array, (3,), "m"))
+    weight: float = field(metadata=checked(as_positive, "N"))
     max_normal_force: Array
 
     def __post_init__(self) -> None:
-        points = as_array("points", self.points, (None, 3), "m")
-        cones = tuple(self.cones) if isinstance(self.cones, Sequence) else ()
+        super().__post_init__()
+        points, cones = self.points, self.cones
+        cones = tuple(cones) if isinstance(cones, Sequence) else ()
         if not len(points):
             raise InputError(
-                "a wrench set needs at least one contact point; a robot in the air can produce no "
-                "wrench."
+                "points is empty. A wrench set needs at least one contact point; a robot in the "
+                "air cannot produce a wrench."
             )
         if len(cones) != len(points) or not all(
             isinstance(cone, FrictionPolyhedron) for cone in cones
         ):
             raise InputError(
-                f"cones must hold one FrictionPolyhedron for each of the {len(points)} points."
+                f"cones must contain one FrictionPolyhedron for each of the {len(points)} points."
             )
-        object.__setattr__(self, "points", points)
         object.__setattr__(self, "cones", cones)
-        object.__setattr__(
-            self, "reference_point", as_array("reference_point", self.reference_point, (3,), "m")
-        )
-        object.__setattr__(self, "weight", as_positive("weight", self.weight, "N"))
         limits = numeric_copy(self.max_normal_force)  # +inf is allowed
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
-            count = f"one number > 0 or {len(points)} of them, one for each contact point (N)"
-            raise InputError(f"max_normal_force must be {count}.")
+            raise InputError(
+                f"max_normal_force must be one number > 0, or {len(points)} of them, one for each "
+                f"contact point [N]."
+            )
         object.__setattr__(self, "max_normal_force", read_only(limits))
 
     @cached_property
     def max_lever_arm(self) -> float:
-        """The largest distance of a point from x_c, m (1 where all are 0): torque / max_lever_arm
-        is comparable to force.
+        """Largest distance of a point from x_c [m], or 1 if all are zero.
+
+        A torque divided by it is comparable to a force.
         """
         return float(np.max(np.linalg.norm(self.points - self.reference_point, axis=1))) or 1.0
 
     @cached_property
     def rays(self) -> Array:
-        """The edges of all cones as wrenches, shape (6, N), point after point, each with normal
-        component 1 N.
-        """
+        """Edges of all cones as wrenches, shape (6, N), each with normal component 1 N."""
         parts = [
             grasp_matrix(x[None], self.reference_point) @ cone.rays.T
             for x, cone in zip(self.points, self.cones, strict=True)
@@ -109,33 +120,36 @@ class WrenchSet(Value):
 
     @cached_property
     def face_matrix(self) -> Array:
-        """Facets of the set, (m, 6): face_matrix @ w ≤ 0, beside equalities @ w = 0. Empty where
-        every wrench is produced.
+        """Facets of the set, shape (m, 6): face_matrix @ w ≤ 0, together with equalities @ w = 0.
 
-        A row (a, b) has ‖a‖² + ‖max_lever_arm b‖² = 1, so face_matrix @ w is in N. `InputError` for
-        a set with limits on the normal force.
+        It is empty if every wrench can be produced. A row (a, b) has ‖a‖² + ‖max_lever_arm b‖² = 1,
+        so face_matrix @ w is in N. A set with limits on the normal force raises `InputError`.
         """
         return self._halfspaces[0]
 
     @cached_property
     def equalities(self) -> Array:
-        """What no contact force can produce, shape (m, 6): equalities @ w = 0, scaled as
-        `face_matrix`.
+        """Directions that no contact force can produce, shape (m, 6): equalities @ w = 0.
 
-        Two point feet cannot twist about the line through them (1 row), one foot makes no torque
-        about itself (3 rows).
+        The scaling is that of `face_matrix`. Two point feet cannot produce a moment about the line
+        through them (1 row). One point foot produces no moment about itself (3 rows).
         """
         return self._halfspaces[1]
 
     def margin(self, wrench: npt.ArrayLike) -> float:
-        """How far inside its facets every contact force can be, N, when together they make the
-        wrench.
+        """Return how far inside their facets all contact forces can be when they make a wrench.
 
-        wrench: shape (6,), world: force, N, then moment about `reference_point`, N·m.
+        Parameters
+        ----------
+        wrench : array_like, shape (6,)
+            Force [N], then moment about `reference_point` [N·m], in world axes.
 
-        The largest t for which there are f_i with margin ≥ t each, and t below the normal force's
-        limit. -inf where no forces make the wrench (see `equalities`), +inf where contacts that
-        face each other can be squeezed as hard as one likes.
+        Returns
+        -------
+        float
+            The largest t for which forces f_i exist with margin ≥ t each, and at least t below the
+            limit of the normal force [N]. It is -inf if no forces make the wrench (see
+            `equalities`), and +inf if contacts that face each other can be squeezed without limit.
         """
         w = as_array("wrench", wrench, (6,))
         scale = float(np.linalg.norm(self._wrench_scaling @ w)) or self.weight
@@ -155,23 +169,48 @@ class WrenchSet(Value):
         return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
 
     def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Whether contact forces that pass their facets and limits by a tolerance, N, at most make
-        the wrench, shape (6,).
+        """Return whether contact forces can make a wrench.
+
+        Parameters
+        ----------
+        wrench : array_like, shape (6,)
+            Force [N], then moment about `reference_point` [N·m], in world axes.
+        tolerance : float, optional
+            Amount by which the forces may at most exceed their facets and limits [N].
+
+        Returns
+        -------
+        bool
+            True if such forces exist.
         """
         return self.margin(wrench) >= -as_positive("tolerance", tolerance, "N", allow_zero=True)
 
     def max_scaling(self, direction: npt.ArrayLike, start: npt.ArrayLike | None = None) -> float:
-        """The largest s with start + s · direction in the set: how hard the stance can push in just
-        this direction.
+        """Return the largest s for which start + s · direction lies in the set.
 
-        direction, start: wrenches of shape (6,); start is 0 by default, (0, 0, weight, 0, 0, 0)
-            while the weight is carried.
-        +inf where there is no end, negative where the set lies behind. Raises `InfeasibleError`
-        when the line misses it.
+        This is how hard the stance can push in one direction.
+
+        Parameters
+        ----------
+        direction : array_like, shape (6,)
+            Wrench: force [N], then moment [N·m], in world axes.
+        start : array_like, shape (6,), optional
+            Wrench at s = 0: force [N], then moment [N·m], in world axes. The default is zero; (0,
+            0, weight, 0, 0, 0) means that the weight is carried.
+
+        Returns
+        -------
+        float
+            The scaling s [-]: +inf if there is no limit, negative if the set lies behind `start`.
+
+        Raises
+        ------
+        InfeasibleError
+            If the line misses the set.
         """
         d = as_array("direction", direction, (6,))
         if not np.any(d):
-            raise InputError("direction is the zero wrench; it must have a direction.")
+            raise InputError("direction is the zero wrench. It must be non-zero.")
         w = as_array("start", np.zeros(6) if start is None else start, (6,))
         N, scale = self.rays.shape[1], float(np.linalg.norm(self._wrench_scaling @ d))
         result = linear_program(
@@ -184,20 +223,33 @@ class WrenchSet(Value):
             [(0.0, None)] * N + [(None, None)],
         )
         if result.status == INFEASIBLE:
-            raise InfeasibleError(
-                "no wrench start + s · direction can be produced, however large or small s is."
-            )
+            raise InfeasibleError("The contacts cannot produce start + s · direction for any s.")
         return np.inf if result.status == UNBOUNDED else -float(result.fun) / scale
 
     def max_horizontal_forces(self, n: int = 72) -> tuple[Array, Array]:
-        """The largest horizontal force that goes with the full weight and no moment about the CoM,
-        in each of n directions.
+        """Return the largest horizontal forces, in n directions, with full weight and no moment.
 
-        Angles, shape (n,), rad, from the world's x axis towards y, evenly spaced, and forces, shape
-        (n,), N: `max_scaling` of that direction from (0, 0, weight, 0, 0, 0). Over `weight` they
-        are the parts of g by which the CoM can be accelerated; facets and the height of the CoM end
-        them. +inf where there is no end. Raises `InfeasibleError` where the contacts cannot carry
-        the weight without moment.
+        The moment is about `reference_point`, which is the centre of mass if `wrench_set` made the
+        set.
+
+        Parameters
+        ----------
+        n : int, optional
+            Number of directions.
+
+        Returns
+        -------
+        angles : ndarray, shape (n,)
+            Directions from the world's x axis towards y, evenly spaced [rad].
+        forces : ndarray, shape (n,)
+            `max_scaling` of each direction from (0, 0, weight, 0, 0, 0) [N], +inf if there is no
+            limit. Divided by `weight`, they are the largest accelerations of the centre of mass as
+            fractions of g. They are limited by the facets and by the height of the centre of mass.
+
+        Raises
+        ------
+        InfeasibleError
+            If the contacts cannot carry the weight without a moment.
         """
         angles = (
             2.0 * np.pi * np.arange(as_integer("number of directions n", n, 1, _MAX_DIRECTIONS)) / n
@@ -205,7 +257,7 @@ class WrenchSet(Value):
         weight_wrench = np.array([0.0, 0.0, self.weight, 0.0, 0.0, 0.0])
         if not self.contains(weight_wrench):
             raise InfeasibleError(
-                "these contacts cannot carry the weight without a moment about the centre of mass."
+                "The contacts cannot carry the weight without a moment about reference_point."
             )
         forces = [
             self.max_scaling([np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0, 0.0], weight_wrench)
@@ -214,13 +266,25 @@ class WrenchSet(Value):
         return read_only(angles), read_only(forces)
 
     def moment_vertices(self, force: npt.ArrayLike | None = None) -> Array:
-        """The slice at a total force: vertices, shape (k, 3), N·m, of the torques τ_c that can go
-        with it.
+        """Return the vertices of the moments τ_c that are possible with a given total force.
 
-        force: f_c, shape (3,), N, world; by default (0, 0, weight), which carries the robot. No
-            rows when no contact forces
-        add up to it. Raises `InputError` when the slice has no end, as where walls that face each
-        other can be squeezed.
+        Parameters
+        ----------
+        force : array_like, shape (3,), optional
+            Total force f_c in the world frame [N]. The default is (0, 0, weight), which carries the
+            robot.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            Vertices of this slice of the set, in world axes [N·m]. There are no rows if no contact
+            forces add up to the force.
+
+        Raises
+        ------
+        InputError
+            If the slice is unbounded, for example because walls that face each other can be
+            squeezed.
         """
         f = as_array("force", (0.0, 0.0, self.weight) if force is None else force, (3,), "N")
         return self._slice(
@@ -228,14 +292,26 @@ class WrenchSet(Value):
         )
 
     def support_region(self) -> Array:
-        """Where the CoM may be for the robot to stand still: vertices of a polygon, shape (k, 2),
-        m, world x and y.
+        """Return the horizontal positions of the CoM at which the robot can stand still.
 
-        All horizontal positions c for which forces in the polyhedra carry the weight without torque
-        about c; its height and `reference_point` do not matter. The vertices come
-        counter-clockwise; on level ground they are those of the feet. Two rows are a segment, one
-        is a point, none says that the stance cannot carry the weight. Raises `InputError` when it
-        has no end.
+        Returns
+        -------
+        ndarray, shape (k, 2)
+            Vertices of a polygon in the world's x and y [m], in counter-clockwise order. Two rows
+            are a segment, and one row is a point. No rows mean that the stance cannot carry the
+            weight.
+
+        Raises
+        ------
+        InputError
+            If the region is unbounded.
+
+        Notes
+        -----
+        The region contains every c for which forces in the polyhedra carry the weight without a
+        moment about c. It does not depend on the height of the CoM or on `reference_point`. On
+        level ground it is the support polygon, the convex hull of the feet. The method is that of
+        [BretlLall2008]_.
         """
         origin = self.points.mean(axis=0)
         rays = np.vstack(
@@ -244,27 +320,27 @@ class WrenchSet(Value):
                 self.rays[3:] + np.cross(self.reference_point - origin, self.rays[:3].T).T,
             ]
         )
-        # (c - origin) × (0, 0, weight) = (weight c_y, -weight c_x, 0) must be the moment about the
-        # origin
+        # the moment about the origin must be (c - origin) × (0, 0, weight), which is
+        # (weight c_y, -weight c_x, 0)
         places = np.array([-rays[4], rays[3]]) / self.weight
         carried = np.array([0.0, 0.0, self.weight, 0.0])
         size = float(np.max(np.linalg.norm(self.points - origin, axis=1))) or 1.0
         return read_only(origin[:2] + self._slice(places, rays[[0, 1, 2, 5]], carried, size))
 
     def _slice(self, values: Array, fixed: Array, at: Array, size: float) -> Array:
-        """Vertices of {values @ x : fixed @ x = at, x ≥ 0 within the limits}, shape (k, n)."""
+        """Return the vertices of {values @ x : fixed @ x = at, x ≥ 0 within limits}, (k, n)."""
         scale = float(np.linalg.norm(at)) or self.weight
         limits = self._limit_inequalities(0, scale)
 
         def support_point(direction: Array) -> Array:
             result = linear_program(-(direction @ values), (fixed, at / scale), limits)
             if result.status == UNBOUNDED:
-                endless = "contacts can be squeezed against each other without limit"
                 raise InputError(
-                    f"this slice of the wrench set has no end: {endless}. Give max_normal_force."
+                    "This slice of the wrench set is unbounded, since contacts can be squeezed "
+                    "against each other without limit. Set max_normal_force."
                 )
             if result.status == INFEASIBLE:
-                raise InfeasibleError("no contact forces add up to the requested force.")
+                raise InfeasibleError("No contact forces add up to the requested force.")
             point: Array = scale * (values @ result.x)
             return point
 
@@ -275,12 +351,12 @@ class WrenchSet(Value):
 
     @cached_property
     def _wrench_scaling(self) -> Array:
-        """Divides torques by `max_lever_arm`, shape (6, 6)."""
+        """Matrix that divides torques by `max_lever_arm`, shape (6, 6)."""
         return np.diag(np.repeat([1.0, 1.0 / self.max_lever_arm], 3))
 
     @cached_property
     def _force_inequalities(self) -> tuple[Array, Array]:
-        """Facets and limits of all points on (λ, t): every slack at least t."""
+        """Facets and limits of all points as inequalities on (λ, t): every slack is at least t."""
         rows, h = [], []
         for at, cone, limit in zip(
             np.eye(len(self.points)), self.cones, self.max_normal_force, strict=True
@@ -297,8 +373,9 @@ class WrenchSet(Value):
     def _limit_inequalities(
         self, extra_columns: int, scale: float = 1.0
     ) -> tuple[Array, Array] | None:
-        """Limits of the normal force on the weights of the rays, `extra_columns` columns of zeros
-        after them; N / scale.
+        """Return the limits of the normal force as inequalities on the weights of the rays.
+
+        They are in N divided by `scale`, and `extra_columns` columns of zeros follow the weights.
         """
         limited = np.isfinite(self.max_normal_force)
         if not np.any(limited):
@@ -312,11 +389,11 @@ class WrenchSet(Value):
 
     @cached_property
     def _halfspaces(self) -> tuple[Array, Array]:
+        """Facets and equalities of the cone, both scaled."""
         if np.any(np.isfinite(self.max_normal_force)):
             raise InputError(
-                "face_matrix describes the cone of a stance without limits on the normal force; "
-                "make the set without "
-                "max_normal_force, or ask contains and margin."
+                "face_matrix exists only for a stance without limits on the normal force. Make the "
+                "set without max_normal_force, or use contains and margin."
             )
         G, E = cone_face_matrix(self._wrench_scaling @ self.rays)
         return read_only(G @ self._wrench_scaling), read_only(E @ self._wrench_scaling)
@@ -331,23 +408,52 @@ def wrench_set(
     facet_rotation: float = 0.0,
     max_normal_force: npt.ArrayLike | None = None,
 ) -> WrenchSet:
-    """(20)(21)(28) The wrenches about the centre of mass that a state's contacts can produce.
+    """Return the wrenches about the centre of mass that the contacts of a state can produce.
 
-    state: where the robot is.
-    contacts: its contacts, each with a friction cone.
-    facets, inner_approximation, facet_rotation: the friction polyhedron of every point (see
-        `FrictionPolyhedron`); by default the controller's.
-    max_normal_force: N, one number or one for each contact point; no limit by default.
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts of the robot, each with a friction cone.
+    facets : int, optional
+        Number of facets of the friction polyhedron of every point. The defaults of this argument
+        and the next two are those of the controller.
+    inner_approximation : bool, optional
+        Whether the polyhedra lie inside the friction cones, see `FrictionPolyhedron`.
+    facet_rotation : float, optional
+        Angle by which the facets are rotated about the normal [rad].
+    max_normal_force : float or array_like, shape (P,), optional
+        Limit of the normal force, one number or one for each contact point [N]. The default is no
+        limit.
 
-    Raises `InputError` where there is no contact, or one whose forces have no cone. Source: [FBR],
-    §3.1, §4.2.
+    Returns
+    -------
+    WrenchSet
+        The wrenches.
+
+    Raises
+    ------
+    InputError
+        If there is no contact, or if the forces of a contact have no cone.
+
+    Notes
+    -----
+    [FBR]_, eqs. (20), (21), (28).
+
+    Examples
+    --------
+    >>> state = fb.load("go2").standing()
+    >>> stance = wrench_set(state, fb.Contacts.points(state.robot))
+    >>> stance.contains([0.0, 0.0, stance.weight, 0.0, 0.0, 0.0])
+    True
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)
     without_cone = [c.name for c in contacts if not isinstance(c, FrictionContact)]
     if without_cone:
         raise InputError(
-            f"{', '.join(without_cone)} has forces without a cone; leave it out: "
+            f"Contacts without a friction cone: {', '.join(without_cone)}. Leave them out with "
             f"contacts.without(…)."
         )
     point_data = zip(contacts.normals, contacts.mus, strict=True)

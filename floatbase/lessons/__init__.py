@@ -1,6 +1,4 @@
-"""What the lessons share: predictions, exercises that check themselves, panels that do not block
-the kernel, controllers.
-"""
+"""Shared parts of the lessons: predictions, exercises, slider panels and simple controllers."""
 
 import os
 from importlib import import_module
@@ -9,13 +7,8 @@ from typing import TYPE_CHECKING, Any
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
-from floatbase.lessons.exercises import (
-    NumericJudge,
-    all_exercises,
-    check,
-    reveal,
-    show_progress,
-)
+from floatbase.lessons.exercises import all_exercises, check, reveal, show_progress
+from floatbase.lessons.judges import NumericJudge
 from floatbase.lessons.predictions import compare, predict, review
 from floatbase.lessons.rounding import rounded
 
@@ -31,7 +24,7 @@ if TYPE_CHECKING:
     )
     from floatbase.lessons.submission import hand_in
 
-# imported at first use: they load physics and pictures
+# imported on first use, because they load the physics and the viewer
 _LAZY = {
     "hand_in": "submission",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
@@ -95,4 +88,4 @@ def __getattr__(name: str) -> Any:
 
 
 if os.environ.get("FLOATBASE_VIEWER") == "site":
-    import_module("floatbase.lessons.static_export")  # tells viewers how they display themselves
+    import_module("floatbase.lessons.static_export")  # registers how viewers display themselves

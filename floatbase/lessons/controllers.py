@@ -1,6 +1,4 @@
-"""Controllers of the lessons: constant torques, a servo in every joint, and one whose QP somebody
-else solves.
-"""
+"""Controllers of the lessons: constant torques, joint servos, and a QP with a custom solver."""
 
 from __future__ import annotations
 
@@ -16,18 +14,22 @@ from floatbase.dynamics import Contacts
 from floatbase.qp import QP
 from floatbase.robots import State
 
-# s to each side for the central difference of a path: smooth over a second, it is off by 1e-8 of
-# its velocity
+# s to each side, for the central difference of a path: for a path that is smooth over a second,
+# the relative error of the velocity is 1e-8
 _DIFFERENCE_STEP = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueCommand:
-    """What a rollout reads from a controller's answer.
+    """Command of a controller, as a rollout reads it.
 
-    tau: shape (d,), N·m. forces: the contact forces that the controller predicts, shape (k,), N,
-        world; None without a
-    prediction.
+    Parameters
+    ----------
+    tau : ndarray, shape (d,)
+        Torques [N·m].
+    forces : ndarray, shape (k,), or None
+        Contact forces that the controller predicts, in the world frame [N]; None without a
+        prediction.
     """
 
     tau: Array
@@ -35,12 +37,18 @@ class TorqueCommand:
 
 
 class ConstantTorques:
-    """A controller that gives the same torques in every state.
+    """Controller that commands the same torques in every state.
 
-    tau: shape (d,), N·m.
-    contacts: the stance for which forces are recorded; all feet by default.
-    predict: contact forces that a theory expects in a configuration q with velocity v, (q, v) ->
-        shape (k,), N, world. They are recorded as planned forces and change nothing.
+    Parameters
+    ----------
+    tau : array_like, shape (d,)
+        Torques [N·m].
+    contacts : Contacts, optional
+        Contacts whose forces are recorded; by default all feet.
+    predict : callable, optional
+        Contact forces that a theory predicts: a function of configuration q and velocity v that
+        returns forces, shape (k,), in the world frame [N]. They are recorded as planned forces and
+        have no effect.
     """
 
     def __init__(
@@ -56,14 +64,19 @@ class ConstantTorques:
         )
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques, and the prediction for configuration q and velocity v."""
+        """Return the torques, and the prediction for configuration q and velocity v."""
         return TorqueCommand(self.tau, self._predict(q, v) if self._predict is not None else None)
 
 
 class SolverController:
-    """A controller that hands the QP of every tick to a solver.
+    """Controller that passes the QP of every control step to a custom solver.
 
-    controller: makes the QP. solver: is called with it, and returns x = (q̈, τ, λ), shape (n,).
+    Parameters
+    ----------
+    controller : WholeBodyController
+        Controller that builds the QP.
+    solver : callable
+        Function of the QP that returns x = (q̈, τ, λ), shape (n,).
     """
 
     def __init__(
@@ -73,11 +86,11 @@ class SolverController:
         self.controller, self.solver = controller, solver
 
     def qp(self, state: State, t: float = 0.0) -> QP:
-        """The QP of one tick."""
+        """Return the QP of one control step."""
         return self.controller.qp(state, t)
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
+        """Return the torques for configuration q and velocity v."""
         qp = self.qp(State(self.robot, q, v), t)
         x = as_array("x", self.solver(qp), (qp.n,))
         return TorqueCommand(x[qp.blocks["tau"]], x[qp.blocks["forces"]])
@@ -90,14 +103,28 @@ def joint_servo(
     stiffness: float = 100.0,
     damping: float = 10.0,
 ) -> Callable[[Array, Array, float], TorqueCommand]:
-    """A controller that knows joints only: τ = tau - stiffness · (position error) - damping ·
-    (velocity error), per joint.
+    """Return a controller that servoes each joint on its own.
 
-    state: its joints are the desired ones.
-    tau: torques that hold the joints at rest, shape (d,), N·m; 0 by default.
-    path: offset of the desired joints at time t in s, t -> shape (d,), rad; 0 by default.
-    stiffness: N·m/rad.
-    damping: N·m·s/rad.
+    The torques are τ = tau - stiffness · (position error) - damping · (velocity error), per joint.
+
+    Parameters
+    ----------
+    state : State
+        State with the desired joint positions.
+    tau : array_like, shape (d,), optional
+        Torques that hold the joints at rest [N·m]; zero by default.
+    path : callable, optional
+        Offset of the desired joint positions: a function of time [s] that returns an array, shape
+        (d,), [rad]; zero by default.
+    stiffness : float, optional
+        Stiffness [N·m/rad].
+    damping : float, optional
+        Damping [N·m·s/rad].
+
+    Returns
+    -------
+    callable
+        The controller, a function of configuration q, velocity v and time t [s].
     """
     d = as_instance("state", state, State).robot.d
     joints = slice(state.robot.nv - d, None)

@@ -1,7 +1,8 @@
-"""The course text's figures as 3-D scenes: each function returns a `Viewer` that shows one figure.
+"""The figures of the course text as 3-D scenes: each function returns a viewer with one figure.
 
-Figure 1: left a robot bolted to the ground, right a floating base. Figure 2: a quadruped, its base,
-centre of mass and feet. Figure 3: left the friction cone, right the plane through normal and force.
+Figure 1: on the left a robot bolted to the ground, on the right a floating base. Figure 2: a
+quadruped with its base, centre of mass and feet. Figure 3: on the left the friction cone, on the
+right the plane through normal and force.
 """
 
 from __future__ import annotations
@@ -23,11 +24,21 @@ MU = 0.7
 
 
 def figure_1_left(background: str = "white") -> Viewer:
-    """A fixed-base robot pushes a wall: the force f_r of the wall, and the moment τ_b of the bolts,
-    which hold the base.
+    """Draw a fixed-base robot that pushes against a wall.
 
-    τ_b = -(p - p_base) × f_r, as the ground exerts it on the base. (1) has no such term: bolts bear
-    any moment.
+    The figure shows the force f_r of the wall and the moment τ_b with which the bolts hold the
+    base. The moment is τ_b = -(p - p_base) × f_r, exerted by the ground on the base. Eq. (1) has no
+    such term, because bolts withstand any moment.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+
+    Returns
+    -------
+    Viewer
+        Viewer that shows the figure.
     """
     robot = load("ur5")
     view = Viewer(robot, background=background)
@@ -52,8 +63,23 @@ def figure_1_left(background: str = "white") -> Viewer:
 
 
 def figure_1_right(background: str = "white") -> Viewer:
-    """A floating base: the contact forces f_i sum to the force f_c and the moment τ_c at the centre
-    of mass, (20)(21).
+    """Draw a floating base with the sums of its contact forces.
+
+    The contact forces f_i add up to the force f_c and the moment τ_c at the centre of mass.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+
+    Returns
+    -------
+    Viewer
+        Viewer that shows the figure.
+
+    Notes
+    -----
+    [FBR]_, eqs. (20), (21).
     """
     robot = load("go2")
     view = Viewer(robot, background=background, scale=0.004)
@@ -77,8 +103,19 @@ def figure_1_right(background: str = "white") -> Viewer:
 
 
 def figure_2(background: str = "white") -> Viewer:
-    """A quadrupedal robot: its base frame, its centre of mass x_c (another point), and its feet
-    x_i.
+    """Draw a quadruped with its base frame, its centre of mass x_c and its feet x_i.
+
+    The centre of mass and the origin of the base are different points.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+
+    Returns
+    -------
+    Viewer
+        Viewer that shows the figure.
     """
     robot = load("go2")
     view = Viewer(robot, background=background)
@@ -88,11 +125,8 @@ def figure_2(background: str = "white") -> Viewer:
     labels = {
         f"x{{{i + 1}}}": _outside(position, state.com) for i, position in enumerate(positions)
     }
-    labels["x{4}"] = positions[3] + [
-        -0.06,
-        0.04,
-        0.01,
-    ]  # behind the robot, since its own foot would hide it outside
+    # behind the robot, since the foot itself would hide a label on the outside
+    labels["x{4}"] = positions[3] + [-0.06, 0.04, 0.01]
     labels["x{c}"] = state.com + [0.065, -0.035, -0.035]
     pose = state.frame_pose(robot.base).homogeneous
     labels["base"] = pose[:3, 3] + [0.0, 0.0, 0.24]
@@ -106,7 +140,22 @@ def figure_2(background: str = "white") -> Viewer:
 
 
 def figure_3_left(background: str = "white") -> Viewer:
-    """(28) The friction cone: a force f, its normal part f_⊥ and its tangential part f_∥."""
+    """Draw the friction cone with a force f, its normal part f_⊥ and its tangential part f_∥.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+
+    Returns
+    -------
+    Viewer
+        Viewer that shows the figure.
+
+    Notes
+    -----
+    [FBR]_, eq. (28).
+    """
     view, along, across = _cone_stage(background)
     force = along + across
     picture = _cone() | {
@@ -126,7 +175,22 @@ def figure_3_left(background: str = "white") -> Viewer:
 
 
 def figure_3_right(background: str = "white") -> Viewer:
-    """(28) The plane through normal and force: α_∥ is at most μ α_⊥."""
+    """Draw the plane through the normal and a force, where α_∥ is at most μ α_⊥.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+
+    Returns
+    -------
+    Viewer
+        Viewer that shows the figure.
+
+    Notes
+    -----
+    [FBR]_, eq. (28).
+    """
     view, along, across = _cone_stage(background)
     height, most = along[2], MU * along[2]
     plane = np.array([[0, 0, 0], [0, MU * 0.8, 0.8], [0, -MU * 0.8, 0.8]], dtype=float)
@@ -161,22 +225,20 @@ FIGURES: dict[str, Callable[..., Viewer]] = {
 
 
 def _example_forces(weight: float) -> Array:
-    """Forces at four feet, (4, 3), N: they carry the weight unevenly and tilt, inside the cones."""
+    """Return unequal forces inside the cones that carry the weight, shape (4, 3) [N]."""
     shares = np.array([0.32, 0.21, 0.27, 0.20])
     lean = np.array([[-0.25, 0.15, 1.0], [0.30, 0.20, 1.0], [0.10, 0.35, 1.0], [-0.35, 0.20, 1.0]])
     return weight * shares[:, None] * lean
 
 
 def _cone_stage(background: str) -> tuple[Viewer, Array, Array]:
-    """A viewer for a cone alone, and the normal and the tangential part of a force in it, drawn in
-    m.
-    """
+    """Return a viewer for a cone, and the normal and tangential part of a force, drawn in m."""
     view = Viewer(load("go2"), background=background)
     return view, np.array([0.0, 0.0, 0.6]), np.array([0.0, 0.26, 0.0])
 
 
 def _cone() -> Picture:
-    """A friction cone 0.8 m high at the origin, with its contact patch."""
+    """Return a friction cone at the origin, 0.8 m high, with its contact patch."""
     return {
         "shape/cone": shapes.friction_cone(np.zeros(3), [0.0, 0.0, 1.0], MU, 0.8, "inside"),
         "patch/contact": shapes.contact_patch(np.zeros(3), [0.0, 0.0, 1.0], 0.05),
@@ -184,20 +246,20 @@ def _cone() -> Picture:
 
 
 def _rod(start: Array, end: Array, colour: RGB) -> shapes.Item:
-    """A thin line from one point to another."""
+    """Return a thin line from one point to another."""
     way = np.asarray(end, dtype=float) - start
     length = float(np.linalg.norm(way))
     return shapes.rod(start, geometry.rotation_with_z_axis(way / length), length, 0.004, colour)
 
 
 def _outside(position: Array, centre: Array) -> Array:
-    """A point 7 cm beside a foot, away from the robot's centre."""
+    """Return a point 7 cm beside a foot, away from the centre of the robot."""
     away = (position - centre) * [1.0, 1.0, 0.0]
     return np.asarray(position + 0.07 * away / np.linalg.norm(away))
 
 
 def _labels(view: Viewer, texts: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Labels without plates. texts: text -> position, (3,), m."""
+    """Return labels without plates; texts: text -> position, shape (3,) [m]."""
     height = 0.085 * view.painter.size
     return {
         f"label/{i}": shapes.label(at, text, height, view.painter.text_colour, plate=False)

@@ -1,8 +1,6 @@
-"""Panels under a live picture: sliders that redraw it, and a handle that pushes the robot of a run
-in the background.
+"""Panels below a live picture: sliders that redraw it, and controls that push a simulated robot.
 
-Nothing here waits: a slider calls a quick function, a run has a thread of its own, and so the
-kernel stays free.
+Nothing here blocks the kernel: a slider calls a fast function, and a simulation has its own thread.
 """
 
 from __future__ import annotations
@@ -24,23 +22,34 @@ from floatbase.viewer.export.recording import push_at
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.transport.notebook_events import receive_during_cells
 
-# width below which nothing of a slider is left but its name and its number
+# width below which only the name and the number of a slider are visible
 _MIN_SLIDER_WIDTH = "min(340px, 100% - 4px)"
-_LETTER_WIDTH, _MAX_NAME_WIDTH = (
-    0.55,
-    10.4,
-)  # em: of a letter of a slider's name, at most on average; of a name where the page is narrow
+# em: largest mean width of a letter in a slider's name; width of the name on a narrow page
+_LETTER_WIDTH, _MAX_NAME_WIDTH = 0.55, 10.4
 
 # sliders ------------------------------------------------------------------------------------------
 
 
 class SliderPanel(widgets.VBox):
-    """A live picture with sliders, as `slider_panel` makes it.
+    """Live picture with sliders, made by `slider_panel`.
 
-    view: the `Viewer` of the picture, None where the note has all there is to see. sliders: the
-        slider of each name. note: the
-    HTML that tells what a position means. beside: whether it stands beside the picture. samples: as
-    for `slider_panel`.
+    Parameters
+    ----------
+    view : Viewer or None
+        Viewer of the picture; None if the note contains everything there is to see.
+    draw : callable
+        Function of the values of the sliders that draws the picture and may return a note.
+    sliders : dict of str to FloatSlider
+        The sliders by name.
+    beside : bool
+        Whether the note is to the right of the picture.
+    samples : mapping of str to sequence of float
+        Values for a static page, as for `slider_panel`.
+
+    Attributes
+    ----------
+    note : HTML
+        The note that explains the present position of the sliders.
     """
 
     def __init__(
@@ -70,13 +79,11 @@ class SliderPanel(widgets.VBox):
         self._redraw()
 
     def values(self) -> dict[str, float]:
-        """The value of each slider, as it shows it."""
+        """Return the value of each slider, as the slider shows it."""
         return {name: _displayed_value(slider) for name, slider in self.sliders.items()}
 
     def draw_at(self, values: Mapping[str, float]) -> str:
-        """Draw the picture for these values of the sliders, which stay where they are; the note,
-        HTML.
-        """
+        """Draw the picture for other values without moving the sliders; return the note as HTML."""
         try:
             return self._draw(**values) or ""
         except FloatbaseError as error:
@@ -86,8 +93,10 @@ class SliderPanel(widgets.VBox):
         self.note.value = self.draw_at(self.values())
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The picture is put in only here: by now the camera has been placed, and a still picture
-        keeps that view.
+        """Return what a notebook shows.
+
+        The picture is added here and not earlier: the camera has been placed by now, so a still
+        picture keeps that view.
         """
         if display_mode() == "site":
             return precomputed_panel(self)
@@ -96,8 +105,9 @@ class SliderPanel(widgets.VBox):
 
 
 def _flex_layout(share: int, least: int) -> widgets.Layout:
-    """A part of a row that takes its share of the width, %, and a line of its own where that is
-    less than `least` pixels.
+    """Return the layout of a part of a row that takes a share of the width [%].
+
+    Where that is less than `least` pixels, the part moves to its own line.
     """
     return widgets.Layout(flex=f"1 1 {share}%", min_width=f"min({least}px, 100%)")
 
@@ -110,23 +120,35 @@ def slider_panel(
     samples: Mapping[str, Sequence[float]] | None = None,
     **ranges: tuple[float, float, float] | tuple[float, float, float, str] | range,
 ) -> SliderPanel:
-    """The live picture of `view` with one slider for each of `ranges`, in the order in which they
-    are given.
+    """Return a live picture with one slider for each of `ranges`, in the given order.
 
-    view: the `Viewer` that is drawn on; None where the note holds the picture, as one in the plane.
-    draw: called once at first and at every move as draw(name=value, …), with the values as they are
-        shown, in the kernel's thread; it draws on `view` and should take a few milliseconds. It may
-        return a note, HTML or plain text.
-    on_release: call `draw` only when a slider is let go, for a function that takes longer.
-    beside: the note stands to the right of the picture; otherwise between the picture and the
-        sliders.
-    samples: name -> values at which the picture is computed for a site, where no kernel draws;
-        round ones by default.
-    ranges: name=(lowest, first, highest) or name=(lowest, first, highest, unit). "_" in a name
-        shows as a blank. The step of a slider is round and meets all three. name=range(n) is a
-        slider of whole numbers, 0 to n - 1, that begins at 0.
+    If `draw` raises an error of floatbase, the note shows its message.
 
-    Where `draw` raises an error of the package, its text is the note.
+    Parameters
+    ----------
+    view : Viewer or None
+        Viewer to draw on; None if the note contains the picture, such as a drawing in the plane.
+    draw : callable
+        Function called as draw(name=value, …), once at the start and then at every move of a
+        slider, in the thread of the kernel. It receives the values as the sliders show them, draws
+        on `view`, and should take a few milliseconds. It may return a note, as HTML or plain text.
+    on_release : bool, optional
+        Whether to call `draw` only when a slider is released, for a function that takes longer.
+    beside : bool, optional
+        Whether the note is to the right of the picture; by default it is between the picture and
+        the sliders.
+    samples : mapping of str to sequence of float, optional
+        For a slider: the values at which the picture is computed for a static page, which has no
+        kernel. By default these are round numbers.
+    **ranges : tuple or range
+        name=(lowest, first, highest) or name=(lowest, first, highest, unit). "_" in a name is shown
+        as a space. The step of a slider is round and reaches all three values. name=range(n) is a
+        slider for the integers from 0 to n - 1, starting at 0.
+
+    Returns
+    -------
+    SliderPanel
+        The panel; a notebook displays it as the value of a cell.
     """
     sliders = {name: _range_slider(name, bounds, on_release) for name, bounds in ranges.items()}
     longest = max((len(slider.description) for slider in sliders.values()), default=0)
@@ -151,8 +173,9 @@ def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlid
 def _slider(
     text: str, low: float, first: float, high: float, step: float, on_release: bool
 ) -> widgets.FloatSlider:
-    """A slider that shows as many digits as its step has. on_release: it tells its value only when
-    it is let go.
+    """Return a slider that shows as many decimals as its step has.
+
+    With `on_release` its value changes only when it is released.
     """
     return widgets.FloatSlider(
         value=first,
@@ -169,10 +192,10 @@ def _slider(
 
 
 def _round_step(*bounds: float) -> float:
-    """The largest of 1, 2 or 5 times a power of ten that divides all bounds, with at least 50 steps
-    from lowest to highest.
+    """Return a round step for a slider with at least 50 steps from the lowest to the highest bound.
 
-    Where none does, because a bound is not round itself, one that is too fine for that to be seen.
+    It is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If none does,
+    because a bound is not round, the step is too small for that to be visible.
     """
     most = (max(bounds) - min(bounds)) / 50
     power = math.floor(math.log10(most)) if most > 0 else 0
@@ -185,8 +208,11 @@ def _round_step(*bounds: float) -> float:
 
 
 def _displayed_value(slider: widgets.FloatSlider) -> float:
-    """The value as the slider shows it: a browser's sum of steps may be off in the last digits."""
-    return float(format(slider.value, slider.readout_format)) + 0.0  # without a minus before a zero
+    """Return the value as the slider shows it.
+
+    A browser adds up steps, so the last digits of the value may be wrong.
+    """
+    return float(format(slider.value, slider.readout_format)) + 0.0  # never -0
 
 
 # pushes -------------------------------------------------------------------------------------------
@@ -195,10 +221,25 @@ def _displayed_value(slider: widgets.FloatSlider) -> float:
 def live_run(
     sim: Simulation, controller: Controller, view: Viewer, **options: Any
 ) -> LiveSimulation:
-    """A run in the background that draws itself into `view`; a push stays as an arrow for half a
-    second.
+    """Return a live simulation that draws itself into a viewer.
 
-    options: as for `LiveSimulation`. Nothing moves before `start`.
+    The arrow of a push stays visible for half a second. Nothing moves before `start` is called.
+
+    Parameters
+    ----------
+    sim : Simulation
+        The simulation.
+    controller : callable
+        Its controller.
+    view : Viewer
+        Viewer to draw into.
+    **options
+        Options of `LiveSimulation`.
+
+    Returns
+    -------
+    LiveSimulation
+        The simulation, paused.
     """
 
     def show(record: Rollout) -> None:
@@ -213,19 +254,29 @@ def live_run(
 
 
 def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> widgets.VBox:
-    """The live picture with a handle to push the robot in any horizontal direction, for 0.1 s at a
-    time.
+    """Return a live picture with controls that push the robot in a horizontal direction for 0.1 s.
 
-    run: as `live_run` returns it, paused at first.
-    view: the viewer that it draws into. Give it a `Viewer` of its own: the picture stops when
+    The first slider sets the force [N] and pushes when it is released. The second sets the
+    direction [°]: 0 is forwards, 90 to the robot's left (+y at the start), 180 backwards. The
+    button *push* pushes again. A push starts the simulation, as *run* does; both first put a fallen
+    robot back on its feet. *pause* stops the simulation, and *reset* restores the initial state and
+    both sliders. The third slider slows down time. A line shows the status and why the simulation
+    stopped.
+
+    Parameters
+    ----------
+    run : LiveSimulation
+        Simulation from `live_run`, paused at first.
+    view : Viewer
+        Viewer that the simulation draws into. It needs its own `Viewer`: the picture stops when
         `view` is displayed again in a later cell.
-    max_force: the largest push, N.
+    max_force : float, optional
+        Largest push [N].
 
-    The first slider sets the force, N, and pushes when it is released. The second sets the
-    direction in degrees: 0 is forwards, 90 to the robot's left (+y, where it begins), 180
-    backwards. The button *push* pushes again. A push starts the run, as *run* does; both first put
-    a fallen robot back on its feet. *pause* stops the run, *reset* restores the start and both
-    sliders. The third slider slows time down. A line shows the status and what stopped the run.
+    Returns
+    -------
+    VBox
+        The panel; a notebook displays it as the value of a cell.
     """
     force = _slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
     towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)
@@ -235,7 +286,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
     def push(_: Any = None) -> None:
         if not force.value:
-            line.value = "a push of 0 N: set how hard first"
+            line.value = "The push is 0 N. Set the force first."
             return
         run.push(_horizontal_force(force.value, towards.value))
         line.show_status(
@@ -271,7 +322,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
 
 class _PushPanel(widgets.VBox):
-    """A live picture with what pushes its robot, as `push_panel` makes it."""
+    """Live picture with controls that push its robot, made by `push_panel`."""
 
     def __init__(
         self, run: LiveSimulation, view: Viewer, max_force: float, rows: Sequence[widgets.Widget]
@@ -289,8 +340,9 @@ class _PushPanel(widgets.VBox):
 
 
 class _StatusLine(widgets.Label):
-    """What a run does: its status, or what was last done to it while it runs. Told from the
-    kernel's thread and the run's.
+    """Line with the status of a simulation, or the last action while it runs.
+
+    It is updated from the thread of the kernel and from that of the simulation.
     """
 
     def __init__(self, run: LiveSimulation):
@@ -298,16 +350,16 @@ class _StatusLine(widgets.Label):
         self._run, self._news, self._telling = run, "", threading.Lock()
 
     def show_status(self, news: str | None = None) -> None:
-        """Show the present status; `news` stands in its place while the run goes on, "" for none,
-        None for the last.
+        """Show the present status.
+
+        While the simulation runs, `news` is shown instead: "" for none, None for the last one.
         """
-        with (
-            self._telling
-        ):  # the status is read in here, so that the last line is never about an earlier one
+        # the lock covers reading the status, so that the last line is never about an earlier one
+        with self._telling:
             self._news = self._news if news is None else news
             status = self._run.status
-            told = status_message(status, self._run.reason)
-            self.value = self._news if status == "running" and self._news else told
+            summary = status_message(status, self._run.reason)
+            self.value = self._news if status == "running" and self._news else summary
 
 
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:
@@ -318,13 +370,13 @@ def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.But
 
 
 def _horizontal_force(force: float, towards: float) -> list[float]:
-    """A force of `force` N towards so many degrees, shape (3,), world."""
+    """Return a horizontal force in a direction [°], shape (3,), world frame [N]."""
     angle = math.radians(towards)
     return [force * math.cos(angle), force * math.sin(angle), 0.0]
 
 
 def _direction_text(force: float, towards: float) -> str:
-    """Where a push goes, in words where there is a word."""
+    """Return the direction of a push in words, or as an angle if there is no word."""
     angle = round(towards + (180.0 if force < 0 else 0.0)) % 360
     words = {0: "forwards", 90: "to the left", 180: "backwards", 270: "to the right"}
     return words.get(angle, f"towards {angle if angle <= 180 else angle - 360}°")

@@ -1,7 +1,6 @@
-"""Predictions: a learner says what a cell will show before it runs; afterwards both stand side by
-    side.
+"""Predictions: learners say what a cell will show before they run it, and compare afterwards.
 
-What was said is kept in the learner's progress file, on this machine alone.
+Predictions are stored in the learner's progress file and never leave this machine.
 """
 
 from __future__ import annotations
@@ -11,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import MAX_MAGNITUDE, as_string, numeric_copy
+from floatbase._validation import MAX_MAGNITUDE, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import rounded
 
-_ANSWER_DIGITS = 6  # digits of what the learner said: as it was typed
+_ANSWER_DIGITS = 6  # digits of a prediction, which is shown as it was typed
 _RIGHT = "right"
-# of this process: units of what was asked, and what could not be kept
+# of this process: units of the predictions, and predictions that could not be saved
 _units: dict[str, str] = {}
 _unsaved: dict[str, dict[str, Any]] = {}
 
@@ -26,47 +25,64 @@ _unsaved: dict[str, dict[str, Any]] = {}
 def predict(
     name: str, *answer: Any, unit: str = "", choices: Sequence[str] = (), count: int = 1
 ) -> None:
-    """Say what will happen before a cell shows it. Prints a line; what is no answer is told in
-    words and not kept.
+    """Predict what a cell will show.
 
-    name: of the lesson and the prediction, "02.c" or "C.a".
-    answer: a number; a list of `count` numbers; one of `choices`, of which the beginning is enough;
-        `...` or none skips it.
-    unit: of the number.
-    choices: the texts to choose from; without them the answer is a number.
-    count: how many numbers.
+    The prediction is saved, and a line is printed. If the answer cannot be used, the line says why,
+    and nothing is saved.
+
+    Parameters
+    ----------
+    name : str
+        Name of the lesson and of the prediction, such as "02.c" or "C.a".
+    *answer : float, sequence of float or str
+        The prediction: a number, `count` numbers, or the first letters of one of `choices`. Without
+        an answer, or with `...`, the prediction is skipped.
+    unit : str, optional
+        Unit of the number.
+    choices : sequence of str, optional
+        Texts to choose from. Without choices the answer is a number.
+    count : int, optional
+        How many numbers to predict.
     """
     _units[as_string("name of a prediction", name)] = unit
     stored = progress.predictions().get(name, {})
     given = answer[0] if len(answer) == 1 else list(answer) or ...
     if given is None or given is Ellipsis:
         before = (stored | _unsaved.get(name, {})).get("said")
-        told = (
-            f"you said {_quoted_answer(before, unit)}, and that stands."
+        message = (
+            f"you predicted {_quoted_answer(before, unit)} earlier; that still counts."
             if before is not None
-            else "skipped. Running on is fine."
+            else "skipped. You can go on without a prediction."
         )
-        print(f"{name}: {told}")
+        print(f"{name}: {message}")
         return
     try:
         said = (
             _match_choice(given, tuple(choices)) if choices else _parse_numbers(given, unit, count)
         )
     except InputError as error:
-        print(f"{name}: {error} Or leave ... there and run on.")
+        print(f"{name}: {error} To skip the prediction, leave the ... in place.")
         return
-    print(f"{name}: you say {_quoted_answer(said, unit)}.")
+    print(f"{name}: you predict {_quoted_answer(said, unit)}.")
     if problem := _save(name, {"said": said, "unit": unit}, stored):
         print(problem)
 
 
 def compare(name: str, value: Any) -> None:
-    """Print the result of what was to be predicted, beside what was said, if anything was; with
-    that it is kept.
+    """Print a result beside the prediction, and save the result if there was a prediction.
 
-    name: as in `predict`. value: a number, several, or a text: what the cell has computed. A whole
-        number is printed whole, any
-    other with two significant digits. Raises `InputError` for anything else.
+    Parameters
+    ----------
+    name : str
+        Name of the prediction, as for `predict`.
+    value : float, array_like or str
+        The result that the cell has computed. Integers are printed in full, other numbers with two
+        significant digits.
+
+    Raises
+    ------
+    InputError
+        If `value` is not a number, an array of numbers or a text.
     """
     as_string("name of a prediction", name)
     result: Any = value if isinstance(value, str) else _stored_result(value)
@@ -78,37 +94,40 @@ def compare(name: str, value: Any) -> None:
         print(f"{name}: {shown}")
         return
     off = _describe_error(known["said"], result, unit)
-    beside = f"; you said {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
-    print(f"{name}: {shown}{', as you said' if off == _RIGHT else beside}")
+    beside = f"; you predicted {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
+    print(f"{name}: {shown}{', as you predicted' if off == _RIGHT else beside}")
     if isinstance(value, str) or np.all(np.isfinite(result)):
         _save(name, {"is": result}, stored)
 
 
 def review(lesson: str = "") -> None:
-    """Print what was predicted in a lesson, "02" or "C", or in all of them: name, what was said,
-    what it is, how far off.
+    """Print a table of your predictions: name, prediction, result and how far off it was.
 
-    The name of one prediction, such as "02.c", prints that one.
+    Parameters
+    ----------
+    lesson : str, optional
+        Name of a lesson, such as "02" or "C", or of a single prediction, such as "02.c". By default
+        all predictions are listed.
     """
     lesson = as_string("lesson", lesson)
-    if len(lesson) == 1:  # 2 is lesson 02, and c is lesson C
+    if len(lesson) == 1:  # 2 means lesson 02, and c means lesson C
         lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
     stored = progress.predictions()
     known = {
         name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})
     }
-    rows = [("", "you said", "it is", "")]
+    rows = [("", "you predicted", "result", "")]
     for name, entry in known.items():
         if "said" in entry and lesson in ("", name, name.split(".")[0]):
             said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
             shown, off = (
-                ("not seen yet", "")
+                ("not shown yet", "")
                 if result is None
                 else (_format_result(result, unit), _describe_error(said, result, unit))
             )
             rows.append((name, _format_answer(said, unit), shown, off))
     if len(rows) == 1:
-        print(f"Nothing was predicted{f' in lesson {lesson}' if lesson else ''} yet.")
+        print(f"There are no predictions{f' in lesson {lesson}' if lesson else ''} yet.")
         return
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
@@ -118,7 +137,7 @@ def review(lesson: str = "") -> None:
 
 
 def _describe_error(said: Any, result: Any, unit: str) -> str:
-    """How far what was said is from the result, in words; "" where that cannot be told."""
+    """Return in words how far a prediction is from the result, or "" if they cannot be compared."""
     if isinstance(said, str) or isinstance(result, str):
         return _RIGHT if str(said).casefold() == str(result).casefold() else ""
     if np.shape(said) != np.shape(result):
@@ -138,19 +157,20 @@ def _describe_error(said: Any, result: Any, unit: str) -> str:
         return ""
     part = rounded(said / result)
     if said / result < 0:
-        return "the other way"
+        return "opposite sign"
     return (
-        "nearly"
+        "close"
         if part == "1"
-        else f"{part} of it"
+        else f"{part} of the result"
         if said / result < 1
-        else f"{part} times as much"
+        else f"{part} times the result"
     )
 
 
 def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
-    """Keep what is new. Where it cannot be kept it lives as long as this process; what prevented
-    it, or "".
+    """Save what is new about a prediction; return what went wrong, or "".
+
+    What cannot be saved is remembered as long as this process runs.
     """
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
@@ -162,7 +182,7 @@ def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
 
 
 def _match_choice(answer: Any, choices: Sequence[str]) -> str:
-    """The one of `choices` that an answer means."""
+    """Return the choice that an answer means."""
     listed = ", ".join(f'"{choice}"' for choice in choices)
     if not isinstance(answer, str) or not answer.strip():
         raise InputError(f"choose one of {listed}, in quotes.")
@@ -171,39 +191,41 @@ def _match_choice(answer: Any, choices: Sequence[str]) -> str:
     meant = meant or [choice for choice in choices if choice.casefold().startswith(wanted)]
     if len(meant) == 1:
         return meant[0]
-    fault = "fits more than one of" if meant else "is none of"
+    fault = "matches more than one of" if meant else "matches none of"
     raise InputError(f'"{answer.strip()[:40]}" {fault} {listed}.')
 
 
 def _parse_numbers(answer: Any, unit: str, count: int) -> Any:
-    """A learner's number, or list of numbers."""
+    """Return the number or the list of numbers in a learner's answer."""
     given = numeric_copy(answer)
     wanted = "one number" if count == 1 else f"a list of {count} numbers"
     form = "12.5" if count == 1 else f"[{', '.join(['12.5'] * count)}]"
-    right = f"write {wanted}{f', in {unit}' if unit else ''}, as {form}."
+    right = f"Write {wanted}{f', in {unit}' if unit else ''}, such as {form}."
     if given is None:
         raise InputError(
-            f"{'a text' if isinstance(answer, str) else 'this'} is no prediction here: {right}"
+            f"{'a text' if isinstance(answer, str) else 'this'} cannot be used here. {right}"
         )
     if given.ndim > 1 or given.size != count:
         raise InputError(
-            f"{given.size} {'number is' if given.size == 1 else 'numbers are'} no prediction here: "
+            f"{given.size} {'number' if given.size == 1 else 'numbers'} cannot be used here. "
             f"{right}"
         )
     if not np.all(np.abs(given) <= MAX_MAGNITUDE):
-        raise InputError(f"this is not finite, or far too large: {right}")
+        raise InputError(f"this number is infinite, NaN or far too large. {right}")
     said = [int(x) if x.is_integer() else x for x in given.ravel().tolist()]
     return said if count > 1 else said[0]
 
 
 def _stored_result(value: Any) -> Any:
-    """A result as it is kept: whole numbers whole, others to six digits, which are the same on
-    every processor; lists flat.
+    """Convert a result to the form that is stored: a number or a flat list.
+
+    Integers stay integers. Other numbers are rounded to six digits, which are the same on every
+    processor.
     """
     given = numeric_copy(value)
     if given is None:
         raise InputError(
-            f"value must be a number, several, or a text, not of the kind {type(value).__name__}."
+            f"value must be a number, an array of numbers or a text, not {short_repr(value)}."
         )
     whole = np.asarray(value).dtype.kind in "iu"
     kept = [int(x) if whole else float(f"{x:.6g}") for x in np.ravel(given).tolist()]

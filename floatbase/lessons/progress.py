@@ -1,9 +1,8 @@
-"""Which exercises a learner has tried and solved, and what was predicted, stored in a file of the
-learner's own.
+"""Progress of a learner: tries, answers and predictions, stored in the learner's own file.
 
-Every try and every prediction is one line at the end of the file, written at once: processes and
-threads that write together need no lock, and an interrupt or a full disk costs that one line at
-most. Nothing that stands in the file is ever changed.
+Every try and every prediction is one line, appended to the file in a single write. Processes and
+threads that write at the same time need no lock, and an interrupt or a full disk loses at most that
+line. Lines in the file are never changed.
 """
 
 from __future__ import annotations
@@ -20,22 +19,38 @@ from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
 _FILE_NAME = "progress.jsonl"
-# characters of an answer that is kept; the longest right one of the course takes less than 20 000
+# characters of a stored answer; the longest right answer in the course has less than 20 000
 _MAX_ANSWER_LENGTH = 100_000
 
 
 def path() -> Path:
-    """Where it is stored: progress.jsonl in the folder that FLOATBASE_HOME names, ~/.floatbase by
-    default.
+    """Return the path of the file in which progress is stored.
 
-    Raises `RuntimeError` where there is no home folder either.
+    The file is progress.jsonl in the folder that the environment variable FLOATBASE_HOME names, by
+    default ~/.floatbase.
+
+    Returns
+    -------
+    Path
+        The path; the file may not exist yet.
+
+    Raises
+    ------
+    RuntimeError
+        If FLOATBASE_HOME is not set and there is no home folder.
     """
     return Path(os.environ.get("FLOATBASE_HOME") or Path.home() / ".floatbase") / _FILE_NAME
 
 
 def load() -> dict[str, dict[str, int]]:
-    """For each exercise that was tried: {"tries": n, "right": m}. What is damaged is left out, the
-    rest is counted.
+    """Return the number of tries and of right answers for each exercise that was tried.
+
+    Damaged lines are ignored.
+
+    Returns
+    -------
+    dict of str to dict
+        For each exercise: {"tries": n, "right": m}.
     """
     tried: dict[str, dict[str, int]] = {}
     for text in _lines():
@@ -47,18 +62,28 @@ def load() -> dict[str, dict[str, int]]:
 
 
 def record_try(name: str, right: bool, answer: Any = None) -> None:
-    """Count a try of the exercise `name`. Where the file cannot be written the try is forgotten,
-    without an error.
+    """Record a try of an exercise. If the file cannot be written, the try is lost without an error.
 
-    answer: what was answered; it is kept as the numbers or names that it is, or as the text of a
-        function, and is never run.
+    Parameters
+    ----------
+    name : str
+        Name of the exercise.
+    right : bool
+        Whether the answer was right.
+    answer : object, optional
+        The answer. Numbers and names are stored as they are, a function as its source code, which
+        is never run.
     """
     append(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
 
 
 def answers() -> dict[str, Any]:
-    """For each exercise that was tried: the last right answer `as_json`, or where none was right
-    the last.
+    """Return the last right answer to each exercise, or the last answer if none was right.
+
+    Returns
+    -------
+    dict of str to object
+        For each exercise that was tried: the answer in the form of `as_json`.
     """
     found: dict[str, Any] = {}
     solved = set()
@@ -72,8 +97,13 @@ def answers() -> dict[str, Any]:
 
 
 def predictions() -> dict[str, dict[str, Any]]:
-    """For each prediction: {"said": …, "unit": …, "is": …}, the latest of each, as far as there is
-    one; see `append`.
+    """Return the latest predictions.
+
+    Returns
+    -------
+    dict of str to dict
+        For each prediction: {"said": …, "unit": …, "is": …}, as far as they are known; see
+        `append`.
     """
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
@@ -88,31 +118,53 @@ def predictions() -> dict[str, dict[str, Any]]:
 
 
 def append(name: str, entry: dict[str, Any]) -> str:
-    """Add a line about the exercise or prediction `name`; what prevented it, and what to do, or "".
+    """Append a line about an exercise or a prediction to the file.
 
-    entry: of a prediction "said" and "is" are a number, a list of numbers or a text; "unit" is a
-        text.
+    Parameters
+    ----------
+    name : str
+        Name of the exercise or prediction.
+    entry : dict
+        What to store. In predictions, "said" and "is" are a number, a list of numbers or a text,
+        and "unit" is a text.
+
+    Returns
+    -------
+    str
+        What went wrong and what to do, or "".
     """
-    # the line end comes first: a line that a full disk cut short before this one stays alone
+    # starts with the line end, so that a line that a full disk cut short spoils no other
     return _append_line(("\n" + json.dumps({name: entry})).encode())
 
 
 def storage_problem() -> str:
-    """Why tries and predictions cannot be saved, and what to do, else "". Makes no file."""
+    """Return why tries and predictions cannot be saved and what to do, or "".
+
+    This function does not create the file.
+    """
     return _append_line(b"")
 
 
 def as_json(answer: Any) -> Any:
-    """An answer in the form in which it is kept: numbers, texts, lists; else an object that says
-    what it is.
+    """Convert an answer to a form that can be stored: numbers, texts, lists or a dict.
 
-    `from_json` gives back an answer that a judge takes for the same; only of a function no more
-    than its code is left.
+    `from_json` returns an answer that a judge treats in the same way. Of a function, only the
+    source code is kept.
+
+    Parameters
+    ----------
+    answer : object
+        Any answer of a learner.
+
+    Returns
+    -------
+    object
+        Something that `json` can write.
     """
     try:
         kept = _as_json(answer)
         fits = len(json.dumps(kept)) <= _MAX_ANSWER_LENGTH
-    except RecursionError:  # a list that holds itself
+    except RecursionError:  # a list that contains itself
         fits = False
     return kept if fits else {"too long": type(answer).__name__}
 
@@ -135,12 +187,26 @@ def _source_of(function: Any) -> str:
     try:
         return inspect.getsource(function)
     except (OSError, TypeError):
-        return "(its code is not known)"
+        return "(source code not available)"
 
 
 def from_json(kept: Any) -> Any:
-    """The answer that `as_json` kept. Raises `ValueError` or another error of Python where it is
-    damaged.
+    """Restore an answer that `as_json` converted.
+
+    Parameters
+    ----------
+    kept : object
+        The stored form of the answer.
+
+    Returns
+    -------
+    object
+        The answer.
+
+    Raises
+    ------
+    ValueError
+        If the stored form is damaged. Other errors of Python are possible, too.
     """
     if isinstance(kept, list) and (array := numeric_copy(kept)) is not None:
         return array
@@ -156,12 +222,13 @@ def from_json(kept: Any) -> Any:
 
 
 def _append_line(line: bytes) -> str:
-    """Write a line at the end of the file; what prevented it, or "". Without a line only whether
-    one could be written.
+    """Append a line to the file; return what went wrong, or "".
+
+    With an empty line, only check whether the file could be written.
     """
     lost, advice = (
-        "Tries and predictions cannot be kept",
-        "Set FLOATBASE_HOME to a folder that you may write to",
+        "Tries and predictions cannot be saved",
+        "Set FLOATBASE_HOME to a folder that you can write to",
     )
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
@@ -190,7 +257,7 @@ def _lines() -> list[bytes]:
 
 
 def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Name and entry of each exercise and prediction in a text of any form."""
+    """Yield name and entry of each exercise and prediction in a line, which may be damaged."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
@@ -203,7 +270,7 @@ def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _try_counts(text: bytes) -> Iterator[tuple[str, int, int]]:
-    """Name, tries and right ones of each exercise in a text of any form."""
+    """Yield name, tries and right answers of each exercise in a line, which may be damaged."""
     for name, entry in _entries(text):
         tries, right = entry.get("tries"), entry.get("right")
         if type(tries) is int and type(right) is int and 0 <= right <= tries > 0:

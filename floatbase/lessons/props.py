@@ -1,4 +1,4 @@
-"""Things beside the robot: a wheel, a turntable, a hydraulic cylinder, a wall, bolts."""
+"""Objects beside the robot: a wheel, a turntable, a hydraulic cylinder, a wall and bolts."""
 
 from __future__ import annotations
 
@@ -28,14 +28,26 @@ def wheel(
     angle: float,
     width: float | None = None,
 ) -> Item:
-    """A wheel with spokes, one of them marked.
+    """Draw a wheel with spokes, one of which is marked.
 
-    centre: (3,), m, world.
-    axis: (3,), world, direction of its axle.
-    radius: m.
-    angle: rad, how far it has turned about the axle by the right-hand rule; at 0 the marked spoke
-        points upwards.
-    width: m; None for 0.35 of the radius.
+    Parameters
+    ----------
+    centre : array_like, shape (3,)
+        Centre of the wheel in the world frame [m].
+    axis : array_like, shape (3,)
+        Direction of the axle in the world frame.
+    radius : float
+        Radius [m].
+    angle : float
+        Angle of rotation about the axle, by the right-hand rule [rad]. At 0 the marked spoke points
+        upwards.
+    width : float, optional
+        Width [m]; by default 0.35 of the radius.
+
+    Returns
+    -------
+    Item
+        Item for `extra` of `Viewer.show`.
     """
     axle = unit_vector("axis of the wheel", axis)
     as_positive("radius of the wheel", radius, "m")
@@ -48,12 +60,22 @@ def wheel(
 
 
 def turntable(centre: npt.ArrayLike, radius: float, angle: float) -> Item:
-    """A round level table with lines painted on it, one of them marked, on a foot.
+    """Draw a round level table on a foot, with painted lines, one of which is marked.
 
-    centre: (3,), m, world, of its top.
-    radius: m.
-    angle: rad, how far it has turned about the vertical by the right-hand rule; at 0 the marked
-        line points along x.
+    Parameters
+    ----------
+    centre : array_like, shape (3,)
+        Centre of the table's top in the world frame [m].
+    radius : float
+        Radius [m].
+    angle : float
+        Angle of rotation about the vertical, by the right-hand rule [rad]. At 0 the marked line
+        points along x.
+
+    Returns
+    -------
+    Item
+        Item for `extra` of `Viewer.show`.
     """
     as_positive("radius of the turntable", radius, "m")
     return Item(_unit_table(), transform(centre, rotation_z(angle), radius))
@@ -65,17 +87,32 @@ def hydraulic_cylinder(
     stroke: tuple[float, float],
     pressures: tuple[float, float] = (0.5, 0.5),
 ) -> Picture:
-    """A double-acting hydraulic cylinder: barrel, rod, piston and two chambers.
+    """Draw a double-acting hydraulic cylinder: barrel, rod, piston and two chambers.
 
-    base, end: (3,), m, world, its two ends.
-    stroke: the shortest and the longest distance between the ends, m.
-    pressures: of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1
-        (full colour).
+    Parameters
+    ----------
+    base, end : array_like, shape (3,)
+        The two ends in the world frame [m].
+    stroke : tuple of float
+        Smallest and largest distance between the ends [m].
+    pressures : tuple of float, optional
+        Pressure of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1
+        (full colour) [-].
+
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
+
+    Raises
+    ------
+    InputError
+        If `stroke` is not positive and in ascending order.
     """
     if not 0.0 < stroke[0] < stroke[1]:
         raise InputError(
-            f"stroke of the cylinder is {stroke}; it must be its shortest and longest length, m, "
-            f"above zero."
+            f"stroke of the cylinder is {stroke}; it must be the smallest and the largest length "
+            f"(m), both above zero and in ascending order."
         )
     start = as_array("base of the cylinder", base, (3,), "m")
     way, length = vector_and_length(
@@ -105,17 +142,33 @@ def hydraulic_cylinder(
 
 
 def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: float) -> Item:
-    """A wall.
+    """Draw a vertical wall.
 
-    position: (3,), m, world, centre of its front.
-    normal: (3,), world, out of its front.
-    width, height: m.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Centre of the front in the world frame [m].
+    normal : array_like, shape (3,)
+        Normal of the front in the world frame, pointing out of the wall.
+    width, height : float
+        Width and height [m].
+
+    Returns
+    -------
+    Item
+        Item for `extra` of `Viewer.show`.
+
+    Raises
+    ------
+    InputError
+        If `normal` is vertical.
     """
     n = unit_vector("normal of the wall", normal)
     side = np.cross([0.0, 0.0, 1.0], n)
     if np.linalg.norm(side) < 1e-6:
         raise InputError(
-            "normal of the wall is vertical; a wall stands, so its normal has a horizontal part."
+            "normal of the wall is vertical. A wall is upright, so its normal must have a "
+            "horizontal component."
         )
     side /= np.linalg.norm(side)
     as_positive("width of the wall", width, "m")
@@ -129,8 +182,21 @@ def wall(position: npt.ArrayLike, normal: npt.ArrayLike, width: float, height: f
 
 
 def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
-    """`count` bolts on a circle. position: (3,), m, world, centre of the circle. radius: of the
-    circle, m.
+    """Draw bolts on a horizontal circle.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Centre of the circle in the world frame [m].
+    radius : float
+        Radius of the circle [m].
+    count : int, optional
+        Number of bolts.
+
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
     """
     as_positive("radius of the bolts' circle", radius, "m")
     picture: Picture = {}
@@ -143,7 +209,7 @@ def bolts(position: npt.ArrayLike, radius: float, count: int = 4) -> Picture:
 
 @lru_cache(maxsize=1)
 def _unit_wheel() -> Shape:
-    """A wheel around z, of radius 1 and width 1, one of its spokes marked."""
+    """Return a wheel around z, of radius 1 and width 1, with one marked spoke."""
     tyre = geometry.surface_of_revolution(
         [(0.8, -0.5), (1.0, -0.5), (1.0, 0.5), (0.8, 0.5), (0.8, -0.5)], 48
     )
@@ -167,8 +233,9 @@ def _unit_wheel() -> Shape:
 
 @lru_cache(maxsize=1)
 def _unit_table() -> Shape:
-    """A disc of radius 1 with its top at z = 0, a rim and twelve painted lines, the one along x
-    dark and wide.
+    """Return a disc of radius 1 with its top at z = 0, a rim and twelve painted lines.
+
+    The line along x is dark and wide.
     """
     top = geometry.surface_of_revolution([(0.97, 0.0), (0.0, 0.0)], 72)
     rim = geometry.surface_of_revolution(
@@ -198,7 +265,7 @@ def _unit_table() -> Shape:
 
 @lru_cache(maxsize=1)
 def _tube() -> Shape:
-    """A translucent tube along z, 1 long, of radius 1."""
+    """Return a translucent tube along z, of length 1 and radius 1."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(1.0, 0.0), (1.0, 1.0)], 32), STEEL, opacity=0.35
     )
@@ -220,7 +287,7 @@ def _rod(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=8)
 def _unit_box(colour: RGB) -> Shape:
-    """A cube of side 1 around the origin."""
+    """Return a cube of side 1 around the origin."""
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return threejs.mesh(

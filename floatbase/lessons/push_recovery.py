@@ -1,11 +1,11 @@
-"""The push roses that end lessons from 05 on: measured by a command, kept with the course, drawn
-over the former lesson's.
+"""Push-recovery maps at the end of the lessons from 05 on, each over the map of the lesson before.
 
-`python -m floatbase.lessons.publish push-recovery 05` measures that of lesson 05 anew, which takes
-a minute or two, and writes it into push_recovery.json beside this file, where the lessons read it.
-A lesson that has one offers `make_controller()`, which makes its controller. What lies in grey
-below is the rose of the lesson before; or, where the robot is another one, a second rose of the
-lesson's own: "09 standing" is that of `make_standing_controller()` in the package of lesson 09.
+`python -m floatbase.lessons.publish push-recovery 05` measures the map of lesson 05 again, which
+takes a minute or two, and writes it to push_recovery.json beside this file, where the lessons read
+it. The package of such a lesson has `make_controller()`, which returns its controller. The grey map
+below is that of the lesson before. If that lesson used another robot, a lesson can have a second
+map of its own instead: "09 standing" is the map of `make_standing_controller()` in the package of
+lesson 09.
 """
 
 from __future__ import annotations
@@ -29,20 +29,34 @@ from floatbase.viewer.plots import push_recovery_plots
 _FILE = Path(__file__).with_name("push_recovery.json")
 _DIRECTIONS = 8
 _STEP, _DURATION = 5.0, 0.1  # N, s
-# s after a push, in which who stands on the spot has fallen; a lesson with steps says
-# `PUSH_RECOVERY_WATCH_TIME`, more
+# s after a push: a robot that cannot step has fallen by then; a lesson with steps sets a longer
+# time, PUSH_RECOVERY_WATCH_TIME
 _WATCH_TIME = 1.5
 
 
 def measured_push_recovery(lesson: str) -> PushRecovery:
-    """The rose of that lesson's controller, such as "05", or of a second one, "09 standing", as it
-    was measured last.
+    """Return the stored push-recovery map of a lesson.
 
-    Raises `InputError` for a lesson without one.
+    Parameters
+    ----------
+    lesson : str
+        Name of the lesson, such as "05", or of a second map, such as "09 standing".
+
+    Returns
+    -------
+    PushRecovery
+        The map as it was last measured.
+
+    Raises
+    ------
+    InputError
+        If there is no such map.
     """
     kept = _stored_pushes()
     if as_string("lesson", lesson) not in kept:
-        raise InputError(f"lesson {lesson!r} has no push rose; these have: {', '.join(kept)}.")
+        raise InputError(
+            f"Lesson {lesson!r} has no push-recovery map. There are maps of {', '.join(kept)}."
+        )
     controller = controller_factory(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     start = Simulation(controller.robot).state
@@ -52,8 +66,19 @@ def measured_push_recovery(lesson: str) -> PushRecovery:
 
 
 def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
-    """The rose of that lesson, over the former lesson's in grey. axis: polar axes to plot on; None
-    for a new figure.
+    """Plot the push-recovery map of a lesson over the map of the lesson before, which is grey.
+
+    Parameters
+    ----------
+    lesson : str
+        Name of the lesson, such as "05".
+    axis : Axes, optional
+        Polar axes to plot on; by default a new figure.
+
+    Returns
+    -------
+    Axes
+        The polar axes.
     """
     return push_recovery_plots.plot(
         measured_push_recovery(lesson), axis, theory=False, previous=_former_push_recovery(lesson)
@@ -61,10 +86,20 @@ def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
 
 
 def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """What `plot_push_recovery` plots, on the ground below the robot: items for `extra` of
-    `Viewer.show`.
+    """Draw what `plot_push_recovery` plots on the ground below the robot.
 
-    scale: length of a drawn push, m/N; None makes the widest rose half as wide again as the stance.
+    Parameters
+    ----------
+    lesson : str
+        Name of the lesson, such as "05".
+    scale : float, optional
+        Length of a push in the picture [m/N]. By default the widest map is half as wide again as
+        the stance.
+
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
     """
     return push_recovery_plots.picture(
         measured_push_recovery(lesson), scale, theory=False, previous=_former_push_recovery(lesson)
@@ -72,9 +107,22 @@ def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
 
 
 def controller_factory(lesson: str) -> Callable[[], Any]:
-    """The function that makes the controller of that lesson's rose, such as "05" or "09 standing".
+    """Return the function that makes the controller of a push-recovery map.
 
-    Raises `InputError` where there is none.
+    Parameters
+    ----------
+    lesson : str
+        Name of the lesson, such as "05", or of a second map, such as "09 standing".
+
+    Returns
+    -------
+    callable
+        Function without arguments that returns the controller.
+
+    Raises
+    ------
+    InputError
+        If there is no such controller.
     """
     second = as_string("lesson", lesson).partition(" ")[2]
     try:
@@ -83,13 +131,24 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
         )
     except (ModuleNotFoundError, AttributeError) as error:
         raise InputError(
-            f"lesson {lesson!r} has no controller to push: lessons from 05 to 09 have."
+            f"Lesson {lesson!r} has no controller to push. Lessons 05 to 09 have one."
         ) from error
     return make
 
 
 def measure_push_recovery(lesson: str) -> PushRecovery:
-    """Measure the rose of that lesson and keep it."""
+    """Measure the push-recovery map of a lesson and store it.
+
+    Parameters
+    ----------
+    lesson : str
+        Name of the lesson, such as "05", or of a second map, such as "09 standing".
+
+    Returns
+    -------
+    PushRecovery
+        The new map.
+    """
     make, watch = (
         controller_factory(lesson),
         getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME),
@@ -104,12 +163,12 @@ def measure_push_recovery(lesson: str) -> PushRecovery:
 
 
 def _lesson_package(lesson: str) -> ModuleType:
-    """Where the controllers of that lesson, or of its second rose, are."""
+    """Return the package that makes the controllers of a lesson."""
     return import_module(f"floatbase.lessons.lesson{lesson.partition(' ')[0]}")
 
 
 def _former_push_recovery(lesson: str) -> PushRecovery | None:
-    """The lesson's own second rose, else the rose of the lesson before, if there is one."""
+    """Return the second map of a lesson, or the map of the lesson before, if there is one."""
     if " " in lesson:
         return None
     kept = _stored_pushes()
@@ -119,6 +178,6 @@ def _former_push_recovery(lesson: str) -> PushRecovery | None:
 
 
 def _stored_pushes() -> dict[str, list[float]]:
-    """For each lesson its largest pushes, N."""
+    """Return the largest pushes of each lesson [N]."""
     kept: dict[str, list[float]] = json.loads(_FILE.read_text(encoding="utf-8"))
     return kept

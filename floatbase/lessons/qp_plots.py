@@ -1,4 +1,4 @@
-"""Quadratic programs in the plane, drawn: level curves, rows, and what they leave."""
+"""Plots of quadratic programs with two variables: level curves, constraints and feasible set."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from floatbase.viewer.scene.colours import GREYS
 
 Box = tuple[float, float, float, float]
 _LEVELS = 12  # curves of equal objective
-_TOLERANCE = 1e-9  # a point of a row's line counts as allowed by that row: rounding
-_NAME_OFFSET = np.array(
-    [24.0, 13.0]
-)  # points from a row's line to the middle of its name, which is wider than high
-_RESOLUTION = 90  # points of each curve, or along each side of what it is drawn through
+_TOLERANCE = 1e-9  # rounding: a point on the line of a constraint satisfies the constraint
+# typographic points from the line of a constraint to the middle of its name, which is wider than
+# high
+_NAME_OFFSET = np.array([24.0, 13.0])
+_RESOLUTION = 90  # points of each curve, or of a grid along each of its sides
 
 
 def plot(
@@ -31,17 +31,36 @@ def plot(
     point: npt.ArrayLike | None = None,
     axis: Axes | None = None,
 ) -> Axes:
-    """App. C: a QP of two variables in the plane: its level curves, its rows with names, and in
-    grey what they leave.
+    """Plot a QP of two variables: level curves, named constraints, and the feasible set in grey.
 
-    qp: of two variables, without equalities.
-    box: what is seen, from and to along the first variable and the second.
-    working_set: names of the rows that are held with equality, drawn thick.
-    point: (2,), a dot, or None.
-    axis: to plot on; None for a new figure.
+    Parameters
+    ----------
+    qp : QP
+        QP of two variables without equality constraints.
+    box : tuple of float, optional
+        Visible range: from and to along the first variable, then along the second.
+    working_set : sequence of str, optional
+        Names of the inequality constraints that hold with equality; they are drawn thick.
+    point : array_like, shape (2,), optional
+        Point that is marked with a dot.
+    axis : Axes, optional
+        Axes to plot on; by default a new figure.
 
-    Raises `InputError` for another number of variables or with equalities, `UnknownNameError` for a
-    row that does not exist.
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    InputError
+        If the QP has another number of variables or equality constraints.
+    UnknownNameError
+        If a name in `working_set` is unknown.
+
+    Notes
+    -----
+    [FBR]_, App. C.
     """
     corners = feasible_polygon(qp, box)
     for name in as_strings("working_set", working_set):
@@ -66,19 +85,34 @@ def plot(
 
 
 def feasible_polygon(qp: QP, box: Box) -> Array:
-    """Corners of what the rows of a QP in the plane leave of a box, in order, shape (k, 2); (0, 2)
-    where they leave nothing.
+    """Return the corners of the feasible set of a QP with two variables, within a box.
 
-    qp, box, errors: as for `plot`.
+    Parameters
+    ----------
+    qp : QP
+        QP of two variables without equality constraints.
+    box : tuple of float
+        Range: from and to along the first variable, then along the second.
+
+    Returns
+    -------
+    ndarray, shape (k, 2)
+        Corners in order; none if the feasible set does not meet the box.
+
+    Raises
+    ------
+    InputError
+        If the QP has another number of variables or equality constraints.
     """
     if as_instance("qp", qp, QP).n != 2 or len(qp.A):
         raise InputError(
-            f"{qp!r} does not lie in the plane: 2 variables and no equalities can be drawn."
+            f"{qp!r} cannot be plotted. It must have 2 variables and no equality constraints."
         )
     x0, x1, y0, y1 = as_array("box", box, (4,))
     if not (x0 < x1 and y0 < y1):
         raise InputError(
-            f"box is {tuple(box)}; it must be from and to along each variable, in ascending order."
+            f"box is {tuple(box)}; it must contain from and to along each variable, in ascending "
+            f"order."
         )
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     for normal, bound in zip(qp.G, qp.h, strict=True):
@@ -87,7 +121,7 @@ def feasible_polygon(qp: QP, box: Box) -> Array:
 
 
 def _clipped(corners: Array, normal: Array, bound: float) -> Array:
-    """What normal · x ≤ bound leaves of a convex polygon."""
+    """Return the part of a convex polygon with normal · x ≤ bound."""
     kept: list[Array] = []
     over = corners @ normal - bound
     for i, (here, now) in enumerate(zip(corners, over, strict=True)):
@@ -100,13 +134,14 @@ def _clipped(corners: Array, normal: Array, bound: float) -> Array:
 
 
 def _plot_levels(qp: QP, box: Box, axis: Axes) -> None:
-    """Curves of equal objective, at objectives that grow like squares: at equal distances where the
-    problem is a bowl.
+    """Plot curves of equal objective.
+
+    Their objective grows like a square, so that the curves of a bowl are equally spaced.
     """
     try:
-        root = np.linalg.inv(
-            np.linalg.cholesky(qp.H)
-        ).T  # a circle of radius r becomes the ellipse r²/2 above the least
+        # this maps a circle of radius r to the ellipse on which the objective is r²/2 above its
+        # minimum
+        root = np.linalg.inv(np.linalg.cholesky(qp.H)).T
     except np.linalg.LinAlgError:  # a valley or a plane
         _plot_contours(qp, box, axis)
         return
@@ -134,8 +169,9 @@ def _plot_contours(qp: QP, box: Box, axis: Axes) -> None:
 
 
 def _plot_constraint(qp: QP, i: int, thick: bool, box: Box, axis: Axes) -> None:
-    """The line where a row holds with equality; its name stands on the forbidden side, beside the
-    border of what is allowed.
+    """Plot the line on which a constraint holds with equality.
+
+    Its name is on the forbidden side, beside the border of the feasible set.
     """
     G, h = qp.G[i], qp.h[i]
     length = np.linalg.norm(G)

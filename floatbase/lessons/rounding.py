@@ -1,6 +1,4 @@
-"""Numbers as a reader wants them: two significant digits, zero below a floor, and the same on every
-processor.
-"""
+"""Numbers as readable text: two significant digits, no rounding noise, equal on all processors."""
 
 from __future__ import annotations
 
@@ -12,32 +10,49 @@ import numpy as np
 from floatbase._validation import as_integer, as_positive, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 
-_PLAIN_EXPONENTS = range(
-    -4, 6
-)  # exponents of ten that are written out; larger and smaller numbers are written as 1.6e7
-# of an array's largest entry: a smaller one is what rounding has left of a zero
+# exponents of ten that are written out; other numbers are written as 1.6e7
+_PLAIN_EXPONENTS = range(-4, 6)
+# fraction of an array's largest entry; a smaller entry is a zero with rounding errors
 _RELATIVE_NOISE = 1e-6
-# digits more that are rounded to first: 12.5 and what another processor makes of it, 12.4999999,
-# both give 13
+# additional digits of the first rounding: 12.5, and 12.4999999 from another processor, both give 13
 _GUARD_DIGITS = 4
 
 
 def rounded(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str:
-    """Numbers as text, each with so many significant digits: "69 mm", "(0.1, 0, -2) N". There is no
-    "-0".
+    """Write numbers as text with a few significant digits, such as "69 mm" or "(0.1, 0, -2) N".
 
-    x: a number, or an array or list of numbers of any shape, which become "(…, …)", row by row.
-    unit: is written behind it.
-    digits: significant ones, from 1 to 12; zeros at the end of a fraction are left out, so that 2.0
-        is "2".
-    floor: what is smaller than this is "0"; in an array so is an entry below 1e-6 of the largest.
+    Halves are rounded away from zero. The number is first rounded to four additional digits, so
+    that the last bits of a computed number do not matter: 12.4999999 is "13", like 12.5. NaN is
+    "not a number", without a unit. There is no "-0".
 
-    Halves are rounded away from zero, after a first rounding to four digits more, so that the last
-    bits of a computed number decide nothing: 12.4999999 is "13" as 12.5 is. NaN is "not a number",
-    without unit.
+    Parameters
+    ----------
+    x : array_like
+        A number, or numbers of any shape, which are written as "(…, …)", row by row.
+    unit : str, optional
+        Unit, which is written after the number.
+    digits : int, optional
+        Significant digits, from 1 to 12. Trailing zeros of a fraction are omitted: 2.0 is "2".
+    floor : float, optional
+        Numbers below this [in `unit`] are written as "0". So are entries of an array below 1e-6 of
+        its largest entry.
 
-    Raises `InputError` for what holds no numbers, such as truth values: say what the number is that
-    decides.
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    InputError
+        If `x` does not contain numbers. Truth values are not numbers.
+
+    Examples
+    --------
+    >>> rounded(0.06923, "m")
+    '0.069 m'
+    >>> rounded([0.1, 1e-12, -2.0], "N")
+    '(0.1, 0, -2) N'
     """
     numbers = numeric_copy(x)
     if numbers is None:
@@ -77,5 +92,5 @@ def _format_scalar(x: float, digits: int, smallest: float) -> str:
 
 
 def _strip_trailing_zeros(text: str) -> str:
-    """Without the zeros at the end of a fraction."""
+    """Remove the zeros at the end of a fraction."""
     return text.rstrip("0").rstrip(".") if "." in text else text

@@ -1,7 +1,7 @@
-"""Panels on a site, which has no kernel: what a panel shows is computed before, at stops of its
-sliders.
+"""Slider panels on a static page: pictures computed in advance for some positions of the sliders.
 
-Of few stops all combinations are computed, of many one slider at a time, from where all began.
+If there are few combinations of positions, all of them are computed. Otherwise one slider at a time
+moves, and the others stay in their initial position.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from floatbase.lessons.panels import SliderPanel
     from floatbase.viewer import Viewer
 
-MAX_COMBINATIONS = 100  # combinations that are computed
-_SAMPLES, _SAMPLES_OF_SLOW = 11, 9  # stops of a slider, about; of one that is slow to draw
-_SAMPLES_OF_TWO = (9, 7, 6, 5)  # the same for two sliders: the first with few enough combinations
-_ROUND_STEPS = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: from stop to stop
-# of the way to the next stop: a round number that is nearer to a bound than this is left out
+MAX_COMBINATIONS = 100  # largest number of combinations that are all computed
+# approximate number of positions of a slider; of a slider that is slow to draw
+_SAMPLES, _SAMPLES_OF_SLOW = 11, 9
+_SAMPLES_OF_TWO = (9, 7, 6, 5)  # of each of two sliders: the first with few enough combinations
+_ROUND_STEPS = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: distance between two positions
+# fraction of that distance: a round number that is closer to a bound than this is left out
 _MIN_GAP = 0.22
 DIRECTIONS = {
     "forwards": 0.0,
@@ -32,26 +33,27 @@ DIRECTIONS = {
     "backwards": 180.0,
     "to the right": 270.0,
 }  # degrees
-_PUSH_START, _TIME_SEEN = (
-    0.1,
-    1.5,
-)  # s: when a recorded push begins, and how long it is seen from then on
-_FRAME_RATE = 15.0  # pictures a second of a recorded push
-_SAMPLED_NOTE = "Computed for these stops; in the live lesson the sliders have all values between."
-_ONE_AT_A_TIME_NOTE = " Here one slider moves at a time: the others go back to where they began."
+# s: start of a recorded push, and how long the recording goes on from then
+_PUSH_START, _TIME_SEEN = 0.1, 1.5
+_FRAME_RATE = 15.0  # pictures per second of a recorded push
+_SAMPLED_NOTE = "Computed for these positions only. In the live lesson the sliders move "
+"continuously."
+_ONE_AT_A_TIME_NOTE = " Here one slider moves at a time: the others return to their initial "
+"position."
 _OUTCOME_TEXTS = {
     "completed": "it stands",
     "fell": "it falls",
-    "controller failed": "its controller finds no answer, and it falls",
+    "controller failed": "its controller finds no solution, and it falls",
 }
-RECORDED_NOTE = "Recorded. In the live lesson you push while it runs, in any direction."
+RECORDED_NOTE = "Recorded. In the live lesson you can push at any time and in any direction."
 
 
 def sample_values(
     low: float, first: float, high: float, step: float, count: int = _SAMPLES
 ) -> tuple[float, ...]:
-    """Some `rounded` values from `low` to `high`, with both, `first` and round ones between, all
-    multiples of `step` from low.
+    """Return rounded values from `low` to `high`: the bounds, `first`, and round values between.
+
+    All values are multiples of `step` above `low`.
     """
     if not high > low:
         return (low,)
@@ -67,9 +69,7 @@ def sample_values(
 
 
 def _round_spacings(width: float, step: float) -> list[float]:
-    """Round numbers between a step and the whole width; whole numbers of steps, where there are
-    any.
-    """
+    """Return round numbers between a step and the width, if possible multiples of the step."""
     power = math.floor(math.log10(width))
     gaps = [
         part * 10.0 ** (power - i)
@@ -82,7 +82,7 @@ def _round_spacings(width: float, step: float) -> list[float]:
 
 
 def panel_samples(panel: SliderPanel) -> dict[str, tuple[float, ...]]:
-    """The stops of each slider of a panel: those that the lesson gives, else round ones."""
+    """Return the positions of each slider, from the lesson or else round numbers."""
     counts = _SAMPLES_OF_TWO if len(panel.sliders) == 2 else (_SAMPLES,)
     sliders = panel.sliders.items()
     found = [
@@ -106,9 +106,21 @@ def _slider_samples(slider: Any, given: Sequence[float] | None, count: int) -> t
 
 
 def combinations(counts: Sequence[int], first: Sequence[int]) -> tuple[list[tuple[int, ...]], bool]:
-    """The combinations to compute, as numbers of stops, and whether these are all of them.
+    """Return the combinations of positions to compute, and whether these are all combinations.
 
-    counts: how many stops each slider has. first: number of the stop at which each begins.
+    Parameters
+    ----------
+    counts : sequence of int
+        Number of positions of each slider.
+    first : sequence of int
+        Index of the initial position of each slider.
+
+    Returns
+    -------
+    list of tuple of int
+        For each combination, the index of the position of each slider.
+    bool
+        Whether the list is complete.
     """
     if math.prod(counts) <= MAX_COMBINATIONS:
         return list(product(*(range(count) for count in counts))), True
@@ -121,7 +133,7 @@ def combinations(counts: Sequence[int], first: Sequence[int]) -> tuple[list[tupl
 
 
 def precomputed_panel(panel: SliderPanel) -> dict[str, Any]:
-    """The mimebundle of a slider panel for a site. The panel is left as it was."""
+    """Return the mimebundle of a slider panel for a static page, leaving the panel as it was."""
     values = panel_samples(panel)
     now = {name: float(slider.value) for name, slider in panel.sliders.items()}
     first = [samples.index(now[name]) for name, samples in values.items()]
@@ -141,7 +153,7 @@ def precomputed_panel(panel: SliderPanel) -> dict[str, Any]:
 
 
 def _site_control(slider: Any, values: Sequence[float], first: int) -> Control:
-    """The control of a site for a slider of a panel."""
+    """Return the control on a static page that replaces a slider of a panel."""
     name, _, unit = slider.description.partition(" [")
     return Control(
         name,
@@ -156,10 +168,21 @@ def recorded_pushes(
     forces: Iterable[float],
     directions: Sequence[str],
 ) -> dict[str, Any]:
-    """The mimebundle of recorded runs, one for each force (N) in each direction, for a site.
-    Without a push they stand still.
+    """Return the mimebundle of recorded pushes for a static page; without a push, the robots stand.
 
-    titles: what stands above each picture -> its viewer, and what runs in it.
+    Parameters
+    ----------
+    titles : mapping of str to tuple
+        For each title of a picture: its viewer, simulation and controller.
+    forces : iterable of float
+        Forces of the pushes [N].
+    directions : sequence of str
+        Names of the directions, keys of `DIRECTIONS`.
+
+    Returns
+    -------
+    dict
+        The mimebundle.
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
     for view, sim, controller in titles.values():
@@ -194,7 +217,7 @@ def _record_push(sim: Simulation, controller: Controller, force: float, towards:
 
 
 def _outcome_texts(titles: Iterable[str], records: Sequence[Rollout]) -> Iterator[str]:
-    """What became of each, in words."""
+    """Yield the outcome of each record in words."""
     for title, record in zip(titles, records, strict=True):
         fate = _OUTCOME_TEXTS.get(record.outcome, record.outcome)
         yield fate if len(records) == 1 else f"{title}: {fate}"

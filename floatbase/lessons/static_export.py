@@ -1,9 +1,8 @@
-"""Pictures for pages without a kernel: of some viewers what they show first, and for each stop of
-the controls what differs.
+"""Pictures for pages without a kernel: the first scene of some viewers, and the changes from there.
 
-Where FLOATBASE_VIEWER=site is in the environment, a display puts this beside its image into the
-output, as plain data: the commands of the scenes (see `protocol`), each held once, and numbers that
-refer to them.
+If the environment has FLOATBASE_VIEWER=site, a display adds this to the output beside its image, as
+plain data: the commands of the scenes (see `protocol`), each stored once, and numbers that refer to
+them.
 """
 
 from __future__ import annotations
@@ -23,21 +22,34 @@ from floatbase.viewer.scene.store import Scene
 if TYPE_CHECKING:
     from floatbase.viewer import Viewer
 
-MODE = "site"  # of `display_mode`
+MODE = "site"  # value of `display_mode`
 MIME = "application/vnd.floatbase.picture+json"
-REMOVED = -1  # in place of a command: there is none under this key
+REMOVED = -1  # instead of the number of a command: the scene has none with this key
 _KINDS = ("range", "choice", "switch")
 _END = (protocol.ANIMATION[0], protocol.ANIMATION[1], "end")
 
 
 @dataclass(frozen=True)
 class Control:
-    """A control with so many stops.
+    """Control on a static page, with a fixed number of positions.
 
-    name: what stands beside it. values: what a stop is called. first: number of the first stop.
-        kind: "range" for a slider,
-    "choice" of one of several, "switch" for one that is off or on. unit: of the values.
-    Raises `ViewerError` for another kind and for a first stop that there is none of.
+    Parameters
+    ----------
+    name : str
+        Label of the control.
+    values : tuple of str
+        Label of each position.
+    first : int
+        Index of the initial position.
+    kind : {"range", "choice", "switch"}
+        "range" is a slider, "choice" selects one of several, "switch" is off or on.
+    unit : str
+        Unit of the values.
+
+    Raises
+    ------
+    ViewerError
+        If the kind is unknown or the initial position does not exist.
     """
 
     name: str
@@ -49,16 +61,25 @@ class Control:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS or not 0 <= self.first < len(self.values):
             raise ViewerError(
-                f"no control is of the kind {self.kind!r} with stop {self.first} of {self.values}."
+                f"A control of the kind {self.kind!r} cannot start at stop {self.first} of "
+                f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the stop must "
+                f"exist."
             )
 
 
 class StaticExport:
-    """What some viewers show now, and what they show at stops of the controls.
+    """What some viewers show now, and what they show at other positions of the controls.
 
-    views: side by side; none where the notes have all there is to see. beside: whether a note
-        stands to their right.
-    words: what stands below, such as that more of it is live only. titles: above each picture.
+    Parameters
+    ----------
+    views : sequence of Viewer
+        Viewers, side by side; none if the notes contain everything there is to see.
+    beside : bool, optional
+        Whether a note is to the right of the pictures.
+    words : str, optional
+        Text below, such as what only the live lesson can do.
+    titles : sequence of str, optional
+        Title above each picture.
     """
 
     def __init__(
@@ -87,8 +108,14 @@ class StaticExport:
         }  # fmt: skip
 
     def add_sample(self, at: Iterable[int], note: str = "") -> None:
-        """What the viewers show now belongs to these stops of the controls, one of each. note:
-        HTML.
+        """Add what the viewers show now as the picture at one position of the controls.
+
+        Parameters
+        ----------
+        at : iterable of int
+            Index of the position of each control.
+        note : str, optional
+            The note at this position, as HTML.
         """
         scenes = [_entries(view.window.scene) for view in self._views]
         changed = [
@@ -97,8 +124,19 @@ class StaticExport:
         self._samples[",".join(map(str, at))] = [self._note_number(note), *changed]
 
     def bundle(self, controls: Sequence[Control] = (), together: bool = True) -> dict[str, Any]:
-        """The mimebundle of a display. together: whether there is a stop for every combination of
-        the controls' stops.
+        """Return the mimebundle of the display.
+
+        Parameters
+        ----------
+        controls : sequence of Control, optional
+            The controls.
+        together : bool, optional
+            Whether there is a picture for every combination of positions.
+
+        Returns
+        -------
+        dict
+            The mimebundle.
         """
         packed = base64.b64encode(
             gzip.compress(protocol.frame(self._commands), 6, mtime=0)
@@ -136,7 +174,7 @@ class StaticExport:
     def _changes(
         self, first: dict[protocol.Key, bytes], now: dict[protocol.Key, bytes]
     ) -> list[int]:
-        """Numbers of key and command, in turn, of all that differs from the first."""
+        """Return numbers of key and command, in turn, of everything that differs from the first."""
         gone = [self._numbers(key, None) for key in first if key not in now]
         fresh = [
             self._numbers(key, command) for key, command in now.items() if first.get(key) != command
@@ -145,12 +183,12 @@ class StaticExport:
 
 
 def commands(data: dict[str, Any]) -> list[bytes]:
-    """The commands in the data of a bundle, in the order of their numbers."""
+    """Return the commands in the data of a bundle, in the order of their numbers."""
     return protocol.unframe(gzip.decompress(base64.b64decode(data["commands"])))
 
 
 def _entries(scene: Scene) -> dict[protocol.Key, bytes]:
-    """The scene without animations that have ended."""
+    """Return the scene without animations that have ended."""
     ended = protocol.no_animation()[1]
     return {
         key: command for key, command in scene.file_entries() if key != _END and command != ended
@@ -158,7 +196,7 @@ def _entries(scene: Scene) -> dict[protocol.Key, bytes]:
 
 
 def bundle(view: Viewer, words: str = "") -> dict[str, Any]:
-    """The mimebundle of one viewer: what it shows now. words: what stands below."""
+    """Return the mimebundle of what a viewer shows now, with a text below."""
     return StaticExport([view], words=words).bundle()
 
 

@@ -1,6 +1,4 @@
-"""Handing in: what a learner has answered and predicted, as one file to give to a teacher. Nothing
-is sent.
-"""
+"""Handing in: write answers and predictions to a file for the teacher. Nothing is sent."""
 
 from __future__ import annotations
 
@@ -19,23 +17,37 @@ FILE_FORMAT = "answers to the floatbase course"
 
 
 def hand_in(name: str, folder: str | Path = ".") -> Path:
-    """Write all answers and predictions of this learner into one file, to be given to a teacher;
-    returns where it is.
+    """Write your answers and predictions to a file for your teacher.
 
-    name: the learner's, as the teacher knows it. folder: where to; in a lesson, the folder of the
+    A file that you have handed in before is replaced.
+
+    Parameters
+    ----------
+    name : str
+        Your name, as your teacher knows it.
+    folder : str or Path, optional
+        Folder of the file. By default the current folder, which in a lesson is the folder of the
         lessons.
-    A file that the same learner has handed in before is replaced. Raises `InputError` where there
-    is nothing to hand in yet, or where no file can be written.
+
+    Returns
+    -------
+    Path
+        Path of the file.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to hand in yet, or if the file cannot be written.
     """
     if not re.search(r"\w", as_string("name", name)) or not name.isprintable():
         raise InputError(
-            'name must be the name that your teacher knows you by, as in hand_in("Ada Lovelace").'
+            'name must be the name by which your teacher knows you, as in hand_in("Ada Lovelace").'
         )
     tried, answers, predicted = progress.load(), progress.answers(), progress.predictions()
     if not tried and not predicted:
         raise InputError(
-            f"there is nothing to hand in yet: no answer and no prediction is kept in "
-            f"{progress.path()}."
+            f"There is nothing to hand in yet: {progress.path()} contains no answers and no "
+            f"predictions."
         )
     exercises = {key: {**entry, "answer": answers.get(key)} for key, entry in tried.items()}
     written = {
@@ -49,7 +61,8 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         path.write_text(json.dumps(written, indent=1), encoding="utf-8")
     except OSError as error:
         raise InputError(
-            f"{path} cannot be written: {error.strerror}. Name a folder: hand_in(…, folder=…)."
+            f"{path} cannot be written: {error.strerror}. Choose another folder: "
+            f"hand_in(…, folder=…)."
         ) from None
     known = all_exercises()  # an older course may have had others
     solved = [key for key, entry in tried.items() if entry["right"] and key in known]
@@ -57,7 +70,7 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     print(f"{path}: {done}. Give this file to your teacher.")
     if lost := [key for key in solved if key not in answers]:
         print(
-            f"An older floatbase did not keep your answers to {', '.join(lost)}: check them once "
-            f"more, then hand in again."
+            f"An older version of floatbase did not save your answers to {', '.join(lost)}. Check "
+            f"them once more, then hand in again."
         )
     return path

@@ -1,4 +1,4 @@
-"""Drawings of the lessons as SVG, quick enough for a slider. Text has the page's own colour."""
+"""Drawings of the lessons as SVG, fast enough for a slider. Text has the colour of the page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,22 @@ from floatbase._validation import Array
 
 
 def element(tag: str, content: str = "", /, **attributes: str | float) -> str:
-    """One element. attributes: "_" in a name stands for "-"; floats, pixels, get one decimal."""
+    """Write an SVG element.
+
+    Parameters
+    ----------
+    tag : str
+        Name of the element.
+    content : str, optional
+        What it contains.
+    **attributes : str or float
+        Attributes; "_" in a name stands for "-". Floats are lengths in pixels and get one decimal.
+
+    Returns
+    -------
+    str
+        The element as text.
+    """
     written = "".join(
         f' {name.replace("_", "-")}="{f"{value:.1f}" if isinstance(value, float) else value}"'
         for name, value in attributes.items()
@@ -18,50 +33,64 @@ def element(tag: str, content: str = "", /, **attributes: str | float) -> str:
 
 
 def polygon(corners: Array, **style: str | float) -> str:
-    """A closed line through corners, (n, 2), pixels."""
+    """Draw a closed line through corners, shape (n, 2), in pixels."""
     return element("polygon", points=_coordinates(corners), **style)
 
 
 def polyline(points: Array, **style: str | float) -> str:
-    """A line from point to point, (n, 2), pixels."""
+    """Draw a line through points, shape (n, 2), in pixels."""
     return element("polyline", points=_coordinates(points), fill="none", **style)
 
 
 def line(start: npt.ArrayLike, end: npt.ArrayLike, **style: str | float) -> str:
-    """A straight line between two points, (2,), pixels."""
+    """Draw a straight line between two points, shape (2,), in pixels."""
     (x1, y1), (x2, y2) = np.asarray([start, end], dtype=np.float64).tolist()
     return element("line", x1=x1, y1=y1, x2=x2, y2=y2, **{"stroke": "currentColor", **style})
 
 
 def circle(centre: npt.ArrayLike, radius: float, **style: str | float) -> str:
-    """A circle, pixels."""
+    """Draw a circle; centre, shape (2,), and radius in pixels."""
     x, y = np.asarray(centre, dtype=np.float64).tolist()
     return element("circle", cx=x, cy=y, r=float(radius), **style)
 
 
 def text(at: npt.ArrayLike, words: str, size: int = 13, anchor: str = "middle") -> str:
-    """A line of text. at: (2,), pixels, of its anchor: "start", "middle" or "end"."""
+    """Draw a line of text at a point, shape (2,), in pixels: its "start", "middle" or "end"."""
     x, y = np.asarray(at, dtype=np.float64).tolist()
     return element("text", words, x=x, y=y, font_size=size, text_anchor=anchor)
 
 
 def upright_text(at: npt.ArrayLike, words: str, size: int = 13) -> str:
-    """A line of text that reads upwards. at: (2,), pixels, of its middle."""
+    """Draw a line of text that reads upwards, with its middle at a point, shape (2,), in pixels."""
     x, y = np.asarray(at, dtype=np.float64).tolist()
     turned = f"translate({x:g} {y:g}) rotate(-90)"
     return element("text", words, transform=turned, font_size=size, text_anchor="middle")
 
 
 def drawing(content: str, width: float, view_box: str) -> str:
-    """A picture that shrinks on a narrow page. view_box: left, top, width, height, pixels."""
+    """Draw a picture that shrinks on a narrow page; view_box: left, top, width, height [px]."""
     style = {"style": "max-width: 100%", "fill": "currentColor"}
     return element("svg", content, width=width, viewBox=view_box, **style)
 
 
 def captioned(content: str, size: tuple[int, int], margin: int, *lines: str) -> str:
-    """A picture, cut off at its size, with lines of text below.
+    """Draw a picture, clipped to its size, with lines of text below.
 
-    size: width and height, pixels. margin: pixels on the left and right, for wide text.
+    Parameters
+    ----------
+    content : str
+        Elements of the picture.
+    size : tuple of int
+        Width and height [px].
+    margin : int
+        Margin on the left and right, for long lines [px].
+    *lines : str
+        The lines of text.
+
+    Returns
+    -------
+    str
+        The drawing as SVG.
     """
     width, height = size
     box = element("svg", content, x=0, y=0, width=width, height=height)
@@ -71,10 +100,21 @@ def captioned(content: str, size: tuple[int, int], margin: int, *lines: str) -> 
 
 
 def from_above(points: Array, middle: tuple[float, float], scale: float) -> Array:
-    """Where horizontal places, (n, 2) or more, m, are in a drawing with x upwards and y to the
-    left, (n, 2), pixels.
+    """Convert points to a drawing from above, with x upwards and y to the left.
 
-    middle: (2,), pixels, of the place 0. scale: pixels for 1 m.
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2) or (n, 3)
+        Points in the world frame [m].
+    middle : tuple of float
+        Place of the origin in the drawing [px].
+    scale : float
+        Scale [px/m].
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Points in the drawing [px].
     """
     return np.asarray(np.array(middle) - scale * points[:, 1::-1])
 

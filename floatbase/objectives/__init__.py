@@ -1,4 +1,7 @@
-"""Costs: moved between spaces, on the centre of mass, and as tasks (§3 of the course text)."""
+"""Tasks, costs on the centre of mass, and pullbacks of costs between spaces.
+
+Section 3 of the course text.
+"""
 
 from floatbase.objectives._task import Task
 from floatbase.objectives.angular_momentum import AngularMomentumTask

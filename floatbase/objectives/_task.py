@@ -1,12 +1,11 @@
-"""Tasks: what a controller should bring about, each a weighted affine residual, actual - desired,
-in q̈, τ or λ.
+"""Tasks: the goals of a controller, as weighted affine residuals (actual - desired) in q̈, τ or λ.
 
-A motion task asks for the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
-position and velocity. Its residual is J q̈ + J̇ q̇ - a, its cost (weight / 2) ‖residual‖², a term
-of ψ in (26).
+A motion task requests the acceleration a = a_ff - kp e - kd ė, where e and ė are the errors of
+position and velocity. Its residual is J q̈ + J̇ q̇ - a. Its cost (weight / 2) ‖residual‖² is a term
+of ψ in eq. (26).
 
-A target is a value, or a function of the time t in s that gives one. That of a motion task gives
-the position alone, and the target's velocity and acceleration count as zero, or all three together:
+A target is a value or a function of the time t [s]. The function of a motion task returns either
+the position alone, with zero velocity and acceleration, or all three:
 `lambda t: (position, velocity, acceleration)`.
 """
 
@@ -46,43 +45,63 @@ Shapes: TypeAlias = Mapping[str, Shape]
 class Task(Protocol):
     """A weighted residual on one block of x = (q̈, τ, λ).
 
-    name: in messages and tables. weight: of ½‖residual‖² in the objective.
+    A user-defined object with the attributes `name`, `weight` and `block` and the method `residual`
+    is a task for both backends. `block` is "qdd", "tau" or "forces".
 
-    A user-defined object of this form is a task on both backends. This one controls the height of
-    the centre of mass; its desired acceleration is 100 (h - z) - 20 ż, m/s².
+    Examples
+    --------
+    This task controls the height of the centre of mass. Its desired acceleration is
+    100 (h - z) - 20 ż [m/s²].
 
-        class Height:
-            name, weight, block = "height", 10.0, "qdd"
-
-            def __init__(self, height):
-                self.height = height
-
-            def residual(self, eom, t=0.0):
-                s = eom.state
-                desired = 100.0 * (self.height - s.com[2:]) - 20.0 * s.com_velocity[2:]
-                return fb.Affine(s.com_jacobian[2:], s.com_drift[2:] - desired)
+    >>> class Height:
+    ...     name, weight, block = "height", 10.0, "qdd"
+    ...
+    ...     def __init__(self, height):
+    ...         self.height = height
+    ...
+    ...     def residual(self, eom, t=0.0):
+    ...         s = eom.state
+    ...         desired = 100.0 * (self.height - s.com[2:]) - 20.0 * s.com_velocity[2:]
+    ...         return fb.Affine(s.com_jacobian[2:], s.com_drift[2:] - desired)
+    >>> isinstance(Height(0.3), Task)
+    True
     """
 
     block: ClassVar[Block]
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name in messages and tables."""
+
     @property
-    def weight(self) -> float: ...
+    def weight(self) -> float:
+        """Weight of ½‖residual‖² in the objective, per squared unit of the residual."""
+
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """The residual as an `Affine` of the task's block at time t."""
+        """Compute the residual as an affine map of the task's block.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at the current state.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        Affine
+            Map from the block (q̈, τ or λ) to the residual, actual - desired.
+        """
 
 
 class TargetTask(Value):
     """Base of the tasks of this package: dataclasses that declare their targets.
 
-    A new one needs this class, its fields, `block`, `target_shapes` and `residual`.
-
-    target_shapes: shape of each target by the name of its field, in numbers or "nq", "d" and "k";
-        the first may be a function of time, the others are its derivatives.
-    compiled_as: the form of the compiled tick that computes this task, as in
-        `control.tick.problem_arrays`; without one its `residual` is called there. A derived class
-        does not inherit it, since its residual may be another.
+    A derived class defines its fields, `block`, `target_shapes` and `residual`. `target_shapes`
+    maps the field of each target to its shape, in numbers or "nq", "d" and "k". The first target
+    may be a function of time; the others are its derivatives. `compiled_as` names the form of this
+    task in the compiled tick, see `control.tick.problem_arrays`; without it, the compiled tick
+    calls `residual`. Derived classes do not inherit `compiled_as`, since their residual may differ.
     """
 
     target_shapes: ClassVar[Shapes]
@@ -92,13 +111,11 @@ class TargetTask(Value):
 
     @property
     def name(self) -> str:
-        """In messages and tables; a field or a property of each task."""
+        """Name in messages and tables, a field or a property of each task."""
         raise NotImplementedError
 
     def __post_init__(self) -> None:
-        """Check gains and weight, and copy the targets that do not move; kd is critically damped,
-        2 √kp, by default.
-        """
+        """Check gains and weight, and copy constant targets; the default of kd is 2 √kp."""
         as_string("name of a task", self.name)
         as_string("frame of a task", getattr(self, "frame", ""))
         fields: dict[str, object] = {
@@ -118,17 +135,18 @@ class TargetTask(Value):
                 as_callable(label, target, f"{name}(t)")
             elif name != first and callable(target):
                 raise InputError(
-                    f"{label} cannot be a function: let {first} be one, and give {self._all_hint}."
+                    f"{label} cannot be a function. Make {first} a function that returns "
+                    f"{self._all_hint}."
                 )
             elif (
                 target is not None or getattr(type(self), name, ...) is not None
-            ):  # None counts where it is the default
+            ):  # None is valid only as the default
                 array = self._as_target(label, target, shape)
                 fields[name] = array if name != first else self._checked(array, None)
                 if time_varying and np.any(array):
                     raise InputError(
-                        f"{label} must be left out, for {first} is a function: let it give "
-                        f"{self._all_hint}."
+                        f"{label} must be left out, because {first} is a function. Let the "
+                        f"function return {self._all_hint}."
                     )
         for name, value in fields.items():
             object.__setattr__(self, name, value)
@@ -141,10 +159,24 @@ class TargetTask(Value):
 
     @property
     def _all_hint(self) -> str:
-        return f"all together, as in lambda t: ({', '.join(self.target_shapes)})"
+        """Example of a function that returns the target with its derivatives."""
+        return f"all of them, as in lambda t: ({', '.join(self.target_shapes)})"
 
     def shapes_for(self, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
-        """Shape of each target by the name of its field, for a robot with k contact forces."""
+        """Return the shape of each target by the name of its field.
+
+        Parameters
+        ----------
+        robot : Robot
+            Robot of the task.
+        k : int
+            Number of contact force components.
+
+        Returns
+        -------
+        dict of str to tuple of int
+            Shapes of the targets.
+        """
         sizes = {"nq": robot.nq, "d": robot.d, "k": k}
         return {
             name: tuple(sizes[n] if isinstance(n, str) else n for n in shape)
@@ -152,10 +184,27 @@ class TargetTask(Value):
         }
 
     def targets_at(self, robot: Robot, k: int, t: float) -> list[Array]:
-        """The targets at time t in s, in the order of `target_shapes`, with k contact forces.
+        """Return the targets at a time, in the order of `target_shapes`.
 
-        Raises `InputError` for a function's value that has another shape, or is no rotation or
-        configuration.
+        Parameters
+        ----------
+        robot : Robot
+            Robot of the task.
+        k : int
+            Number of contact force components.
+        t : float
+            Time [s].
+
+        Returns
+        -------
+        list of ndarray
+            Target and its derivatives.
+
+        Raises
+        ------
+        InputError
+            If a function returns a value of the wrong shape, or one that is not a rotation matrix
+            or a configuration where such a value is needed.
         """
         shapes = self.shapes_for(robot, k)
         values = [getattr(self, name) for name in shapes]
@@ -175,24 +224,22 @@ class TargetTask(Value):
         return [self._checked(targets[0], robot), *targets[1:]]
 
     def _targets(self, eom: EquationsOfMotion, t: float) -> list[Array]:
-        """The targets that a residual is asked for with."""
+        """Return the targets of a residual after checking its arguments."""
         as_instance("eom", eom, EquationsOfMotion)
         return self.targets_at(eom.robot, eom.k, as_number("t", t, "s"))
 
     def _as_target(self, label: str, target: Any, shape: Shape) -> Array:
-        """A target that does not move, checked as far as it can be without a robot."""
+        """Return a constant target, checked as far as possible without a robot."""
         return as_array(label, target, tuple(None if isinstance(n, str) else n for n in shape))
 
     def _checked(self, target: Array, robot: Robot | None) -> Array:
-        """The first target, after checking what its shape does not say; robot: None when the task
-        is made.
-        """
+        """Return the first target after checking its values; `robot` is None at construction."""
         return target
 
     def _split(
         self, value: Any, shape: tuple[int, ...], *derivative_shapes: tuple[int, ...]
     ) -> list[Any]:
-        """What a function of time gave, with zeros for its derivatives unless it gave them all."""
+        """Return the result of a target function, with zeros for derivatives that it lacks."""
         is_sequence = (
             derivative_shapes
             and (isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim))
@@ -204,11 +251,12 @@ class TargetTask(Value):
         if len(value) == 1 + len(derivative_shapes):
             return list(value)
         raise InputError(
-            f"the function of {self.name} gave {len(value)} targets; it must give one, or "
-            f"{self._all_hint}."
+            f"The target function of {self.name} returned {len(value)} values. It must return the "
+            f"target alone, or {self._all_hint}."
         )
 
 
 @lru_cache(maxsize=64)
 def _zeros(shape: tuple[int, ...]) -> Array:
+    """Return a read-only array of zeros."""
     return frozen(np.zeros(shape))

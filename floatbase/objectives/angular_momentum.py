@@ -1,4 +1,4 @@
-"""`AngularMomentumTask`: the whole robot's angular momentum about its centre of mass."""
+"""Task for the angular momentum of the whole robot about its centre of mass."""
 
 from __future__ import annotations
 
@@ -15,18 +15,29 @@ from floatbase.objectives._task import Shapes, Target, TargetTask
 
 @dataclass(frozen=True, eq=False)
 class AngularMomentumTask(TargetTask):
-    """Bring the angular momentum k_G about the centre of mass to a target; residual in q̈, N·m.
+    """A task that brings the angular momentum k_G about the centre of mass to a target.
 
     The residual is d/dt k_G - (d/dt k_desired - kd (k_G - k_desired)), where d/dt k_G is affine in
-    q̈. With the default target it damps rotation of the whole robot. In contact it is (21): the
-    moment of the contact forces about the centre of mass.
+    q̈. With the default target, the task damps rotation of the whole robot. In contact, d/dt k_G is
+    the moment of the contact forces about the centre of mass, eq. (21).
 
-    momentum: shape (3,), kg·m²/s, world; or a function of t that gives it, or (momentum, rate).
-    rate: shape (3,), N·m, world, of a target that is no function.
-    kd: gain on the momentum, 1/s.
-    weight, name: as for `CoMTask`.
+    Parameters
+    ----------
+    momentum : array_like, shape (3,), or callable, optional
+        Target in the world frame [kg·m²/s], or a function of the time t [s] that returns
+        `momentum` or `(momentum, rate)`. The default is zero.
+    rate : array_like, shape (3,), optional
+        Time derivative of a constant target, in the world frame [N·m].
+    kd : float, optional
+        Gain on the momentum error [1/s].
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(N·m)²].
+    name : str, optional
+        Name in messages and tables.
 
-    Source: Orin, Goswami, Lee, Centroidal dynamics of a humanoid robot, 2013.
+    Notes
+    -----
+    Centroidal dynamics are described in [Orin2013]_.
     """
 
     momentum: Target = (0.0, 0.0, 0.0)
@@ -38,9 +49,24 @@ class AngularMomentumTask(TargetTask):
     target_shapes: ClassVar[Shapes] = {"momentum": (3,), "rate": (3,)}
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """A_k q̈ + Ȧ_k q̇ - (rate - kd (k_G - momentum)), shape (3,), N·m, where k_G = A_k q̇."""
+        """Compute the residual A_k q̈ + Ȧ_k q̇ - (rate - kd (k_G - momentum)), with k_G = A_k q̇.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at the current state.
+        t : float, optional
+            Time at which the targets are evaluated [s].
+
+        Returns
+        -------
+        Affine
+            Map from q̈ to the residual, shape (3,), in the world frame [N·m].
+        """
         momentum, rate = self._targets(eom, t)
-        model, state = eom.robot.model, eom.state
-        data = model.createData()
-        drift = pin.dccrba(model, data, state.q, state.v) @ state.v
-        return Affine(data.Ag[3:], drift[3:] - rate + self.kd * (data.hg.angular - momentum))
+        robot, state = eom.robot, eom.state
+        data = state._data
+        # of one joint Pinocchio gives (6,)
+        rate_matrix = pin.dccrba(robot.model, data, state.q, state.v).reshape(6, robot.nv)
+        drift, matrix = rate_matrix[3:] @ state.v, data.Ag.reshape(6, robot.nv)[3:]
+        return Affine(matrix, drift - rate + self.kd * (data.hg.angular - momentum))

@@ -1,5 +1,6 @@
-"""The centre of mass steered by forces: momentum, G_f, G_τ, wrenches, force bias, torque redundancy
-(20)-(25).
+"""Centroidal dynamics: momentum, net force and moment, force bias and torques for given forces.
+
+Sections 3.1.1 and 3.1.2 of the course text.
 """
 
 from __future__ import annotations
@@ -35,11 +36,24 @@ from floatbase.robots import State
 
 
 def centroidal_momentum(state: State) -> Array:
-    """Momentum of the whole robot, shape (6,), world: linear, kg·m/s, then angular about the centre
-    of mass, kg·m²/s.
+    """Compute the linear and angular momentum of the whole robot about its centre of mass.
 
-    Linear m ẋ_c, angular Σ (x_i - x_c) × m_i ẋ_i over all particles: what (20)(21) say that outside
-    forces change.
+    The linear momentum is m ẋ_c. The angular momentum is Σ (x_i - x_c) × m_i ẋ_i over all
+    particles. Only external forces change them.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        Linear [kg·m/s] and angular momentum [kg·m²/s] in the world frame.
+
+    Notes
+    -----
+    Centroidal momentum is described in [Orin2013]_.
     """
     as_instance("state", state, State)
     model = state.robot.model
@@ -49,11 +63,22 @@ def centroidal_momentum(state: State) -> Array:
 
 
 def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
-    """Time derivative of `centroidal_momentum` under q̈, shape (nv,), as v of `State`; shape (6,),
-    N and N·m, world.
+    """Compute the time derivative of the centroidal momentum for an acceleration q̈.
 
-    Newton and Euler: (f_c + m g, τ_c), with the wrench (f_c, τ_c) of (20)(21) that the contact
-    forces have about the centre of mass. Torques of the joints are internal and do not show up.
+    By the laws of Newton and Euler it equals (f_c + m g, τ_c), where (f_c, τ_c) is the wrench of
+    the contact forces about the centre of mass. Joint torques are internal and have no effect.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    qdd : array_like, shape (nv,)
+        Acceleration q̈ [m/s², rad/s²]: the base in its own frame, then the joints.
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        Rates of linear [N] and angular momentum [N·m] in the world frame.
     """
     as_instance("state", state, State)
     model = state.robot.model
@@ -66,19 +91,49 @@ def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
 
 
 def net_force_matrix(contacts: Contacts) -> Array:
-    """(20) G_f, shape (3, 3n): f_c = G_f λ, one identity block for each point (four for four feet).
-    N, world.
+    """Compute the matrix G_f of the net contact force f_c = G_f λ.
+
+    It has one identity block for each contact point, four for four point feet.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts whose forces are λ.
+
+    Returns
+    -------
+    ndarray, shape (3, 3n)
+        G_f, dimensionless, for forces in world axes.
+
+    Notes
+    -----
+    [FBR]_, eq. (20).
     """
     as_instance("contacts", contacts, Contacts)
     return grasp_matrix(np.zeros((contacts.n_points, 3)), np.zeros(3))[:3]
 
 
 def net_moment_matrix(state: State, contacts: Contacts) -> Array:
-    """(21) G_τ, shape (3, 3n), m: τ_c = G_τ λ = Σ (x_i - x_c) × f_i, the moment about the centre of
-    mass x_c. World.
+    """Compute the matrix G_τ of the net contact moment τ_c = G_τ λ about the centre of mass.
 
-    The order matters: footnote 10 of the course text prints x_c - x_i, which would give the
-    opposite moment.
+    The moment is τ_c = Σ (x_i - x_c) × f_i, where x_c is the centre of mass.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts whose forces are λ.
+
+    Returns
+    -------
+    ndarray, shape (3, 3n)
+        G_τ in world axes [m].
+
+    Notes
+    -----
+    [FBR]_, eq. (21). Footnote 10 of the course text prints x_c - x_i, which would give the opposite
+    moment.
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)
@@ -86,11 +141,29 @@ def net_moment_matrix(state: State, contacts: Contacts) -> Array:
 
 
 def com_wrench_map(state: State, contacts: Contacts) -> Affine:
-    """(20)(21) λ -> (f_c, τ_c), with blocks "force" (3,), N, and "moment" (3,), N·m, both world,
-    about the centre of mass.
+    """Compute the map from contact forces to their wrench about the centre of mass.
 
-    Only contacts whose forces act at points count. Raises `InputError` for others
-    (`LinearConstraint`).
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts whose forces are λ.
+
+    Returns
+    -------
+    Affine
+        Map from λ, shape (k,) [N], to (f_c, τ_c), with blocks "force", shape (3,) [N], and
+        "moment", shape (3,) [N·m], both in world axes.
+
+    Raises
+    ------
+    InputError
+        If a contact has forces that do not act at points, such as a `LinearConstraint`.
+
+    Notes
+    -----
+    [FBR]_, eqs. (20), (21).
     """
     as_instance("state", state, State)
     _require_point_forces(contacts)
@@ -109,18 +182,36 @@ def wrench_objective(
     force_weight: float = 1.0,
     moment_weight: float = 1.0,
 ) -> Quadratic:
-    """(22) w_f ½ ‖f̃_c - G_f λ‖² + w_τ ½ ‖τ̃_c - G_τ λ‖² as a cost on λ.
+    """Make a cost on contact forces for the error of their wrench about the centre of mass.
 
-    The course text adds N² and (N·m)² as they come, w_f = w_τ = 1. Where the feet cannot give the
-    whole wrench, the weights decide which part is missed; w_τ = 1e6 is the same as counting moments
-    in N·mm.
+    The cost is w_f ½ ‖f̃_c - G_f λ‖² + w_τ ½ ‖τ̃_c - G_τ λ‖². The course text adds N² and (N·m)²
+    with w_f = w_τ = 1. If the feet cannot produce the whole wrench, the weights decide which part
+    has the error. The weight w_τ = 1e6 is the same as measuring moments in N·mm.
 
-    state: where the robot is.
-    contacts: whose forces are λ, shape (k,).
-    force: f̃_c, shape (3,), N, world: what the ground should do to the robot; to stand still, its
-        weight upwards.
-    moment: τ̃_c, shape (3,), N·m, world, about the centre of mass.
-    force_weight, moment_weight: w_f and w_τ, ≥ 0.
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Contacts whose forces are λ.
+    force : array_like, shape (3,)
+        Desired force f̃_c of the ground on the robot, in the world frame [N]. To stand still, it is
+        the robot's weight, upwards.
+    moment : array_like, shape (3,)
+        Desired moment τ̃_c about the centre of mass, in the world frame [N·m].
+    force_weight : float, optional
+        Weight w_f ≥ 0 [1/N²].
+    moment_weight : float, optional
+        Weight w_τ ≥ 0 [1/(N·m)²].
+
+    Returns
+    -------
+    Quadratic
+        Cost on λ, shape (k,).
+
+    Notes
+    -----
+    [FBR]_, eq. (22).
     """
     named_weights = {"force_weight": force_weight, "moment_weight": moment_weight}
     weights = np.repeat(
@@ -138,11 +229,25 @@ def desired_wrench(
     com_acceleration: npt.ArrayLike,
     angular_momentum_rate: npt.ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array]:
-    """The (f̃_c, τ̃_c) of (22) for a desired motion: f = m (a - g), Newton; τ = L̇, Euler. Shapes
-    (3,), N and N·m, world.
+    """Compute the contact wrench about the centre of mass that a desired motion requires.
 
-    com_acceleration: a, shape (3,), m/s². angular_momentum_rate: L̇ about the centre of mass, shape
-        (3,), N·m.
+    The force is m (a - g) by Newton's law, and the moment is L̇ by Euler's law.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    com_acceleration : array_like, shape (3,)
+        Acceleration a of the centre of mass, in the world frame [m/s²].
+    angular_momentum_rate : array_like, shape (3,), optional
+        Rate L̇ of the angular momentum about the centre of mass, in the world frame [N·m].
+
+    Returns
+    -------
+    force : ndarray, shape (3,)
+        Desired force f̃_c of eq. (22), in the world frame [N].
+    moment : ndarray, shape (3,)
+        Desired moment τ̃_c of eq. (22), in the world frame [N·m].
     """
     as_instance("state", state, State)
     specific_force = (
@@ -155,8 +260,17 @@ def desired_wrench(
 
 
 def centroidal_inertia(state: State) -> Array:
-    """Inertia of the whole robot about its centre of mass, joints locked, shape (3, 3), kg·m²,
-    world.
+    """Compute the inertia of the whole robot about its centre of mass, with locked joints.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rotational inertia in world axes [kg·m²].
     """
     as_instance("state", state, State)
     data = state.robot.model.createData()
@@ -165,37 +279,76 @@ def centroidal_inertia(state: State) -> Array:
 
 
 def tangential_bias(contacts: Contacts) -> Quadratic:
-    """(23), first part: Σ ½ ‖(I - n nᵀ) f_i‖², the friction that each foot asks for, squared; a
-    cost on λ.
+    """Make a cost on the tangential parts of the contact forces, Σ ½ ‖(I - n nᵀ) f_i‖².
 
-    The course text prints the norm without its square; only squared is it quadratic.
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts, all with forces at points.
+
+    Returns
+    -------
+    Quadratic
+        Cost on λ, shape (k,) [N²].
+
+    Notes
+    -----
+    [FBR]_, eq. (23). This is its first part. The course text prints the norm without the square,
+    but only its square is quadratic.
     """
     N = _normal_matrix(contacts)
     return Quadratic.from_residual(np.eye(len(N)) - N @ N.T, np.zeros(len(N)))
 
 
 def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
-    """(23), second part without its α: Σ ½ ‖n nᵀ f_i - a n‖², which draws each normal force towards
-    a, N; a cost on λ.
+    """Make a cost that draws each normal force towards a, Σ ½ ‖n nᵀ f_i - a n‖².
 
-    a: one number for all points or shape (n,).
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts, all with forces at points.
+    a : float or array_like, shape (n,)
+        Desired normal force [N]: one number for all points, or one for each.
+
+    Returns
+    -------
+    Quadratic
+        Cost on λ, shape (k,) [N²].
+
+    Notes
+    -----
+    [FBR]_, eq. (23). This is its second part, without the factor α.
     """
     N = _normal_matrix(contacts)
     numeric = numeric_copy(a)
     targets = [a] * N.shape[1] if numeric is not None and numeric.ndim == 0 else a
-    targets = as_array("the nominal normal force a", targets, (N.shape[1],), "N")
+    targets = as_array("the desired normal force a", targets, (N.shape[1],), "N")
     return Quadratic.from_residual(N @ N.T, N @ targets)
 
 
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
-    """(23) Σ h_i(f_i) = Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖², as a cost on λ, shape
-    (k,). Source: §3.1.1.
+    """Make the cost Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖² on contact forces.
 
-    A preference, not a limit: nothing keeps a force in its cone, or from pulling.
+    It is a preference, not a limit: it keeps no force inside its friction cone, and it allows
+    forces that pull.
 
-    contacts: all with forces at points.
-    alpha: α ≥ 0, weight of the normal part beside the tangential one.
-    a: the normal force that each contact should carry, N; one number for all points or shape (n,).
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts, all with forces at points.
+    alpha : float
+        Weight α ≥ 0 of the normal part relative to the tangential part, dimensionless.
+    a : float or array_like, shape (n,)
+        Desired normal force [N]: one number for all points, or one for each.
+
+    Returns
+    -------
+    Quadratic
+        Cost on λ, shape (k,) [N²].
+
+    Notes
+    -----
+    [FBR]_, eq. (23).
     """
     return tangential_bias(contacts) + as_positive("alpha", alpha, allow_zero=True) * normal_bias(
         contacts, a
@@ -204,15 +357,25 @@ def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
 
 @dataclass(frozen=True, eq=False)
 class TorquesFromForces(Value):
-    """(25) The smallest torques that give desired forces, in closed form.
+    """The smallest torques that produce desired contact forces, in closed form.
 
-    With fewer torques than forces not every λ is reachable: `torque` then answers for the nearest
-    reachable accelerations.
+    With fewer torques than forces, not every λ is reachable. For an unreachable λ, `torque` gives
+    the torques of the nearest reachable accelerations.
 
-    torque: `Affine` λ -> τ, the pseudo-inverse solution, shape (k,) N to (d,) N·m.
-    reachable: the forces that any torques can give, as an `Affine` β̂ -> λ with orthonormal
+    Parameters
+    ----------
+    torque : Affine
+        Pseudo-inverse solution, from λ, shape (k,) [N], to τ, shape (d,) [N·m].
+    reachable : Affine
+        All forces that torques can produce, as a map from coordinates β̂ to λ [N] with orthonormal
         columns.
-    null_torques: (d, f), torques that change no force: the redundancy.
+    null_torques : ndarray, shape (d, f)
+        Orthonormal columns that span the torques without effect on any contact force, the
+        redundancy.
+
+    Notes
+    -----
+    [FBR]_, eq. (25).
     """
 
     torque: Affine
@@ -220,20 +383,56 @@ class TorquesFromForces(Value):
     null_torques: Array
 
     def distance(self, forces: npt.ArrayLike) -> float:
-        """Distance [N] of desired forces (k,) from the reachable ones; 0 when reachable."""
+        """Compute the distance of desired forces from the reachable ones.
+
+        Parameters
+        ----------
+        forces : array_like, shape (k,) or (k / 3, 3)
+            Desired contact forces in world axes [N].
+
+        Returns
+        -------
+        float
+            Distance [N], 0 for reachable forces.
+        """
         return float(np.linalg.norm(as_forces(forces, self.reachable.n_out) - self.nearest(forces)))
 
     def nearest(self, forces: npt.ArrayLike) -> Array:
-        """The reachable forces nearest to desired ones, shape (k,), N."""
+        """Compute the reachable forces nearest to desired ones.
+
+        Parameters
+        ----------
+        forces : array_like, shape (k,) or (k / 3, 3)
+            Desired contact forces in world axes [N].
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            Nearest reachable forces in world axes [N].
+        """
         forces = as_forces(forces, self.reachable.n_out)
         return self.reachable(self.reachable.A.T @ (forces - self.reachable.b))
 
 
 def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
-    """(24)(25) min ½ ‖f^τ(β)‖² subject to λ = f^λ(β), for every λ at once.
+    """Compute the smallest torques for every λ at once, min ½ ‖f^τ(β)‖² subject to λ = f^λ(β).
 
-    f^τ and f^λ are the blocks of (24). Legs of 2, 3 and more joints give d < k, d = k and d > k:
-    forces out of reach, one τ for each λ, and a choice among many. Source: [FBR], §3.1.2.
+    f^τ and f^λ are the blocks of eq. (24). Legs with two joints (d < k) cannot reach every λ. Legs
+    with three joints (d = k) have one τ for each λ. Legs with more joints (d > k) have many.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion at one state.
+
+    Returns
+    -------
+    TorquesFromForces
+        The map from forces to torques, the reachable forces and the redundant torques.
+
+    Notes
+    -----
+    [FBR]_, eqs. (24), (25).
     """
     as_instance("eom", eom, EquationsOfMotion)
     A, b = resolved_constraint(eom)
@@ -249,8 +448,9 @@ def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
 
 
 def _normal_matrix(contacts: Contacts) -> Array:
-    """The normal of each point as a column, shape (k, n): the normal parts of λ are Nᵀ λ, and N Nᵀ
-    λ as forces.
+    """Return N with the normal of each point as a column, shape (k, n).
+
+    Nᵀ λ are the normal components of the forces, and N Nᵀ λ are the normal parts as vectors.
     """
     _require_point_forces(contacts)
     return (np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]).reshape(
@@ -259,10 +459,11 @@ def _normal_matrix(contacts: Contacts) -> Array:
 
 
 def _require_point_forces(contacts: Contacts) -> None:
+    """Check that the forces of all contacts act at points."""
     as_instance("contacts", contacts, Contacts)
     names = [contact.name for contact in contacts if not isinstance(contact, FrictionContact)]
     if names:
         raise InputError(
-            f"{', '.join(names)} has forces that do not act at points; leave it out: "
-            f"contacts.without(…)."
+            f"The forces of {', '.join(names)} do not act at points, which is required here. Leave "
+            f"such constraints out with contacts.without(…)."
         )

@@ -1,4 +1,4 @@
-"""Motion tasks: the centre of mass, a frame's orientation and position, the joints."""
+"""Motion tasks for the centre of mass, frames and joints."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from floatbase.robots._checks import check_unit_norms
 
 _ZERO3 = (0.0, 0.0, 0.0)
 _POINT: Shapes = {"position": (3,), "velocity": (3,), "acceleration": (3,)}
-# R Rᵀ - 1 of matrices printed with seven digits or stored as float32 is below
+# R Rᵀ - 1 is smaller for matrices printed with seven digits or stored as float32
 _ROTATION_TOLERANCE = 1e-6
 _IDENTITY = frozen(np.eye(3))
-_ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: nothing to mend
+_ROTATION_ROUNDING = 1e-14  # R Rᵀ - 1 of products of exact rotations: no correction needed
 
 
 class MotionTask(TargetTask):
@@ -33,27 +33,60 @@ class MotionTask(TargetTask):
     kd: float | None
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """J q̈ + J̇ q̇ - a, m/s² or rad/s², world-aligned for a point or a frame."""
+        """Compute the residual J q̈ + J̇ q̇ - a.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at the current state.
+        t : float, optional
+            Time at which the targets are evaluated [s].
+
+        Returns
+        -------
+        Affine
+            Map from q̈ to the residual [m/s² or rad/s²], in world axes for a point or a frame.
+        """
         x, v, a = self._targets(eom, t)
         J, drift, e, e_dot = self._motion(eom.state, x, v)
-        assert self.kd is not None  # set when the task was made
+        assert self.kd is not None  # set by the constructor
         return Affine(J, drift - a + self.kp * e + self.kd * e_dot)
 
     def _motion(self, state: State, x: Array, v: Array) -> tuple[Array, Array, Array, Array]:
-        """J, J̇ q̇, e and ė for a target x with velocity v."""
+        """Return J, J̇ q̇, e and ė for a target x with velocity v."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
 class CoMTask(MotionTask):
-    """Bring the centre of mass to a position; residual in q̈, m/s².
+    """A task that brings the centre of mass to a position.
 
-    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity,
-        acceleration).
-    velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
-    kp, kd: gains, 1/s² and 1/s; kd is critically damped by default.
-    weight: of ½‖residual‖² in the objective.
-    name: in messages and tables.
+    Parameters
+    ----------
+    position : array_like, shape (3,), or callable
+        Target in the world frame [m], or a function of the time t [s] that returns `position` or
+        `(position, velocity, acceleration)`.
+    velocity : array_like, shape (3,), optional
+        Velocity of a constant target, in the world frame [m/s].
+    acceleration : array_like, shape (3,), optional
+        Acceleration of a constant target, in the world frame [m/s²].
+    kp : float, optional
+        Gain on the position error [1/s²].
+    kd : float, optional
+        Gain on the velocity error [1/s]. The default, 2 √kp, is critical damping.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(m/s²)²].
+    name : str, optional
+        Name in messages and tables.
+
+    Examples
+    --------
+    Keep the centre of mass 2 cm above its standing position:
+
+    >>> state = fb.load("go2").standing()
+    >>> task = fb.CoMTask(state.com + [0.0, 0.0, 0.02])
+    >>> task.kp, task.kd
+    (100.0, 20.0)
     """
 
     position: Target
@@ -72,15 +105,28 @@ class CoMTask(MotionTask):
 
 @dataclass(frozen=True, eq=False)
 class OrientationTask(MotionTask):
-    """Bring a frame to an orientation; residual in q̈, rad/s². The error is e = log(R R_desiredᵀ),
-    rad, world-aligned.
+    """A task that brings a frame to an orientation.
 
-    frame: its name; "base" is the base link.
-    rotation: R_world_frame, shape (3, 3); or a function of t that gives it, or (R, angular
-        velocity, angular acceleration).
-    angular_velocity, angular_acceleration: shape (3,), rad/s and rad/s², world, of a target that is
-        no function.
-    kp, kd, weight: as for `CoMTask`.
+    The error is e = log(R R_desiredᵀ), a rotation vector in world axes [rad].
+
+    Parameters
+    ----------
+    frame : str, optional
+        Name of the frame; "base" is the base link.
+    rotation : array_like, shape (3, 3), or callable, optional
+        Target rotation matrix from the frame to the world, dimensionless, or a function of the time
+        t [s] that returns `rotation` or `(rotation, angular_velocity, angular_acceleration)`. The
+        default is the identity.
+    angular_velocity : array_like, shape (3,), optional
+        Angular velocity of a constant target, in the world frame [rad/s].
+    angular_acceleration : array_like, shape (3,), optional
+        Angular acceleration of a constant target, in the world frame [rad/s²].
+    kp : float, optional
+        Gain on the orientation error [1/s²].
+    kd : float, optional
+        Gain on the angular velocity error [1/s]. The default, 2 √kp, is critical damping.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(rad/s²)²].
     """
 
     frame: str = "base"
@@ -99,7 +145,7 @@ class OrientationTask(MotionTask):
 
     @property
     def name(self) -> str:
-        """orientation of the frame."""
+        """Name in messages and tables, such as "orientation of base"."""
         return f"orientation of {self.frame}"
 
     def _checked(self, target: Array, robot: Robot | None) -> Array:
@@ -113,17 +159,29 @@ class OrientationTask(MotionTask):
 
 @dataclass(frozen=True, eq=False)
 class FrameTask(MotionTask):
-    """Bring a frame's origin to a position; residual in q̈, m/s². A foot that swings, a hand.
+    """A task that brings a frame's origin to a position, such as a swing foot or a hand.
 
-    The origin of a ball foot's frame is not where it touches: `Contacts.positions` has the sole,
-    one radius lower where the frame sits in the ball's centre. So aim at `state.point(frame)`, or
-    at a position one radius above the ground.
+    The origin of a ball foot's frame is not its contact point, which `Contacts.positions` gives. If
+    the frame lies at the centre of the ball, the contact point is one radius lower. So use
+    `state.point(frame)`, or a position one radius above the ground, as the target.
 
-    frame: its name.
-    position: shape (3,), m, world; or a function of t that gives it, or (position, velocity,
-        acceleration).
-    velocity, acceleration: shape (3,), m/s and m/s², world, of a target that is no function.
-    kp, kd, weight: as for `CoMTask`.
+    Parameters
+    ----------
+    frame : str
+        Name of the frame.
+    position : array_like, shape (3,), or callable
+        Target in the world frame [m], or a function of the time t [s] that returns `position` or
+        `(position, velocity, acceleration)`.
+    velocity : array_like, shape (3,), optional
+        Velocity of a constant target, in the world frame [m/s].
+    acceleration : array_like, shape (3,), optional
+        Acceleration of a constant target, in the world frame [m/s²].
+    kp : float, optional
+        Gain on the position error [1/s²].
+    kd : float, optional
+        Gain on the velocity error [1/s]. The default, 2 √kp, is critical damping.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(m/s²)²].
     """
 
     frame: str
@@ -138,7 +196,7 @@ class FrameTask(MotionTask):
 
     @property
     def name(self) -> str:
-        """position of the frame."""
+        """Name in messages and tables, such as "position of FL_foot"."""
         return f"position of {self.frame}"
 
     def _motion(self, state: State, x: Array, v: Array) -> tuple[Array, Array, Array, Array]:
@@ -148,15 +206,29 @@ class FrameTask(MotionTask):
 
 @dataclass(frozen=True, eq=False)
 class PostureTask(MotionTask):
-    """Bring the joints to those of a configuration; residual in q̈, rad/s².
+    """A task that brings the joints to the positions of a configuration.
 
-    q: shape (nq,); its base part does not count, and (cos, sin) of joints without limits must be of
-        length 1. Or a function of t that gives it, or (q, velocity, acceleration).
-    velocity, acceleration: shape (d,), of the joints, of a target that is no function; 0 by
-        default.
-    kp, kd, weight, name: as for `CoMTask`. The weight is small, so that posture settles only what
-        other tasks leave open; where posture is what matters most, as for an arm, give it more,
-        such as 1.
+    The default weight is small, so that the posture decides only what other tasks leave open. If
+    the posture matters most, as for an arm, increase the weight, for example to 1.
+
+    Parameters
+    ----------
+    q : array_like, shape (nq,), or callable
+        Target configuration [rad, or m for prismatic joints], or a function of the time t [s] that
+        returns `q` or `(q, velocity, acceleration)`. The base part is ignored. The pair (cos, sin)
+        of a joint without limits must have length 1.
+    velocity : array_like, shape (d,), optional
+        Joint velocities of a constant target [rad/s, m/s]; zero by default.
+    acceleration : array_like, shape (d,), optional
+        Joint accelerations of a constant target [rad/s², m/s²]; zero by default.
+    kp : float, optional
+        Gain on the position error [1/s²].
+    kd : float, optional
+        Gain on the velocity error [1/s]. The default, 2 √kp, is critical damping.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(rad/s²)²].
+    name : str, optional
+        Name in messages and tables.
     """
 
     q: Target
@@ -170,7 +242,7 @@ class PostureTask(MotionTask):
     compiled_as = "posture"
 
     def _checked(self, target: Array, robot: Robot | None) -> Array:
-        if robot is not None:  # the base's quaternion does not count
+        if robot is not None:  # the base's quaternion is ignored
             first_joint = 2 if robot.is_floating else 1
             check_unit_norms(robot.model, f"q of {self.name}", target, first_joint=first_joint)
         return target
@@ -182,10 +254,26 @@ class PostureTask(MotionTask):
 
 
 def standing_tasks(state: State) -> tuple[Task, ...]:
-    """The tasks that keep a robot where `state` has it: centre of mass, base orientation, posture.
+    """Make the tasks that keep a robot at a state: centre of mass, base orientation and posture.
 
-    To go elsewhere, replace the centre of mass's target: posture gives way, and settles only what
-    the others leave open.
+    To move the robot, replace the target of the centre of mass. The posture task yields, because
+    its small weight decides only what the other tasks leave open.
+
+    Parameters
+    ----------
+    state : State
+        State to keep, such as `robot.standing()`.
+
+    Returns
+    -------
+    tuple of Task
+        A `CoMTask`, an `OrientationTask` of the base and a `PostureTask`.
+
+    Examples
+    --------
+    >>> state = fb.load("go2").standing()
+    >>> [task.name for task in fb.standing_tasks(state)]
+    ['centre of mass', 'orientation of base', 'posture']
     """
     as_instance("state", state, State)
     return (
@@ -196,17 +284,33 @@ def standing_tasks(state: State) -> tuple[Task, ...]:
 
 
 def nearest_rotation(name: str, R: Array) -> Array:
-    """The rotation nearest to R (3, 3), which may be off by the rounding of printed digits or of
-    float32.
+    """Return the rotation matrix nearest to a matrix with rounding errors.
 
-    Raises `InputError` where R Rᵀ is off by more than 1e-6 of the identity, or R mirrors.
+    Printed digits and float32 numbers have such errors.
+
+    Parameters
+    ----------
+    name : str
+        Name of the target in messages.
+    R : array_like, shape (3, 3)
+        Rotation matrix with rounding errors, dimensionless.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rotation matrix, read-only.
+
+    Raises
+    ------
+    InputError
+        If an entry of R Rᵀ differs from the identity by more than 1e-6, or if R is a reflection.
     """
     R = as_array(f"rotation of {name}", R, (3, 3))
     error = np.max(np.abs(R @ R.T - _IDENTITY))
     if not error <= _ROTATION_TOLERANCE or cross(R[0], R[1]) @ R[2] < 0:
         raise InputError(
-            f"rotation of {name} is not a rotation matrix: its columns must be orthonormal, "
-            f"determinant +1."
+            f"rotation of {name} is not a rotation matrix. Its columns must be orthonormal and its "
+            f"determinant must be +1."
         )
     if error < _ROTATION_ROUNDING:
         return R

@@ -1,6 +1,4 @@
-"""Costs moved between spaces: pullbacks (15)(18), and a cost seen from fewer variables (19) in its
-two readings.
-"""
+"""Pullbacks of costs between spaces: costs on coordinates, and costs on a single block."""
 
 from __future__ import annotations
 
@@ -16,11 +14,29 @@ def cost_on_space(
     tau: Quadratic | None = None,
     forces: Quadratic | None = None,
 ) -> Quadratic:
-    """(18) The sum of costs on q̈, τ and λ, each optional, as one cost on β;
-    `cost.pullback(space.map)` moves one on all three.
+    """Add costs on q̈, τ and λ, and pull them back to one cost on β.
 
-    space: β -> (q̈, τ, λ), as from `feasible_space`.
-    qdd, tau, forces: costs on vectors of shape (nv,), (d,) and (k,).
+    For a cost on all three together, use `cost.pullback(space.map)`.
+
+    Parameters
+    ----------
+    space : FeasibleSpace
+        Map from β to (q̈, τ, λ), such as `fb.feasible_space(eom)`.
+    qdd : Quadratic, optional
+        Cost on q̈, shape (nv,).
+    tau : Quadratic, optional
+        Cost on τ, shape (d,).
+    forces : Quadratic, optional
+        Cost on λ, shape (k,).
+
+    Returns
+    -------
+    Quadratic
+        Sum of the costs as a function of β.
+
+    Notes
+    -----
+    [FBR]_, eq. (18).
     """
     as_instance("space", space, FeasibleSpace)
     parts = (("qdd", qdd), ("tau", tau), ("forces", forces))
@@ -33,33 +49,82 @@ def cost_on_space(
 
 
 def minimum_norm_coordinates(space: FeasibleSpace, block: Block) -> Affine:
-    """The β that (19) takes: the smallest β that gives a value of the block, β = V† (x - v)."""
+    """Compute the smallest β for a value x of one block, β = V† (x - v).
+
+    Parameters
+    ----------
+    space : FeasibleSpace
+        Space of feasible (q̈, τ, λ).
+    block : {"qdd", "tau", "forces"}
+        Block of (q̈, τ, λ) that x belongs to.
+
+    Returns
+    -------
+    Affine
+        Map from x to the β that eq. (19) uses.
+    """
     as_instance("space", space, FeasibleSpace)
     f = space.map[block]
     U, s, Vt, r = svd_with_rank(
         f.A, absolute=True
-    )  # rows of orthonormal columns: what is below the tolerance is rounding
+    )  # part of orthonormal columns: singular values below the tolerance are rounding
     V_pinv = (Vt[:r].T / s[:r]) @ U[:, :r].T
     return Affine(V_pinv, -V_pinv @ f.b)
 
 
 def minimum_norm_pullback(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
-    """(19) as written: the cost on β seen from one block, with the smallest β that gives the
-    block's value.
+    """Express a cost on β as a cost on one block, using the smallest β for each value.
 
-    Answers "what does this motion cost, if everything it leaves open is set to zero in β?". That
-    choice depends on the origin v of β and has no physical meaning where V of the block loses rank
-    (four point feet: 12 columns, rank 6).
+    The result answers the question "What does this motion cost if everything that it leaves open is
+    set to zero in β?" This choice depends on the origin v of β. It has no physical meaning where V
+    of the block loses rank, as for four point feet with 12 columns and rank 6. See
+    `partial_minimum` for the least cost.
+
+    Parameters
+    ----------
+    cost : Quadratic
+        Cost on β, such as `cost_on_space(…)`.
+    space : FeasibleSpace
+        Space of feasible (q̈, τ, λ).
+    block : {"qdd", "tau", "forces"}
+        Block of (q̈, τ, λ) on which the result depends.
+
+    Returns
+    -------
+    Quadratic
+        Cost on the block.
+
+    Notes
+    -----
+    [FBR]_, eq. (19), as written.
     """
     as_instance("cost", cost, Quadratic)
     return cost.pullback(minimum_norm_coordinates(space, block))
 
 
 def argmin_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> Affine:
-    """The β of least cost that gives a value of the block: β = V† (x - v) + N z*(x), N spanning
-    what the block leaves open.
+    """Compute the β of least cost for a value x of one block, β = V† (x - v) + N z*(x).
 
-    Raises `InputError` where the cost has no minimum over what is left open.
+    The columns of N span the directions of β that the block leaves open.
+
+    Parameters
+    ----------
+    cost : Quadratic
+        Cost on β, such as `cost_on_space(…)`.
+    space : FeasibleSpace
+        Space of feasible (q̈, τ, λ).
+    block : {"qdd", "tau", "forces"}
+        Block of (q̈, τ, λ) that x belongs to.
+
+    Returns
+    -------
+    Affine
+        Map from x to β.
+
+    Raises
+    ------
+    InputError
+        If the cost has no minimum over the directions left open.
     """
     as_instance("cost", cost, Quadratic)
     minimum_norm = minimum_norm_coordinates(space, block)
@@ -67,11 +132,34 @@ def argmin_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> A
 
 
 def partial_minimum(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
-    """(19) made honest: the cost on β seen from one block, minimised over what the block leaves
-    free (a Schur complement).
+    """Express a cost on β as the least cost for each value of one block (a Schur complement).
 
-    Answers "what does this motion cost at least?". Never above `minimum_norm_pullback`, and equal
-    to it where V of the block has full column rank.
+    The result answers the question "What does this motion cost at least?" It is at most
+    `minimum_norm_pullback`, and equal to it where V of the block has full column rank.
+
+    Parameters
+    ----------
+    cost : Quadratic
+        Cost on β, such as `cost_on_space(…)`.
+    space : FeasibleSpace
+        Space of feasible (q̈, τ, λ).
+    block : {"qdd", "tau", "forces"}
+        Block of (q̈, τ, λ) on which the result depends.
+
+    Returns
+    -------
+    Quadratic
+        Cost on the block.
+
+    Raises
+    ------
+    InputError
+        If the cost has no minimum over the directions left open.
+
+    Notes
+    -----
+    [FBR]_, eq. (19), with a minimum over β in place of the smallest β. A partial minimum of a
+    quadratic function is a Schur complement [Boyd2004]_.
     """
     as_instance("cost", cost, Quadratic)
     return cost.pullback(argmin_coordinates(cost, space, block))

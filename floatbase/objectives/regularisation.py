@@ -1,4 +1,4 @@
-"""Regularisation: contact forces and joint torques kept near a target."""
+"""Regularisation tasks, which keep contact forces and joint torques near a target."""
 
 from __future__ import annotations
 
@@ -13,22 +13,45 @@ from floatbase.objectives._task import Shape, Shapes, Target, TargetTask
 
 @dataclass(frozen=True, eq=False)
 class _BlockTask(TargetTask):
-    """Keep a block x of (q̈, τ, λ) near a target, zero by default."""
+    """Base of tasks that keep a block x of (q̈, τ, λ) near a target, zero by default."""
 
     target: Target | None = None
     weight: float = 1e-5
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """x - target, N or N·m."""
+        """Compute the residual x - target.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at the current state.
+        t : float, optional
+            Time at which the targets are evaluated [s].
+
+        Returns
+        -------
+        Affine
+            Map from the block to the residual, in its unit [N or N·m].
+        """
         (target,) = self._targets(eom, t)
         return Affine.identity(target.size) - target
 
 
 @dataclass(frozen=True, eq=False)
 class ForceTask(_BlockTask):
-    """Keep contact forces near a target, shape (k,), N, world, zero by default; residual in λ, N.
+    """A task that keeps contact forces near a target, with residual λ - target.
 
-    With a small weight it chooses among forces of equal wrench: the force regularisation.
+    With a small weight, it chooses among forces with the same wrench.
+
+    Parameters
+    ----------
+    target : array_like, shape (k,) or (k / 3, 3), or callable, optional
+        Target forces in world axes [N], or a function of the time t [s] that returns shape (k,).
+        The default is zero.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/N²].
+    name : str, optional
+        Name in messages and tables.
     """
 
     name: str = "force regularisation"
@@ -42,7 +65,18 @@ class ForceTask(_BlockTask):
 
 @dataclass(frozen=True, eq=False)
 class TorqueTask(_BlockTask):
-    """Keep joint torques near a target, shape (d,), N·m, zero by default; residual in τ, N·m."""
+    """A task that keeps joint torques near a target, with residual τ - target.
+
+    Parameters
+    ----------
+    target : array_like, shape (d,), or callable, optional
+        Target torques [N·m], or a function of the time t [s] that returns them. The default is
+        zero.
+    weight : float, optional
+        Weight of ½‖residual‖² in the objective [1/(N·m)²].
+    name : str, optional
+        Name in messages and tables.
+    """
 
     name: str = "torque regularisation"
     block: ClassVar[Block] = "tau"

@@ -1,5 +1,6 @@
-"""The playground: a live robot with all that a controller may know or mistake, in a notebook and on
-a page of its own.
+"""Playground: a live robot whose model and physics can be changed separately.
+
+It runs in a notebook and on a page of its own.
 """
 
 from floatbase.playground.build import nodding_rotation

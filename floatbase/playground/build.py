@@ -1,4 +1,4 @@
-"""The objects that settings ask for: world, actuators and controller."""
+"""Ground, actuators and controller made from the settings of the playground."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array, T
 from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
@@ -32,24 +33,50 @@ from floatbase.playground.settings import GAITS, IDEAL_BANDWIDTH, Settings, six_
 from floatbase.robots import Robot, State
 from floatbase.simulation import Controller, Ground
 
-_RECOVERY_GAITS = {4: ("trot", 0.2), 2: ("walk", 0.4)}  # with its swing, s, by number of feet
-_FIRST_STEP_DELAY = 1.0  # s from a control to the first step
-LIFT_HEIGHT = 0.04  # m that a foot which is to leave the ground is lifted
-_NODDING_FREQUENCY = 0.6  # Hz, loops of the ellipse: quicker ones let the feet slip
+_RECOVERY_GAITS = {4: ("trot", 0.2), 2: ("walk", 0.4)}  # number of feet: gait and its swing [s]
+_FIRST_STEP_DELAY = 1.0  # s from selecting a gait to the first step
+LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
+_NODDING_FREQUENCY = 0.6  # Hz, of the ellipse: the feet slip at higher frequencies
 _YAW_OVER_PITCH = 1.15  # the ellipse is a little wider in yaw
-_RAMP_TIME = 1.5  # s in which the ellipse grows from nothing
+_RAMP_TIME = 1.5  # s in which the ellipse grows from zero to its full size
 
 
 def ground(settings: Settings) -> Ground:
-    """The true ground."""
+    """Make the actual ground.
+
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+
+    Returns
+    -------
+    Ground
+        Ground with the actual friction and slope.
+    """
     mu, normal = settings.friction[1], np.array(settings.normals[1])
     return Ground(mu) if settings.slope[1] == 0.0 else Ground(mu, normal=normal)
 
 
 def perturbation(settings: Settings, robot: Robot) -> Perturbation:
-    """What holds in the world instead of (7).
+    """Make the perturbation of the simulation, which replaces eq. (7).
 
-    Raises `UnknownNameError` for a leg that is switched off and is no foot's name.
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+    robot : Robot
+        Robot that is simulated.
+
+    Returns
+    -------
+    Perturbation
+        What differs from exact physics.
+
+    Raises
+    ------
+    UnknownNameError
+        If the leg that is switched off is not the name of a foot.
     """
     off = settings.actual_off
     return Perturbation(
@@ -63,7 +90,18 @@ def perturbation(settings: Settings, robot: Robot) -> Perturbation:
 
 
 def mismatch(settings: Settings) -> ModelMismatch | None:
-    """What the controller assumes instead of (7); None where that is exact."""
+    """Make the controller's model mismatch.
+
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+
+    Returns
+    -------
+    ModelMismatch or None
+        What the controller assumes instead of eq. (7), or None if its model is exact.
+    """
     off = settings.assumed_off
     ignored = "forces" in off and settings.leg not in settings.lifted_feet
     made = ModelMismatch(
@@ -75,13 +113,26 @@ def mismatch(settings: Settings) -> ModelMismatch | None:
 
 
 def _switched_off(options: dict[str, str], off: tuple[str, ...]) -> dict[str, Any]:
-    """The options, by name of the term, of terms that are off."""
+    """Return False for the option of each term that is off; `options` maps terms to options."""
     return {option: False for term, option in options.items() if option and term in off}
 
 
 def actuators(settings: Settings, robot: Robot, state: State) -> FirstOrderLag | None:
-    """The true actuators, which begin with the torques that hold the robot up in `state`; None for
-    perfect ones.
+    """Make the actual actuators.
+
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+    robot : Robot
+        Robot that they drive.
+    state : State
+        State in which their initial torques hold the robot up.
+
+    Returns
+    -------
+    FirstOrderLag or None
+        Actuators with the actual bandwidth, or None if they are ideal.
     """
     if settings.bandwidth[1] >= IDEAL_BANDWIDTH:
         return None
@@ -92,9 +143,26 @@ def actuators(settings: Settings, robot: Robot, state: State) -> FirstOrderLag |
 
 
 def gait(settings: Settings, robot: Robot) -> Gait:
-    """The gait that was chosen, which begins soon after.
+    """Make the selected gait, which starts one second after its selection.
 
-    Raises `InputError` where a robot with so many feet has no such gait.
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+    robot : Robot
+        Robot that walks.
+
+    Returns
+    -------
+    Gait
+        The gait.
+
+    Raises
+    ------
+    InputError
+        If the playground has no gaits for this number of feet.
+    UnknownNameError
+        If a robot with this number of feet does not have the gait.
     """
     gaits = _by_feet(GAITS, robot)
     if settings.gait not in gaits:
@@ -103,12 +171,30 @@ def gait(settings: Settings, robot: Robot) -> Gait:
 
 
 def recovery_gait(robot: Robot) -> tuple[str, float]:
-    """Name and swing, s, of the gait with which a pushed robot steps."""
+    """Return the gait with which a pushed robot takes steps.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot that is pushed.
+
+    Returns
+    -------
+    name : str
+        Name of the gait.
+    swing : float
+        Duration of a swing [s].
+
+    Raises
+    ------
+    InputError
+        If the playground has no gaits for this number of feet.
+    """
     return _by_feet(_RECOVERY_GAITS, robot)
 
 
 def _by_feet(table: dict[int, T], robot: Robot) -> T:
-    """The entry of a table for as many feet as the robot has."""
+    """Return the entry of a table for the robot's number of feet."""
     n = len(robot.feet)
     if n not in table:
         numbers = " or ".join(map(str, sorted(table)))
@@ -119,9 +205,28 @@ def _by_feet(table: dict[int, T], robot: Robot) -> T:
 def controller(
     settings: Settings, robot: Robot, sim: PerturbedSimulation, state: State
 ) -> Controller:
-    """The controller of a robot that is to stand as in `state`, or to walk.
+    """Make a controller for standing or walking.
 
-    Raises `FloatbaseError` where settings and robot do not fit.
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+    robot : Robot
+        Robot that is controlled.
+    sim : PerturbedSimulation
+        Simulation whose base wrench is set if the base has motors.
+    state : State
+        State that defines the standing posture.
+
+    Returns
+    -------
+    Controller
+        The controller.
+
+    Raises
+    ------
+    FloatbaseError
+        If the settings do not fit the robot.
     """
     contacts = Contacts.feet(
         robot, settings.friction[0], normals=settings.normals[0] if settings.slope[0] else None
@@ -150,7 +255,7 @@ def controller(
 
 
 def _tasks(settings: Settings, state: State) -> list[Task]:
-    """The tasks of a robot that stands as in `state`."""
+    """Return the tasks that keep a robot standing as in `state`."""
     motion, posture, effort = settings.weights
     gains: dict[str, Any] = {"kp": settings.kp, "weight": six_digits(10.0 * motion)}
     level: Any = state.frame_pose("base").rotation
@@ -173,30 +278,36 @@ def _tasks(settings: Settings, state: State) -> list[Task]:
 def nodding_rotation(
     rotation: npt.ArrayLike, size: float, begin: float = 0.0
 ) -> Callable[[float], tuple[Array, Array, Array]]:
-    """Orientations that describe an ellipse in pitch and yaw around `rotation`, as
-    `OrientationTask` takes them.
+    """Make an orientation target that moves on an ellipse in pitch and yaw, for `OrientationTask`.
 
-    rotation: (3, 3), world.
-    size: rad, half its width in pitch.
-    begin: s, when it grows from nothing.
-    Returns R (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of
-    t.
+    Parameters
+    ----------
+    rotation : array_like, shape (3, 3)
+        Orientation at the centre of the ellipse, in the world frame.
+    size : float
+        Half the width of the ellipse in pitch [rad].
+    begin : float, optional
+        Time at which the ellipse starts to grow from zero [s].
+
+    Returns
+    -------
+    callable
+        Function of the time t [s]. It returns the rotation matrix, shape (3, 3), the angular
+        velocity, shape (3,) [rad/s], and the angular acceleration, shape (3,) [rad/s²], all in the
+        world frame.
     """
     home = np.asarray(rotation, dtype=float)
 
     def angles(t: float) -> Array:
-        s = min(max((t - begin) / _RAMP_TIME, 0.0), 1.0)
+        """Return pitch and yaw at time t."""
+        amplitude = size * minimum_jerk((t - begin) / _RAMP_TIME)[0]
         phase = 2.0 * math.pi * _NODDING_FREQUENCY * (t - begin)
-        return (
-            size
-            * s**3
-            * (10.0 - 15.0 * s + 6.0 * s**2)
-            * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
-        )
+        return amplitude * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
 
     turning = pitch_and_yaw(angles)
 
     def path(t: float) -> tuple[Array, Array, Array]:
+        """Return rotation, angular velocity and angular acceleration at time t."""
         turn, omega, alpha = turning(t)
         return turn @ home, omega, alpha
 

@@ -1,4 +1,4 @@
-"""Ten challenges, each with a start, what may not be changed, and a judge that watches the run."""
+"""Ten challenges, each with initial settings, locked settings and a judge that watches the run."""
 
 from __future__ import annotations
 
@@ -15,25 +15,31 @@ from floatbase.friction import FrictionPolyhedron
 from floatbase.playground.session import Session
 from floatbase.playground.settings import Settings
 
-_MIN_LOAD = 5.0  # N: a foot with more carries something
-_LIFTED_HEIGHT = 0.02  # m over the ground, and higher is lifted
-_FACET_TOLERANCE = 1e-4  # of the normal force: closer to a facet is on it
-_SLIDE_DISTANCE = 0.3  # m, twice as far as it comes with what it believes at first
-_TRAVEL_DISTANCE = 0.012  # m that every foot of the seventh challenge is to travel
-_MAX_SLIP = 0.004  # m, that creeps under a foot which rolls
-_FORCE_ROUNDING = 1e-9  # N, of a force that is made of its size and its direction
-_ONE_PUSH_ONLY = "That was more than one push: reset, and push once."
-_SURVIVAL_TIME = 2.0  # s that a robot must stay on its feet after a push
-_MAX_TOPPLING_IMPULSE = 19.2  # N·s: forwards it takes 19.5, sideways less, backwards 22.5
-_CHOICE_TIME = 1.0  # s that a number must stay: a slider on its way passes all of them
+_MIN_LOAD = 5.0  # N: a foot with a larger normal force counts as loaded
+_LIFTED_HEIGHT = 0.02  # m above the ground: a higher foot counts as lifted
+_FACET_TOLERANCE = 1e-4  # fraction of the normal force: a force nearer to a facet counts as active
+_SLIDE_DISTANCE = 0.3  # m, twice as far as the robot slides with the initial settings
+_TRAVEL_DISTANCE = 0.012  # m that each foot must travel in the seventh challenge
+_MAX_SLIP = 0.004  # m: a rolling foot creeps by less
+_FORCE_ROUNDING = 1e-9  # N: rounding of a force computed from magnitude and direction
+_ONE_PUSH_ONLY = "That was more than one push. Reset, and push only once."
+_SURVIVAL_TIME = 2.0  # s that the robot must remain standing after a push
+_MAX_TOPPLING_IMPULSE = 19.2  # N·s: toppling takes 19.5 forwards, less sideways, 22.5 backwards
+_CHOICE_TIME = 1.0  # s that a number must be kept: a moving slider passes all of them
 
 
 class Judge:
-    """Watches a run from one reset to the next: `observe` gets every slice, `run_ended` why it
-    stopped. `message` is the state of play.
+    """Judge that watches a run from one reset to the next.
 
-    `pushes` are those seen so far. `violation` says what was changed that may not be: there is
-    nothing to win any more.
+    Call `observe` with each slice of the run, and `run_ended` when the run stops by itself.
+    `message` holds the current status, `won` whether the challenge is solved, and `pushes` the
+    pushes so far. If a locked setting was changed, `violation` says which one, and the challenge
+    can no longer be won.
+
+    Parameters
+    ----------
+    challenge : Challenge
+        Challenge to judge.
     """
 
     def __init__(self, challenge: Challenge):
@@ -45,29 +51,45 @@ class Judge:
 
     @property
     def largest_push(self) -> float | None:
-        """The largest force of a push, N; None before the first one."""
+        """Largest force of a push so far [N]; None before the first push."""
         return max((float(np.linalg.norm(push.force)) for push in self.pushes), default=None)
 
     def observe(self, record: fb.Rollout, session: Session) -> None:
-        """A slice has been run."""
+        """Judge a new slice of the run.
+
+        Parameters
+        ----------
+        record : Rollout
+            Record of the slice.
+        session : Session
+            Session that ran it.
+        """
         self.pushes += [
             push for push in record.pushes if all(push is not seen for seen in self.pushes)
         ]
         self._apply_verdict(self.challenge.watch(self, record, session), session)
 
     def run_ended(self, status: str, session: Session) -> None:
-        """The run has stopped by itself."""
+        """Judge a run that stopped by itself.
+
+        Parameters
+        ----------
+        status : str
+            Status of the run, with the reason.
+        session : Session
+            Session that ran it.
+        """
         if self.challenge.end is not None:
             self._apply_verdict(self.challenge.end(self, status, session), session)
 
     def _apply_verdict(self, verdict: bool | str, session: Session) -> None:
-        """True wins, a text tells the state of the play. Who has won has won."""
+        """Store a verdict: True wins, a text becomes the message. A won challenge stays won."""
         if self.won:
             return
         if violations := self.challenge.violations(session.settings):
             self.violation = (
-                f"{' and '.join(violations)} may not be changed in this challenge: "
-                f'press "all as at first".'
+                f"{' and '.join(violations)} must not be changed in this challenge. "
+                f'Press "reset everything".'
             )
         if self.violation:
             self.message = self.violation
@@ -82,15 +104,28 @@ Watch = Callable[[Judge, fb.Rollout, Session], bool | str]
 
 @dataclass(frozen=True)
 class Challenge:
-    """A challenge.
+    """A challenge of the playground.
 
-    title, text: what the reader sees.
-    watch: looks at each slice; True when it is solved, else the state of the play.
-    start: settings to begin with.
-    locked: names of settings that may not be changed.
-    locked_actual: names of pairs of settings of which the true one may not be changed.
-    paused: whether the reader must press run first.
-    end: looks at why a run stopped, where that may solve it.
+    Parameters
+    ----------
+    title : str
+        Title that the user sees.
+    text : str
+        Description that the user sees.
+    watch : callable
+        Function `watch(judge, record, session)` that examines each slice. It returns True when the
+        challenge is solved, otherwise a status message.
+    start : Settings
+        Initial settings.
+    locked : tuple of str
+        Names of settings that must not be changed.
+    locked_actual : tuple of str
+        Names of paired settings whose actual value must not be changed.
+    end : callable or None
+        Function `end(judge, status, session)`, called when the run stops by itself, for challenges
+        that this can solve. It returns the same as `watch`.
+    paused : bool
+        Whether the challenge starts paused, so that the user must press run.
     """
 
     robot: ClassVar[str] = "go2"
@@ -104,61 +139,76 @@ class Challenge:
     paused: bool = False
 
     def judge(self) -> Judge:
-        """A new judge."""
+        """Make a new judge."""
         return Judge(self)
 
     def violations(self, settings: Settings) -> list[str]:
-        """What differs from the start and may not, in words."""
+        """List the locked settings that differ from the initial ones.
+
+        Parameters
+        ----------
+        settings : Settings
+            Current settings.
+
+        Returns
+        -------
+        list of str
+            Names of the settings, for a message.
+        """
         locked = [
             name for name in self.locked if getattr(settings, name) != getattr(self.start, name)
         ]
         return locked + [
-            f"true {name}"
+            f"actual {name}"
             for name in self.locked_actual
             if getattr(settings, name)[1] != getattr(self.start, name)[1]
         ]
 
 
 def _normals(record: fb.Rollout) -> dict[str, Array]:
-    """Measured normal force of each foot through a record, N, on level ground."""
+    """Return the measured normal force of each foot over a record, on level ground [N]."""
     return {name: record.force(name)[:, 2] for name in record.contacts.names}
 
 
 def _heights(session: Session) -> dict[str, float]:
-    """How far each foot is over the ground now, m."""
+    """Return the current height of each foot above the ground [m]."""
     clearances = session.sim.ground.clearances(session.sim.contact_positions()).min(axis=1)
     return dict(zip(session.sim.point_names, clearances.tolist(), strict=True))
 
 
 def _time_held(judge: Judge, record: fb.Rollout, holds: bool) -> float:
-    """s for which something has held without a break."""
+    """Return for how long a condition has held without interruption [s]."""
     span = len(record) * float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
     judge.memory["held"] = judge.memory.get("held", 0.0) + span if holds else 0.0
     return float(judge.memory["held"])
 
 
 def _two_feet(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the robot stands on FL and RR alone for one second."""
     lifted = {name for name, height in _heights(session).items() if height > _LIFTED_HEIGHT / 2}
     held = _time_held(judge, record, lifted == {"FR_foot", "RL_foot"})
-    return held >= 1.0 or f"{held:.1f} s on FL and RR, the others in the air."
+    return held >= 1.0 or f"On FL and RR alone for {held:.1f} s."
 
 
 def _survive(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the robot survives a push of 300 N."""
     if (size := judge.largest_push) is None:
-        return "Push it with 300 N, in any direction."
+        return "Push the robot with 300 N in any direction."
     if size < 300.0 - _FORCE_ROUNDING:
         return f"{size:.0f} N is not enough."
     held = _time_held(judge, record, True)
-    return held >= _SURVIVAL_TIME or f"On its feet for {held:.1f} s."
+    return held >= _SURVIVAL_TIME or f"Standing for {held:.1f} s."
 
 
 def _icy_slope(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the robot has slid far enough."""
     start = judge.memory.setdefault("start", np.array(session.sim.state.com))
     way = float(np.linalg.norm(session.sim.state.com - start))
-    return way >= _SLIDE_DISTANCE or f"{100 * way:.0f} of {100 * _SLIDE_DISTANCE:.0f} cm."
+    return way >= _SLIDE_DISTANCE or f"Moved {100 * way:.0f} of {100 * _SLIDE_DISTANCE:.0f} cm."
 
 
 def _on_an_edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the planned force of a foot lies on an edge of its polyhedron."""
     found = {}
     contacts = record.contacts_at(-1)
     for i, name in enumerate(contacts.names):
@@ -172,23 +222,25 @@ def _on_an_edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
                 )
             )
     most = max(found.values(), default=0)
-    return most >= 2 or f"{most} active facet{'s' if most != 1 else ''} at a foot."
+    return most >= 2 or f"Most active facets at one foot: {most}."
 
 
 def _no_answer(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    return "The quadratic program has an answer at every tick."
+    """Return the status while the quadratic program is feasible."""
+    return "The quadratic program has been feasible at every control step."
 
 
 def _infeasible(judge: Judge, status: str, session: Session) -> bool | str:
+    """Judge whether the run ended because the quadratic program was infeasible."""
     return (
         True
         if "infeasible" in status or "conflict" in status
-        else f"Not that: {status.splitlines()[0][:80]}"
+        else f"The run ended for another reason: {status.splitlines()[0][:80]}"
     )
 
 
 def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
-    """From the last time that all four carry to a front foot in the air."""
+    """Judge how fast a front foot is lifted after all four feet last carried load."""
     normals, heights = _normals(record), _heights(session)
     front = max(heights["FL_foot"], heights["FR_foot"])
     if "up" not in judge.memory:
@@ -198,26 +250,27 @@ def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
         ):
             judge.memory["all"] = float(record.time[-1])
         if front <= _LIFTED_HEIGHT or "all" not in judge.memory:
-            return "Lift a front foot 2 cm, and stay on the other three for a second."
+            return "Lift a front foot 2 cm, and stand on the other three for one second."
         judge.memory["up"] = float(record.time[-1]) - judge.memory["all"]
     held = _time_held(judge, record, front > _LIFTED_HEIGHT)
     if held == 0.0:
         del judge.memory["up"]
-        return "It came down again."
+        return "The foot came down again."
     if judge.memory["up"] >= 0.5:
-        return f"It took {judge.memory['up']:.2f} s: reset, and lean first."
+        return f"Lifting took {judge.memory['up']:.2f} s. Reset, and lean first."
     judge.memory["score"] = f"{judge.memory['up']:.2f} s."
-    return held >= 1.0 or f"Up in {judge.memory['up']:.2f} s, for {held:.1f} s."
+    return held >= 1.0 or f"Lifted in {judge.memory['up']:.2f} s, in the air for {held:.1f} s."
 
 
 def _feet_that_travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether all feet have moved without being lifted and without slipping."""
     normals = _normals(record)
     if (
         len(normals) < len(session.sim.point_names)
         or min(float(force.min()) for force in normals.values()) < _MIN_LOAD
     ):
         judge.memory.clear()
-        return "A foot was lifted: it begins anew."
+        return "A foot was lifted, so the distances start again from zero."
     places, rolled = record.foot_positions, record.rolling_displacement()
     slid = (
         judge.memory.get("slid", np.zeros(places.shape[1:]))
@@ -229,50 +282,59 @@ def _feet_that_travel(judge: Judge, record: fb.Rollout, session: Session) -> boo
     way = np.linalg.norm((places[-1] - start)[:, :2], axis=1)
     slip = float(np.linalg.norm(slid[:, :2], axis=1).max())
     if slip > _MAX_SLIP:
-        return f"A foot slipped by {1e3 * slip:.0f} mm: reset, and more gently."
+        return f"A foot slipped by {1e3 * slip:.0f} mm. Reset, and move more gently."
     return (
         float(way.min()) >= _TRAVEL_DISTANCE
-        or f"The feet are {', '.join(f'{1e3 * x:.0f}' for x in way)} mm from where they stood."
+        or f"The feet have moved {', '.join(f'{1e3 * x:.0f}' for x in way)} mm."
     )
 
 
 def _on_ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the feet stay in place after a push on ice."""
     feet, size = session.sim.contact_positions(), judge.largest_push
     start = judge.memory.setdefault("feet", feet)
     if size is None or size < 10.0 - _FORCE_ROUNDING:
         judge.memory["feet"] = feet
-        return "Push it with 10 N." if size is None else "10 N, at least."
+        return "Push the robot with 10 N." if size is None else "Push with at least 10 N."
     moved = float(np.linalg.norm(feet - start, axis=1).max())
     if moved > 0.01:
-        return f"A foot has slipped by {1e3 * moved:.0f} mm: reset."
+        return f"A foot has slipped by {1e3 * moved:.0f} mm. Reset."
     held = _time_held(judge, record, True)
-    return held >= _SURVIVAL_TIME or f"All feet within {1e3 * moved:.1f} mm for {held:.1f} s."
+    return (
+        held >= _SURVIVAL_TIME
+        or f"No foot has slipped more than {1e3 * moved:.1f} mm for {held:.1f} s."
+    )
 
 
 def _how_many_facets(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Judge whether the number of facets is the smallest sufficient one."""
     n = session.settings.facets
     if judge.memory.get("facets") != n:
         judge.memory = {"facets": n}
     lost = 1.0 - math.cos(math.pi / n)
     if lost > 0.03:
-        return f"{n} facets: the weakest direction has lost {100 * lost:.1f} % of its friction."
+        return f"{n} facets: the weakest direction loses {100 * lost:.1f} % of its friction."
     if 1.0 - math.cos(math.pi / (n - 1)) <= 0.03:
-        return f"{n} facets lose {100 * lost:.1f} %; fewer would do."
+        return f"{n} facets lose {100 * lost:.1f} %. Fewer are enough."
     return (
         _time_held(judge, record, True) >= _CHOICE_TIME
-        or f"{n} facets lose {100 * lost:.1f} %: leave it there for a second."
+        or f"{n} facets lose {100 * lost:.1f} %. Keep this number for one second."
     )
 
 
 def _topple(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
+    """Return the status before the robot falls."""
     return (
-        _ONE_PUSH_ONLY if len(judge.pushes) > 1 else "One push, with as little force as topples it."
+        _ONE_PUSH_ONLY
+        if len(judge.pushes) > 1
+        else "Topple the robot with one push, as small as possible."
     )
 
 
 def _toppled(judge: Judge, status: str, session: Session) -> bool | str:
+    """Judge the impulse of the push that made the robot fall."""
     if not status.startswith("fell") or not judge.pushes:
-        return "It must fall by a push."
+        return "A push must make the robot fall."
     if len(judge.pushes) > 1:
         return _ONE_PUSH_ONLY
     (push,) = judge.pushes
@@ -280,7 +342,8 @@ def _toppled(judge: Judge, status: str, session: Session) -> bool | str:
     judge.memory["score"] = f"{impulse:.1f} N·s."
     return (
         impulse <= _MAX_TOPPLING_IMPULSE
-        or f"{impulse:.1f} N·s topple it; {_MAX_TOPPLING_IMPULSE:.0f} do, from the right side."
+        or f"{impulse:.1f} N·s toppled the robot. From the right side, "
+        f"{_MAX_TOPPLING_IMPULSE:.0f} N·s are enough."
     )
 
 
@@ -290,51 +353,51 @@ _LOCKED_QP = ("facets", "torque_fraction", "min_normal_force", "weights")
 CHALLENGES = (
     Challenge(
         "Stand on two feet",
-        "Lift FR and RL, and stand on FL and RR for a second.",
+        "Lift FR and RL, and stand on FL and RR for one second.",
         _two_feet, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "Survive 300 N",
-        "Push it with 300 N from any side; 2 s later it must be on its feet.",
+        "Push the robot with 300 N from any side. It must still be standing 2 s later.",
         _survive, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "Down an icy slope",
-        "The ground falls by 20° and is slippery. Press run, and slide 30 cm without falling.",
+        "The ground slopes by 20° and is slippery. Press run, and slide 30 cm without falling.",
         _icy_slope, Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)),
         locked=("mass", "actual_off", "assumed_off"), locked_actual=("slope", "friction"),
         paused=True,
     ),
     Challenge(
         "On an edge",
-        "Bring a foot's planned force onto an edge of its polyhedron: two active facets.",
+        "Bring a foot's planned force onto an edge of its friction polyhedron (two active facets).",
         _on_an_edge, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
-        "No answer",
-        "Find settings for which the quadratic program has no solution.",
+        "Infeasible",
+        "Find settings for which the quadratic program is infeasible.",
         _no_answer, locked=("actual_off", "assumed_off"), end=_infeasible,
     ),
     Challenge(
         "Quick foot",
-        "From four feet that carry to a front foot 2 cm in the air in less than 0.5 s; stay so for "
-        "1 s.",
+        "Start with load on all four feet. Lift a front foot 2 cm in less than 0.5 s, and keep it "
+        "up for 1 s.",
         _quick_foot, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "Feet that travel",
-        "No foot is lifted, none slips, and all four end 12 mm away from where they stood.",
+        "Move all four feet 12 mm away from their starting points. No foot may be lifted or slip.",
         _feet_that_travel, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "On ice",
-        "The ground has a friction of 0.05. Push with 10 N; no foot may slip by 1 cm for 2 s.",
+        "The friction coefficient is 0.05. Push with 10 N. No foot may slip 1 cm within 2 s.",
         _on_ice, Settings(friction=(0.7, 0.05)),
         locked=(*_LOCKED_PHYSICS, "gait"), locked_actual=("friction",),
     ),
     Challenge(
         "How many facets?",
-        "The fewest facets with which no direction loses more than 3 % of the cone's friction.",
+        "Use the fewest facets with which no direction loses more than 3 % of its friction.",
         _how_many_facets, locked=_LOCKED_PHYSICS,
     ),
     Challenge(

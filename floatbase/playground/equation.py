@@ -1,4 +1,4 @@
-"""The terms of (7) in the playground: how each is written, and which switches it has."""
+"""Terms of eq. (7) in the playground: their symbols and their switches."""
 
 from __future__ import annotations
 
@@ -6,13 +6,22 @@ from typing import NamedTuple
 
 
 class Term(NamedTuple):
-    """A term of (7).
+    """A term of eq. (7).
 
-    name: in `Settings.assumed_off` and `Settings.actual_off`. symbol: as it is written over the
-        picture.
-    assumed_switch, actual_switch: the names of its switches on the page; "" for none.
-    mismatch_option, perturbation_option: the options of `ModelMismatch` and of `Perturbation` that
-        switch it; "" where that takes more than a flag.
+    Parameters
+    ----------
+    name : str
+        Name in `Settings.assumed_off` and `Settings.actual_off`.
+    symbol : str
+        Symbol shown over the picture.
+    assumed_switch : str
+        Name of the switch for the controller's model; "" if there is none.
+    actual_switch : str
+        Name of the switch for the simulation; "" if there is none.
+    mismatch_option : str
+        Option of `ModelMismatch` that switches the term; "" if a flag is not enough.
+    perturbation_option : str
+        Option of `Perturbation` that switches the term; "" if a flag is not enough.
     """
 
     name: str
@@ -24,7 +33,7 @@ class Term(NamedTuple):
 
     @property
     def switches(self) -> dict[str, str]:
-        """The names of the switches that there are, by the field of `Settings` that they set."""
+        """Names of the existing switches, keyed by the field of `Settings` that they set."""
         names = {"assumed_off": self.assumed_switch, "actual_off": self.actual_switch}
         return {field: name for field, name in names.items() if name}
 
@@ -33,18 +42,18 @@ EQUATION = (
     Term("inertia", "M q̈"),
     Term(
         "velocity", "+ C q̇",
-        "Coriolis and centrifugal forces believed",
-        "Coriolis and centrifugal forces in the world",
+        "Coriolis and centrifugal forces in the model",
+        "Coriolis and centrifugal forces in reality",
         "velocity_forces", "velocity_forces",
     ),
-    Term("gravity", "+ g", "gravity believed", "gravity in the world", "gravity", "gravity"),
-    Term("zeros", "= S τ", "zeros of S believed", "zeros of S in the world", "underactuated"),
-    Term("forces", "+ Jᵀλ", "force of one leg believed", "force of one leg in the world"),
-    Term("drift", "J̇ q̇", "drift of the contacts believed", "", "drift"),
+    Term("gravity", "+ g", "gravity in the model", "gravity in reality", "gravity", "gravity"),
+    Term("zeros", "= S τ", "zeros of S in the model", "zeros of S in reality", "underactuated"),
+    Term("forces", "+ Jᵀλ", "force of one leg in the model", "force of one leg in reality"),
+    Term("drift", "J̇ q̇", "drift of the contacts in the model", "", "drift"),
     Term(
         "cones", "nᵀλ ≥ 0",
-        "feet that cannot pull believed",
-        "feet that cannot pull in the world",
+        "unilateral contacts in the model",
+        "unilateral contacts in reality",
         "cones",
     ),
 )  # fmt: skip

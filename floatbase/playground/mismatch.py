@@ -1,69 +1,86 @@
-"""`ModelMismatch`: what a controller assumes of (7) where that is not the truth, to study what each
-term is for.
-"""
+"""Controllers with a wrong model of the robot: what they assume instead of eq. (7)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings
+from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings, checked
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import unknown_name
 from floatbase.qp import QP, ConstraintLabel
 
-_SWITCHES = ("gravity", "velocity_forces", "drift", "underactuated", "cones")
-
 
 @dataclass(frozen=True)
 class ModelMismatch(Value):
-    """What a controller assumes instead of (7), M q̈ + h = S τ + Jᵀ λ with A q̈ = b. The defaults
-    are exact.
+    """Difference between a controller's model and the exact equations of motion, eq. (7).
 
-        fb.WholeBodyController(robot, contacts, tasks, modify_qp=ModelMismatch(gravity=False))
+    Eq. (7) is M q̈ + h = S τ + Jᵀ λ with A q̈ = b. By default, the model is exact. Pass a mismatch
+    to a controller as its `modify_qp`. Tasks still use the exact model. For wrong friction or wrong
+    normals no mismatch is needed: set them in the controller's contacts.
 
-    The tasks use the exact model. Wrong friction and wrong normals need no mismatch: they are those
-    of the controller's contacts.
-
-    mass: all masses and inertias as a multiple of the true ones, M and h.
-    gravity: whether h contains gravity.
-    velocity_forces: whether h contains what grows with the velocity, Coriolis and centrifugal
-        forces.
-    drift: whether b contains -J̇ q̇; else A q̈ = 0.
-    ignored_contacts: names of contacts or feet whose forces are left out of the motion, so that
-        Jᵀ λ lacks them.
-    underactuated: whether S has its zeros (3); else the controller counts on a motor for each
+    Parameters
+    ----------
+    mass : float
+        Assumed masses and inertias as a multiple of the robot's own, dimensionless. It scales M and
+        h.
+    gravity : bool
+        Whether h contains gravity.
+    velocity_forces : bool
+        Whether h contains the velocity-dependent terms (Coriolis and centrifugal forces).
+    drift : bool
+        Whether b contains -J̇ q̇. Otherwise A q̈ = 0.
+    ignored_contacts : iterable of str
+        Names of contacts or feet whose forces are left out of Jᵀ λ.
+    underactuated : bool
+        Whether S has its zero rows, eq. (3). Otherwise the controller assumes a motor for each
         motion of the base.
-    cones: whether forces lie in friction cones; else feet may pull, nᵀ λ < 0.
+    cones : bool
+        Whether forces must lie in friction cones. Otherwise feet may pull, nᵀ λ < 0.
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> from floatbase.playground import ModelMismatch
+    >>> robot = fb.load("go2")
+    >>> tasks = fb.standing_tasks(robot.standing())
+    >>> mismatch = ModelMismatch(gravity=False)
+    >>> contacts = fb.Contacts.feet(robot)
+    >>> controller = fb.WholeBodyController(robot, contacts, tasks, modify_qp=mismatch)
     """
 
-    mass: float = 1.0
-    gravity: bool = True
-    velocity_forces: bool = True
-    drift: bool = True
-    ignored_contacts: Iterable[str] = ()
-    underactuated: bool = True
-    cones: bool = True
-
-    def __post_init__(self) -> None:
-        mass = as_positive("mass of the model, as a multiple of the actual one,", self.mass)
-        object.__setattr__(self, "mass", mass)
-        ignored = as_strings("ignored_contacts", self.ignored_contacts)
-        object.__setattr__(self, "ignored_contacts", ignored)
-        for name in _SWITCHES:
-            as_bool(name, getattr(self, name))
+    mass: float = field(default=1.0, metadata=checked(as_positive))
+    gravity: bool = field(default=True, metadata=checked(as_bool))
+    velocity_forces: bool = field(default=True, metadata=checked(as_bool))
+    drift: bool = field(default=True, metadata=checked(as_bool))
+    ignored_contacts: Iterable[str] = field(default=(), metadata=checked(as_strings))
+    underactuated: bool = field(default=True, metadata=checked(as_bool))
+    cones: bool = field(default=True, metadata=checked(as_bool))
 
     @property
     def is_exact(self) -> bool:
-        """Whether the controller assumes (7) as it is."""
+        """Whether the controller assumes eq. (7) without changes."""
         return self == ModelMismatch()
 
     def assumed_equations(self, eom: EquationsOfMotion) -> EquationsOfMotion:
-        """The equations of motion as the controller assumes them.
+        """Return the equations of motion that the controller assumes.
 
-        Raises `UnknownNameError` for an ignored contact that is neither a contact nor a foot.
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Exact equations of motion.
+
+        Returns
+        -------
+        EquationsOfMotion
+            Equations with the assumed M, h, J and b.
+
+        Raises
+        ------
+        UnknownNameError
+            If an ignored contact is neither a contact nor a foot.
         """
         if as_instance("eom", eom, EquationsOfMotion) and self.is_exact:
             return eom
@@ -85,8 +102,19 @@ class ModelMismatch(Value):
         )
 
     def __call__(self, qp: QP, eom: EquationsOfMotion) -> QP:
-        """The QP as the controller assumes it, with other rows of (7) than `qp` has at `eom`, as
-        `modify_qp` of `fb.WholeBodyController`.
+        """Replace the rows of eq. (7) in a QP by those that the controller assumes.
+
+        Parameters
+        ----------
+        qp : QP
+            Quadratic program of the whole-body controller.
+        eom : EquationsOfMotion
+            Exact equations of motion from which `qp` was made.
+
+        Returns
+        -------
+        QP
+            The QP with the assumed model.
         """
         if self.is_exact:
             return qp

@@ -1,4 +1,4 @@
-"""`Playground`: the page of `python -m floatbase view`, and the same in a notebook."""
+"""`Playground`: the page of `python -m floatbase view`, also shown in notebooks."""
 
 from __future__ import annotations
 
@@ -25,22 +25,28 @@ from floatbase.viewer import PUSH_DISPLAY_TIME, Picture, status_message
 from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
-_SITE_NOTE = "The playground needs the live lesson: here its robot stands still."
-_SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn at first
+_SITE_NOTE = "The playground runs only in a live notebook. Here the robot stands still."
+_SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
 
 class Playground:
-    """A robot on the physics, everything about it that a controller may know or mistake, and
-    challenges to solve with it.
+    """A live simulated robot with controls for its model, its physics and its controller.
 
-    In a notebook, as the last line of a cell, it displays itself. Elsewhere, open `playground.url`
-    in a browser.
+    It also offers challenges. In a notebook, it displays itself as the last line of a cell.
+    Elsewhere, open `playground.url` in a browser.
 
-    robot: as from `fb.load`.
-    settings: those at first.
-    background: "white", "light" or "dark".
-    height: of the picture in a notebook, pixels.
-    port: of the page; 0 for a free one, opened once `url` is asked for.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as from `fb.load`.
+    settings : Settings, optional
+        Initial settings.
+    background : {"white", "light", "dark"}, optional
+        Background of the picture.
+    height : int, optional
+        Height of the picture in a notebook [pixels].
+    port : int, optional
+        Port of the page; 0 selects a free one when `url` is first read.
     """
 
     def __init__(
@@ -59,23 +65,20 @@ class Playground:
         )
         self.session = Session(robot, settings)
         self._initial_settings = self.session.settings
-        self.force, self.towards = (
-            self._default_push,
-            0.0,
-        )  # N, and degrees: 0 forwards, 90 to the left
-        self.pushed_frame = (
-            "base" if robot.is_floating else robot.model.frames[-1].name
-        )  # of an arm its tip
+        self.force = self._default_push  # N
+        self.towards = 0.0  # degrees: 0 is forwards, 90 to the left
+        # of an arm, its tip
+        self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name
         self.outcome = ""
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
         self._last_push: fb.Push | None = None
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
-        self._pause_after_slice = False  # for the reader to press run, after the next slice
+        self._pause_after_slice = False  # then the user must press run
         self._requested: dict[str, Any] = {}
-        self._applying: dict[str, Any] = {}  # what the session is changing to just now
-        self._lock = threading.Lock()  # over what is requested
-        self._drawing_lock = threading.Lock()  # the run draws, and so does who pauses it
+        self._applying: dict[str, Any] = {}  # what is being applied now
+        self._lock = threading.Lock()  # protects the requests
+        self._drawing_lock = threading.Lock()  # the run and a thread that pauses it both draw
         session = self.session
         self.run = LiveSimulation(
             session.sim, session.controller, self._on_slice, control_period=PERIOD,
@@ -90,30 +93,41 @@ class Playground:
 
     @property
     def url(self) -> str:
-        """Address of the page, which has no port before this is asked for."""
+        """Address of the page. The page has no port before this is read."""
         return self.view.url
 
     @property
     def _default_push(self) -> float:
-        """The push at first, N."""
+        """Initial force of the push [N]."""
         return 0.1 * self.robot.weight
 
     def start(self) -> Playground:
-        """Show the robot and let it run."""
+        """Show the robot and start the run.
+
+        Returns
+        -------
+        Playground
+            The playground itself.
+        """
         self.view.show(self.session.sim.state)
         self.run.start()
         return self
 
     def close(self) -> None:
-        """End the run and close the page."""
+        """Stop the run and close the page."""
         self.run.close()
         self.view.close()
 
     def push(self, force: float | None = None, towards: float | None = None) -> None:
         """Push the robot for a tenth of a second.
 
-        force: N; towards: degrees, from forwards to the left; both are as set before where they are
-            not given.
+        Parameters
+        ----------
+        force : float, optional
+            Horizontal force [N]. By default, the last one set.
+        towards : float, optional
+            Direction of the push [degrees]: 0 is forward, 90 to the left. By default, the last one
+            set.
         """
         self.force = self.force if force is None else force
         self.towards = self.towards if towards is None else towards
@@ -124,36 +138,57 @@ class Playground:
         self._update_text()
 
     def set(self, **changes: Any) -> None:
-        """Change settings, fields of `Settings`; the run takes them over before its next slice.
+        """Change settings; the run adopts them before its next slice.
 
-        Raises `TypeError` for a name that is none, `InputError` for a value that cannot be.
+        Parameters
+        ----------
+        **changes
+            New values of fields of `Settings`.
+
+        Raises
+        ------
+        TypeError
+            If a name is not a setting.
+        InputError
+            If a value is not allowed.
         """
         replace(self.session.settings, **changes)
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
         if not self.run.is_simulating:
-            self.run.close()  # its last slice may still go on
+            self.run.close()  # its last slice may still be running
             self._apply_requested()
         elif not waiting:
             self.run.call_soon(self._apply_requested)
 
     def set_nodding(self, size: float) -> None:
-        """Let the base describe an ellipse in pitch and yaw; one under way keeps its phase. size:
-        rad, half its width.
+        """Move the base on an ellipse in pitch and yaw; a motion under way keeps its phase.
+
+        Parameters
+        ----------
+        size : float
+            Half the width of the ellipse [rad]; 0 stops the motion.
         """
         pending = self.pending_settings
         self.set(nod=size, start_time=pending.start_time if pending.nod else self.session.sim.time)
 
     def start_challenge(self, challenge: Challenge | None) -> None:
-        """Begin a challenge, or play freely."""
+        """Start a challenge, or return to free play.
+
+        Parameters
+        ----------
+        challenge : Challenge or None
+            Challenge to start; None for free play.
+        """
         self.challenge, self.judge = challenge, None if challenge is None else challenge.judge()
         self._restart_with(self._initial_settings if challenge is None else challenge.start)
         self._update_text()
 
     def reset_all(self) -> None:
-        """Set everything as it was at first, the push, the speed and what is shown too, and put the
-        robot back on its feet.
+        """Restore the initial settings, push, speed and displayed terms, and reset the robot.
+
+        During a challenge, its initial settings are restored.
         """
         self.force, self.towards, self._last_push = self._default_push, 0.0, None
         self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
@@ -164,13 +199,14 @@ class Playground:
         )
 
     def _restart_with(self, settings: Settings) -> None:
-        """Put the robot back on its feet under these settings."""
+        """Put the robot back on its feet with these settings."""
         with self._lock:
             self._requested = {}
         self.run.call_soon(lambda: self._start_with(settings))
         self.run.reset()
 
     def _start_with(self, settings: Settings) -> None:
+        """Apply these settings and show them at the controls."""
         with self._lock:
             self._applying = asdict(settings)
         self._change()
@@ -179,7 +215,7 @@ class Playground:
         self._update_text()
 
     def _apply_requested(self) -> None:
-        """Change what was requested, and hand it to the run."""
+        """Apply the requested changes and pass them to the run."""
         with self._lock:
             if not self._requested:
                 return
@@ -191,7 +227,7 @@ class Playground:
             self.run.reset()
 
     def _change(self) -> bool:
-        """Change the session; returns whether it put the robot back on its feet."""
+        """Change the session, and return whether the robot was put back on its feet."""
         try:
             return self.session.change(**self._applying)
         finally:
@@ -199,16 +235,17 @@ class Playground:
                 self._applying = {}
 
     def _update_run(self) -> None:
+        """Pass the session's controller, simulation and ground to the run and the viewer."""
         session = self.session
         self.run.set_controller(
             session.controller, sim=session.sim, actuators=session.actuators, control_period=PERIOD
         )
-        self.view.set_ground(session.sim.ground)  # the true one, whatever the controller believes
+        self.view.set_ground(session.sim.ground)  # the actual one, whatever the controller assumes
         if self.view.painter.facets not in (None, session.settings.facets):
             self.view.painter = self.view.painter.replace(facets=session.settings.facets)
 
     def _after_reset(self) -> None:
-        """After a reset of the simulation, in the run's thread."""
+        """Update session and judge after a reset of the simulation, in the run's thread."""
         self.session.after_reset()
         self._pause_after_slice = self.challenge is not None and self.challenge.paused
         challenge = self.challenge
@@ -218,27 +255,38 @@ class Playground:
 
     @property
     def pending_settings(self) -> Settings:
-        """The settings with what is still requested, or being changed."""
+        """Settings including changes that are requested or being applied."""
         with self._lock:
             return replace(self.session.settings, **self._applying | self._requested)
 
     def show_term(self, term: str, shown: bool) -> None:
+        """Show or hide the arrows of a term.
+
+        Parameters
+        ----------
+        term : str
+            Name of a term of `EQUATION`.
+        shown : bool
+            Whether to draw it.
+        """
         self.shown_terms[term] = shown
         if self.run.status != "running":
             self._redraw()
 
     def _update_text(self) -> None:
-        """The texts of the panel: the challenge, and the program."""
-        judge = self.judge  # a challenge may be chosen meanwhile
+        """Update the texts of the panel: the challenge and the program."""
+        judge = self.judge  # another thread may change the challenge
         with suppress(ViewerError):
             if judge is not None:
                 self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
-            self.view.add_text("code", self.session.code(self._last_push), "as Python", code=True)
+            self.view.add_text(
+                "code", self.session.code(self._last_push), "Python program", code=True
+            )
 
     def _on_status(self, status: str) -> None:
-        """Show what stopped the run, if anything did, over the last picture."""
+        """Show over the last picture why the run stopped."""
         self.outcome = "" if status == "running" else status_message(status, self.run.reason)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:
@@ -247,15 +295,16 @@ class Playground:
         self._redraw()
 
     def _redraw(self) -> None:
+        """Draw the last record again."""
         with suppress(ViewerError):  # the window may be closed already
             if self.session.last is not None:
                 self._draw(self.session.last)
 
     def _on_slice(self, record: fb.Rollout) -> None:
-        """What the run hands over: draw it, and judge it."""
+        """Draw and judge a slice of the run."""
         self.session.observe(record)
-        judge = self.judge  # a challenge may be chosen or left meanwhile
-        if judge is not None and self.run.status == "running":  # who has fallen is only drawn
+        judge = self.judge  # another thread may change the challenge
+        if judge is not None and self.run.status == "running":  # after a fall, only draw
             before = judge.message
             judge.observe(record, self.session)
             if judge.message != before:
@@ -266,23 +315,21 @@ class Playground:
             self.run.pause()
         if self.robot.is_floating:
             self.view.add_plot_point(
-                "planned and measured forces differ by",
+                "difference between planned and measured forces",
                 float(record.time[-1]),
                 mean_force_error(record),
                 "N",
             )
 
     def _draw(self, record: fb.Rollout) -> None:
-        """The last row of a slice, under the time, the part of real time that this machine reaches,
-        and messages.
-        """
+        """Draw the last row of a slice, with time, real-time factor and messages in the title."""
         now, session = float(record.time[-1]), self.session
         with self._drawing_lock:
             factor = self.real_time_factor.update(now)
             rate = "" if factor is None else f", {factor:.0%} of real time"
             gait = f", {session.settings.gait}" if session.settings.gait else ""
             headline = (
-                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control every {1e3 * PERIOD:g} ms"
+                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control step {1e3 * PERIOD:g} ms"
             )
             self.view.show(
                 record.final, record.contacts, record.measured[-1], _last_planned_forces(record),
@@ -293,7 +340,7 @@ class Playground:
             )  # fmt: skip
 
     def _term_arrows(self, record: fb.Rollout) -> Picture:
-        """Arrows of the terms, and marks of a walk."""
+        """Return the arrows of the displayed terms, and the overlay of a walk."""
         picture: Picture = {}
         settings = self.session.settings
         for term, shown in self.shown_terms.items():
@@ -323,16 +370,35 @@ class Playground:
 
 
 def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> Playground:
-    """A playground for a notebook.
+    """Make a playground for a notebook.
 
-    robot: as from `fb.load`, or its name. settings: those at first.
+    Parameters
+    ----------
+    robot : Robot or str, optional
+        Robot as from `fb.load`, or its name.
+    settings : Settings, optional
+        Initial settings.
+
+    Returns
+    -------
+    Playground
+        The playground, which displays itself.
     """
     return Playground(fb.load(robot) if isinstance(robot, str) else robot, settings)
 
 
 def mean_force_error(record: fb.Rollout) -> float:
-    """Planned less measured forces: the length of the difference, N, added over the contacts, on
-    average over a record.
+    """Return the mean difference between planned and measured contact forces of a record.
+
+    Parameters
+    ----------
+    record : Rollout
+        Record of a run.
+
+    Returns
+    -------
+    float
+        Length of the difference, summed over the contact points and averaged over time [N].
     """
     if not len(record) or not record.planned.size:
         return 0.0
@@ -343,5 +409,5 @@ def mean_force_error(record: fb.Rollout) -> float:
 
 
 def _last_planned_forces(record: fb.Rollout) -> Any:
-    """The planned forces at the last row, None where there are none."""
+    """Return the planned forces of the last row, or None if there are none."""
     return record.planned[-1] if np.isfinite(record.planned[-1]).all() else None

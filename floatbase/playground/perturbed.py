@@ -1,11 +1,12 @@
-"""A simulation in which terms of (7) can be changed or switched off while it runs, to see what each
-of them does; and a controller that drives motors of the base there.
+"""Simulation with modified physics, and a controller that drives motors of the base.
+
+Terms of eq. (7) can be changed or switched off while the simulation runs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -19,6 +20,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     as_strings,
+    checked,
     cross,
 )
 from floatbase.control import Command
@@ -29,57 +31,58 @@ from floatbase.robots import Robot, State
 from floatbase.simulation import Controller, Ground, Push, Simulation
 
 
+def _as_friction(name: str, value: object) -> float | None:
+    """Check a friction coefficient; None is allowed."""
+    return None if value is None else as_positive(name, value)
+
+
 @dataclass(frozen=True)
 class Perturbation(Value):
-    """What holds in a `PerturbedSimulation` instead of (7), M q̈ + h = S τ + Jᵀ λ. The defaults are
-    physics as it is.
+    """Difference between a `PerturbedSimulation` and the exact equations of motion, eq. (7).
 
-    mass: all masses and inertias as a multiple of the robot's own, M and h.
-    gravity: whether there is gravity.
-    velocity_forces: whether there are Coriolis and centrifugal forces, the part of h that grows
-        with the velocity, in the coordinates of (7); else they are cancelled at every timestep.
-    friction: coefficient of all feet on the ground; None leaves the ground's.
-    disabled_contacts: names of contact points that go through the ground, so that Jᵀ λ lacks them.
-    adhesion_force: N, with which the ground pulls each contact point that touches it: so much nᵀ λ
-        may be negative.
+    Eq. (7) is M q̈ + h = S τ + Jᵀ λ. By default, the physics is exact.
+
+    Parameters
+    ----------
+    mass : float
+        Actual masses and inertias as a multiple of the robot's nominal ones, dimensionless. It
+        scales M and h.
+    gravity : bool
+        Whether there is gravity.
+    velocity_forces : bool
+        Whether there are Coriolis and centrifugal forces, the velocity-dependent part of h in the
+        coordinates of eq. (7). Otherwise they are cancelled at each timestep.
+    friction : float or None
+        Friction coefficient of all feet on the ground, dimensionless. None keeps the ground's
+        coefficient.
+    disabled_contacts : iterable of str
+        Names of contact points that pass through the ground. Their forces are missing in Jᵀ λ.
+    adhesion_force : float
+        Force with which the ground attracts each touching contact point [N]. The normal force nᵀ λ
+        may be negative by this amount.
     """
 
-    mass: float = 1.0
-    gravity: bool = True
-    velocity_forces: bool = True
-    friction: float | None = None
-    disabled_contacts: Iterable[str] = ()
-    adhesion_force: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "mass",
-            as_positive("mass of the perturbation, as a multiple of the robot's,", self.mass),
-        )
-        object.__setattr__(
-            self, "disabled_contacts", as_strings("disabled_contacts", self.disabled_contacts)
-        )
-        object.__setattr__(
-            self,
-            "adhesion_force",
-            as_positive("adhesion_force of the ground", self.adhesion_force, "N", allow_zero=True),
-        )
-        if self.friction is not None:
-            object.__setattr__(
-                self,
-                "friction",
-                as_positive("friction coefficient of the perturbation", self.friction),
-            )
-        for name in ("gravity", "velocity_forces"):
-            as_bool(name, getattr(self, name))
+    mass: float = field(default=1.0, metadata=checked(as_positive))
+    gravity: bool = field(default=True, metadata=checked(as_bool))
+    velocity_forces: bool = field(default=True, metadata=checked(as_bool))
+    friction: float | None = field(default=None, metadata=checked(_as_friction))
+    disabled_contacts: Iterable[str] = field(default=(), metadata=checked(as_strings))
+    adhesion_force: float = field(default=0.0, metadata=checked(as_positive, "N", allow_zero=True))
 
 
 class PerturbedSimulation(Simulation):
-    """A `Simulation` whose `perturbation` can be set at any time, and that can push the base as if
-    it had motors of its own.
+    """`Simulation` whose perturbation can be changed at any time, with optional motors of the base.
 
-    robot, ground, timestep: as for `Simulation`. perturbation: what holds at first.
+    Parameters
+    ----------
+    robot : Robot
+        Robot to simulate.
+    ground : Ground or float, optional
+        Ground, or friction coefficient of level ground [-].
+    timestep : float, optional
+        Timestep of the physics [s].
+    perturbation : Perturbation, optional
+        Initial perturbation. By default, the physics is exact.
     """
 
     def __init__(
@@ -94,7 +97,7 @@ class PerturbedSimulation(Simulation):
         self._base_wrench: Array = np.zeros(6)
         super().__init__(robot, ground, timestep)
         model = self.model
-        self._scratch = mujoco.MjData(model)  # for what is computed beside the step
+        self._scratch = mujoco.MjData(model)  # for computations outside the step
         self._nominal = {
             name: np.array(getattr(model, name))
             for name in ("body_mass", "body_inertia", "dof_armature")
@@ -104,12 +107,12 @@ class PerturbedSimulation(Simulation):
 
     @property
     def perturbation(self) -> Perturbation:
-        """What holds; set another one to change it."""
+        """Current perturbation. Assign another one to change it."""
         return self._perturbation
 
     @perturbation.setter
     def perturbation(self, perturbation: Perturbation) -> None:
-        """Raises `UnknownNameError` for a disabled contact point that does not exist."""
+        """Change the perturbation; raise `UnknownNameError` for an unknown contact point."""
         for name in as_instance("perturbation", perturbation, Perturbation).disabled_contacts:
             if name not in self.point_names:
                 raise unknown_name("contact point", name, self.point_names)
@@ -126,26 +129,39 @@ class PerturbedSimulation(Simulation):
 
     @property
     def base_wrench(self) -> Array:
-        """Force and moment of motors that the base does not have, shape (6,), N and N·m, at its
-        origin in its axes.
-        """
+        """Wrench of the base's motors, shape (6,), in the frame of the base [N and N·m]."""
         return self._base_wrench
 
     @base_wrench.setter
     def base_wrench(self, wrench: npt.ArrayLike) -> None:
+        """Set the wrench; raise `InputError` if the robot has a fixed base."""
         if not self.robot.is_floating:
             raise InputError(
-                f"{self.robot.name} is bolted to the ground; only a floating base has a wrench."
+                f"{self.robot.name} has a fixed base. base_wrench needs a floating base."
             )
         self._base_wrench = as_array("base_wrench", wrench, (6,), "N and N·m")
 
     def reset(self, state: State | None = None) -> None:
-        """As `Simulation.reset`; the base's wrench is zero again."""
+        """Reset the simulation as `Simulation.reset` does, and set the base wrench to zero.
+
+        Parameters
+        ----------
+        state : State, optional
+            State to start from. By default, the robot stands.
+        """
         self._base_wrench = np.zeros(6)
         super().reset(state)
 
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
-        """As `Simulation.advance`, with what the perturbation adds."""
+        """Advance one timestep as `Simulation.advance` does, with the perturbation's forces.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (d,)
+            Joint torques [N·m].
+        pushes : tuple of Push, optional
+            Pushes that may act during the step.
+        """
         data, applied = self.data, self.data.qfrc_applied
         applied[:] = 0.0
         if not self._perturbation.velocity_forces:
@@ -157,16 +173,16 @@ class PerturbedSimulation(Simulation):
             mujoco.mju_quat2Mat(R, data.qpos[3:7])
             applied[:3] += (
                 R.reshape(3, 3) @ self._base_wrench[:3]
-            )  # MuJoCo: linear in world axes, angular in the base's
+            )  # MuJoCo: linear in the world frame, angular in the base frame
             applied[3:6] += self._base_wrench[3:]
         super().advance(tau, pushes)
 
     def _velocity_compensation(self) -> Array:
-        """The forces, as MuJoCo takes them, that cancel what h of (7) has because of the velocity.
+        """Return the generalized forces that cancel the velocity part of h, in MuJoCo coordinates.
 
-        MuJoCo's bias forces less those at rest are that for its own coordinates, in which the
-        base's velocity is along world axes. In (7) it is along the base's own, which turn: M times
-        ω × v of the base comes to it.
+        MuJoCo's bias forces minus those at rest give the velocity part for MuJoCo's coordinates, in
+        which the base velocity is expressed along the world axes. In eq. (7) it is expressed along
+        the base's own axes, which rotate. This adds M times ω × v of the base.
         """
         model, data = self.model, self._scratch
         data.qpos[:], data.qvel[:] = self.data.qpos, self.data.qvel
@@ -185,7 +201,7 @@ class PerturbedSimulation(Simulation):
 
     def _apply_adhesion(self, applied: Array) -> None:
         """Add the adhesion force on each ball that touches the ground."""
-        # contacts where the feet are now: the step before found them where it began
+        # update the contacts: the last step found them for the positions at its beginning
         mujoco.mj_fwdPosition(self.model, self.data)
         foot_geoms = set(self.foot_contacts.geoms.tolist())
         for plane, ball in self.data.contact.geom.tolist():
@@ -197,7 +213,20 @@ class PerturbedSimulation(Simulation):
                 )
 
     def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """As there, less the adhesion force: the force between ground and foot."""
+        """Return contact forces as `Simulation.contact_forces_of` does, without adhesion.
+
+        Parameters
+        ----------
+        geoms : ndarray, shape (N, n, 2)
+            Ground and foot geom of up to n contacts at N instants.
+        contact_frame_forces : ndarray, shape (N, 3 n)
+            Forces in MuJoCo's contact frames [N].
+
+        Returns
+        -------
+        ndarray, shape (N, n_points, 3)
+            Forces of the ground on the contact points in the world frame [N].
+        """
         forces = super().contact_forces_of(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
@@ -210,14 +239,20 @@ class PerturbedSimulation(Simulation):
 
 
 class BaseMotors:
-    """A controller around another one that drives motors of the base which no robot has: S without
-    its zeros.
+    """Controller that also drives motors of the base, as if S had no zero rows.
 
-    At each control step `sim.base_wrench` becomes the base's rows of (7), M q̈ + h - Jᵀ λ, of what
-    the controller plans, with M, h and J as it assumes them: zero, but for rounding, unless it
-    assumes such motors.
+    It wraps another controller. At each control step, `sim.base_wrench` becomes the base's rows of
+    M q̈ + h - Jᵀ λ in eq. (7) for the planned values, with M, h and J as the controller assumes
+    them. The wrench is zero, up to rounding, unless the controller assumes such motors.
 
-    mismatch: the controller's; None for none.
+    Parameters
+    ----------
+    controller : Controller
+        Controller to wrap.
+    sim : PerturbedSimulation
+        Simulation whose base wrench is set.
+    mismatch : ModelMismatch, optional
+        Mismatch of the controller. By default, its model is exact.
     """
 
     def __init__(
@@ -231,12 +266,27 @@ class BaseMotors:
 
     @property
     def contacts(self) -> Contacts:
-        """Those of the controller now."""
+        """Current contacts of the controller."""
         held: Contacts = self.controller.contacts  # type: ignore[attr-defined]
         return held
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """The command of the controller at q, (nq,), and v, (nv,), at t in s."""
+        """Compute the controller's command, and set the base wrench of the simulation.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        Command
+            Command of the wrapped controller.
+        """
         command: Command = self.controller(q, v, t)  # type: ignore[arg-type]
         eom = self.mismatch.assumed_equations(
             equations_of_motion(State(self.sim.robot, q, v), self.contacts)

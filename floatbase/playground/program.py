@@ -1,4 +1,4 @@
-"""The program that the playground shows: it makes what `build` makes of the same settings."""
+"""Python program that reproduces the settings of the playground."""
 
 from __future__ import annotations
 
@@ -14,15 +14,33 @@ from floatbase.playground.settings import IDEAL_BANDWIDTH, IDEAL_KP, Settings, s
 from floatbase.robots import Robot, load
 from floatbase.simulation import Push
 
-_DURATION = 3.0  # s that the program simulates
-_PUSH_START = 0.5  # s: the robot stands quietly by then
+_DURATION = 3.0  # s simulated by the program
+_PUSH_START = 0.5  # s: the robot is at rest by then
 
 
 def program(settings: Settings, robot: Robot, period: float, push: Push | None = None) -> str:
-    """A program that makes and runs the same robot for 3 s.
+    """Write a program that makes and runs the same robot for 3 s.
 
-    period: s, of the controller. push: acts at 0.5 s; None for none.
-    Raises `FloatbaseError` where settings and robot do not fit.
+    Parameters
+    ----------
+    settings : Settings
+        Settings of the playground.
+    robot : Robot
+        Robot to simulate.
+    period : float
+        Control period [s].
+    push : Push, optional
+        Push that acts at 0.5 s in the program.
+
+    Returns
+    -------
+    str
+        Source code of the program.
+
+    Raises
+    ------
+    FloatbaseError
+        If the settings do not fit the robot.
     """
     given = build.perturbation(settings, robot)
     is_perturbed = given != Perturbation() or "zeros" in settings.actual_off
@@ -48,7 +66,7 @@ def program(settings: Settings, robot: Robot, period: float, push: Push | None =
 
 
 def _imports(settings: Settings, perturbation: Perturbation | None) -> list[str]:
-    """The imports that the lines of these settings need."""
+    """Return the import lines that these settings need."""
     lines = ["import floatbase as fb"]
     if settings.bandwidth[1] < IDEAL_BANDWIDTH:
         lines.append("from floatbase.actuators import FirstOrderLag")
@@ -66,11 +84,12 @@ def _imports(settings: Settings, perturbation: Perturbation | None) -> list[str]
 
 
 def _stands(settings: Settings) -> bool:
+    """Return whether the robot stands without taking steps."""
     return settings.gait is None and not settings.steps_when_pushed
 
 
 def _world(settings: Settings, perturbation: Perturbation | None) -> list[str]:
-    """Lines that make `sim`, `state` where the robot stands in it, and `actuators`."""
+    """Return the lines that make `sim`, `state` (the standing state in it) and `actuators`."""
     ground, hertz = _literal(settings.friction[1]), settings.bandwidth[1]
     if settings.slope[1] != 0.0:
         ground = f"fb.Ground({ground}, normal={settings.normals[1]})"
@@ -90,7 +109,7 @@ def _world(settings: Settings, perturbation: Perturbation | None) -> list[str]:
 
 
 def _controller(settings: Settings, robot: Robot) -> list[str]:
-    """Lines that make `controller`."""
+    """Return the lines that make `controller`."""
     mu, fraction = _literal(settings.friction[0]), _literal(settings.torque_fraction)
     normals = f", normals={settings.normals[0]}" if settings.slope[0] else ""
     lines = [f"contacts = fb.Contacts.feet(robot, {mu}{normals})"]
@@ -129,7 +148,7 @@ def _controller(settings: Settings, robot: Robot) -> list[str]:
 
 
 def _standing(settings: Settings) -> list[str]:
-    """Lines that make `tasks`, and `contacts` without lifted feet."""
+    """Return the lines that make `tasks`, and `contacts` without lifted feet."""
     motion, posture, effort = settings.weights
     weight = f", weight={_literal(six_digits(10.0 * motion))}" if motion != 1.0 else ""
     gains = ("" if settings.kp == IDEAL_KP else f", kp={_literal(settings.kp)}") + weight
@@ -162,7 +181,7 @@ def _standing(settings: Settings) -> list[str]:
 
 
 def _call(value: Any) -> str:
-    """The call that makes a dataclass, with the fields that differ from their defaults."""
+    """Return the call that makes a dataclass, with the fields that differ from their defaults."""
     given = {
         field.name: getattr(value, field.name)
         for field in fields(value)
@@ -173,16 +192,17 @@ def _call(value: Any) -> str:
 
 
 def _literal(value: object) -> str:
-    """A value in Python, a number as short as it can be without losing digits."""
+    """Return a value as Python source, a number as short as possible without losing digits."""
     short = f"{value:g}" if isinstance(value, float) else ""
     return short if short and float(short) == value else repr(value)
 
 
 @lru_cache(maxsize=8)
 def _load_call(robot: Robot) -> str:
-    """The call that loads a robot. One that `load` does not give comes from a file with its name.
+    """Return the call that loads a robot.
 
-    User-defined limits, locked joints and feet of several radii are left out.
+    If `load` does not give this robot, the call reads a URDF file with its name.
+    User-defined limits, locked joints and feet of different radii are left out.
     """
     with suppress(FloatbaseError):
         if load(robot.name) == robot:

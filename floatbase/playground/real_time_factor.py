@@ -1,6 +1,4 @@
-"""How fast a run is, compared with real time: a machine that cannot hold it is slower, and the page
-says by how much.
-"""
+"""Real-time factor of a simulation: how fast it runs compared with real time."""
 
 from __future__ import annotations
 
@@ -10,8 +8,14 @@ from collections.abc import Callable
 
 
 class RealTimeFactor:
-    """Simulated time per real time. clock: gives real time, s. over: s of real time, back from now,
-    that count.
+    """Ratio of simulated time to real time over the last seconds.
+
+    Parameters
+    ----------
+    clock : callable, optional
+        Function that returns the real time [s].
+    over : float, optional
+        Length of the averaging window, in real time [s].
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
@@ -19,8 +23,17 @@ class RealTimeFactor:
         self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
 
     def update(self, simulated: float) -> float | None:
-        """The pace when the simulation's clock has come to `simulated` s; None for half a second
-        after a start or a pause.
+        """Record the simulated time, and return the real-time factor.
+
+        Parameters
+        ----------
+        simulated : float
+            Current time of the simulation [s].
+
+        Returns
+        -------
+        float or None
+            Real-time factor [-]; None during the first half second after a start or a pause.
         """
         now = self._clock()
         if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):

@@ -1,6 +1,4 @@
-"""A robot, its world and its controller as the playground's settings make them; with or without a
-page.
-"""
+"""Robot, simulation and controller made from the settings of the playground, without a page."""
 
 from __future__ import annotations
 
@@ -12,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import floatbase as fb
+from floatbase._geometry import rotation_z
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
 from floatbase.playground import build
@@ -21,21 +20,29 @@ from floatbase.playground.settings import Settings
 from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, Controller, Push
 
-# s between ticks: go2's reference QP takes 1.5 ms, so that half of the time is left for physics and
+# s, control period: go2's reference QP takes 1.5 ms, which leaves half of the time for physics and
 # pictures
 PERIOD = 4e-3
 
 
 class Session:
-    """A robot under settings that change while it runs.
+    """A robot whose settings can change while it runs.
 
-    robot: as from `fb.load`. settings: those at first.
-    `sim`, `controller` and `actuators` are what `rollout` takes, with a control step every
-    `PERIOD`: the same on every machine, so that a run can be had again. `code` shows a program that
-    makes the same. `last` is the newest record, which `observe` keeps. `refusal` says why a change
-    was refused, and then everything stays as it was.
+    Pass `sim`, `controller` and `actuators` to `rollout` with a control period of `PERIOD`. The
+    period is the same on every machine, so a run can be reproduced. `last` is the newest record
+    passed to `observe`. `refusal` says why the last change was refused; "" if it was accepted.
 
-    Raises `FloatbaseError` where robot and settings do not fit.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as from `fb.load`.
+    settings : Settings, optional
+        Initial settings.
+
+    Raises
+    ------
+    FloatbaseError
+        If the settings do not fit the robot.
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
@@ -49,7 +56,7 @@ class Session:
         self.controller: Controller = build.controller(self.settings, robot, self.sim, self.home)
 
     def _make_simulation(self, settings: Settings) -> PerturbedSimulation:
-        """A world on the true ground, with the robot standing in it."""
+        """Return a simulation on the actual ground, with the robot standing."""
         return PerturbedSimulation(
             self.robot,
             build.ground(settings),
@@ -57,7 +64,7 @@ class Session:
         )
 
     def _make_actuators(self, settings: Settings) -> Actuators | None:
-        """Actuators that go on with the torques of the last record."""
+        """Return actuators that continue with the torques of the last record."""
         made = build.actuators(settings, self.robot, self.home)
         if made is not None and self.last is not None:
             made.reset(self.last.tau[-1])
@@ -65,7 +72,7 @@ class Session:
 
     @property
     def walk(self) -> Walk | None:
-        """The behaviour that makes steps, where there is one."""
+        """Behaviour that walks, or None if the robot does not walk."""
         inner = (
             self.controller.controller
             if isinstance(self.controller, BaseMotors)
@@ -74,21 +81,44 @@ class Session:
         return inner if isinstance(inner, Walk) else None
 
     def code(self, push: Push | None = None) -> str:
-        """A program that makes and runs the same robot for 3 s, from its standing posture on.
+        """Write a program that makes and runs the same robot for 3 s, from its standing posture.
 
-        push: acts at 0.5 s; None for none.
+        Parameters
+        ----------
+        push : Push, optional
+            Push that acts at 0.5 s in the program.
+
+        Returns
+        -------
+        str
+            Source code of the program.
         """
         return program(self.settings, self.robot, PERIOD, push)
 
     def observe(self, record: fb.Rollout) -> None:
-        """Take note of the newest slice."""
+        """Store the newest slice of the run.
+
+        Parameters
+        ----------
+        record : Rollout
+            Record of the slice.
+        """
         self.last = record
 
     def change(self, **changes: Any) -> bool:
-        """Change settings; returns whether the robot was put back on its feet for it, as another
-        slope asks for.
+        """Change settings.
 
-        Where the new settings cannot be, `refusal` says why, and nothing changes.
+        If the new settings are impossible, nothing changes, and `refusal` says why.
+
+        Parameters
+        ----------
+        **changes
+            New values of fields of `Settings`.
+
+        Returns
+        -------
+        bool
+            Whether the robot was put back on its feet, which a change of the actual slope requires.
         """
         before = self.settings
         try:
@@ -105,7 +135,7 @@ class Session:
         return moved
 
     def _start_over(self, settings: Settings) -> None:
-        """Stand in a new world. Raises `FloatbaseError` before anything has changed."""
+        """Stand in a new simulation; raise `FloatbaseError` before anything has changed."""
         sim = self._make_simulation(settings)
         home = sim.state
         actuators = build.actuators(settings, self.robot, home)
@@ -114,8 +144,10 @@ class Session:
         self.actuators, self.controller = actuators, controller
 
     def _go_on(self, settings: Settings) -> None:
-        """Go on in the same world, changed; a walk goes on where only its velocity or gait changes.
-        Raises `FloatbaseError` before anything has changed.
+        """Continue in the same simulation with new settings.
+
+        A walk continues if only its velocity or gait changes. Raises `FloatbaseError` before
+        anything has changed.
         """
         before, walk = self.settings, self.walk
         perturbation = build.perturbation(settings, self.robot)
@@ -138,13 +170,14 @@ class Session:
                 settings, self.robot, self.sim, self._standing_state_here()
             )
             if self.robot.is_floating:
-                self.sim.base_wrench = np.zeros(6)  # of motors that may be there no more
+                self.sim.base_wrench = np.zeros(6)  # the base may have no motors any more
         self.sim.perturbation = replace(perturbation, friction=settings.friction[1])
         self.settings, self.actuators = settings, actuators
 
     def after_reset(self) -> None:
-        """After a reset of the simulation: schedules count from the clock's new beginning, and
-        actuators hold the robot.
+        """Update the session after a reset of the simulation.
+
+        Schedules restart with the clock, and the actuators hold the robot.
         """
         self.last = None
         self.settings = replace(self.settings, start_time=0.0)
@@ -152,13 +185,13 @@ class Session:
         self.controller = build.controller(self.settings, self.robot, self.sim, self.home)
 
     def _standing_state_here(self) -> State:
-        """The standing posture where the feet are now, turned as the robot is."""
+        """Return the standing posture at the current position and heading of the feet."""
         contacts = Contacts.feet(self.robot)
         if self.last is None or not self.robot.is_floating or not len(contacts):
             return self.home
         present = self.last.final
         R, R0 = (state.frame_pose("base").rotation for state in (present, self.home))
-        turn = pin.exp3(np.array([0.0, 0.0, math.atan2(*(R @ R0.T)[[1, 0], 0])]))
+        turn = rotation_z(math.atan2(*(R @ R0.T)[[1, 0], 0]))
         q = np.array(self.home.q)
         q[3:7] = pin.Quaternion(turn @ R0).coeffs()
         turned = self.home.replace(q=q)
@@ -171,5 +204,5 @@ class Session:
 
 
 def _without_gait(settings: Settings) -> Settings:
-    """The settings that a walk does not take over while it goes on."""
+    """Return the settings that a walk cannot take over while it continues."""
     return replace(settings, gait=None, velocity=(0.0, 0.0, 0.0), start_time=0.0)

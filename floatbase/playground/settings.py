@@ -1,4 +1,4 @@
-"""All that can be set in the playground, as one checked value."""
+"""Settings of the playground as one checked value."""
 
 from __future__ import annotations
 
@@ -17,50 +17,77 @@ from floatbase._validation import (
 )
 from floatbase.behaviours import Gait
 from floatbase.errors import unknown_name
+from floatbase.friction._polytopes import MAX_FACETS
 from floatbase.playground.equation import EQUATION
 
 GAITS = {  # by number of feet
     4: {"trot": Gait.trot, "crawl": Gait.crawl},
     2: {"walk": Gait.walk},
 }
-IDEAL_BANDWIDTH = 100.0  # Hz: actuators at this end of their slider are perfect
-IDEAL_KP = 100.0  # 1/s², of tasks with perfect actuators
-_MAX_FACETS = 1000
+IDEAL_BANDWIDTH = 100.0  # Hz: actuators with this bandwidth, the end of the slider, are ideal
+IDEAL_KP = 100.0  # 1/s², gain of tasks with ideal actuators
 _MAX_SLOPE = 89.0  # degrees: at 90 the ground is a wall
-_MAX_SHIFT = 10.0  # m: more is a slip of units
-_MAX_SPEED = 5.0  # m/s and rad/s: more is a slip of units
+_MAX_SHIFT = 10.0  # m: a larger value is probably in the wrong unit
+_MAX_SPEED = 5.0  # m/s and rad/s: a larger value is probably in the wrong unit
 _GAIT_NAMES = tuple(name for gaits in GAITS.values() for name in gaits)
 
 
 @dataclass(frozen=True)
 class Settings(Value):
-    """What the playground's controls set. Pairs are (believed by the controller, true in the
-    world). Numbers are kept to six digits, so that `Session.code` shows the same.
+    """Settings of the playground.
 
-    friction: coefficients.
-    slope: degrees, how much the ground rises forwards.
-    mass: of all parts, as a multiple of the robot's own.
-    bandwidth: Hz, of the actuators; `IDEAL_BANDWIDTH` is a perfect one. The believed one sets how
-        fast the tasks answer.
-    facets: of the friction polyhedra.
-    lifted_feet: names of contacts that are to leave the ground.
-    com_shift: (3,) m, of the centre of mass.
-    nod: rad, half the width of the ellipse in pitch and yaw that the base describes.
-    torque_fraction: fraction of the motors' limits that the controller uses.
-    min_normal_force: N, the least normal force that the controller plans at each point.
-    weights: factors of the weights of motion (centre of mass, base), of posture, and of effort
-        (torques, forces).
-    gait: among those of `GAITS`, or None to stand.
-    velocity: m/s forwards and to the left, rad/s to the left, of a gait.
-    steps_when_pushed: whether it steps when it must.
-    assumed_off, actual_off: names of terms of `EQUATION` that are switched off in the controller's
-        belief, and in the world.
-    leg: the contact whose force the term "forces" switches off.
-    start_time: s, on the clock, when the gait or the ellipse was chosen.
+    Pairs are (nominal, actual): the first value is what the controller assumes, the second is what
+    holds in the simulation. Numbers are rounded to six digits, so that `Session.code` shows the
+    same values.
 
-    Raises `InputError` for a value of another type or out of range, `UnknownNameError` for a gait
-    or a term that does not exist. Names of feet, and whether the
-    robot has the gait, are checked where a robot is known, by `Session`.
+    Parameters
+    ----------
+    friction : tuple of float
+        Friction coefficients, nominal and actual, dimensionless.
+    slope : tuple of float
+        Rise of the ground in the forward direction, nominal and actual [degrees].
+    mass : tuple of float
+        Masses of all parts as a multiple of the robot's own, nominal and actual, dimensionless.
+    bandwidth : tuple of float
+        Bandwidth of the actuators, nominal and actual [Hz]; at `IDEAL_BANDWIDTH` they are ideal.
+        The nominal one limits the gains of the tasks.
+    facets : int
+        Number of facets of the friction polyhedra.
+    lifted_feet : tuple of str
+        Names of contacts that leave the ground.
+    com_shift : tuple of float
+        Displacement of the centre of mass in the world frame, three numbers [m].
+    nod : float
+        Half the width of the ellipse in pitch and yaw that the base describes [rad].
+    torque_fraction : float
+        Fraction of the torque limits that the controller uses, dimensionless.
+    min_normal_force : float
+        Smallest normal force that the controller plans at each point [N].
+    weights : tuple of float
+        Factors of the weights of motion (centre of mass, base), posture, and effort (torques,
+        forces), dimensionless.
+    gait : str or None
+        Name of a gait in `GAITS`, or None to stand.
+    velocity : tuple of float
+        Walking velocity: forward [m/s], to the left [m/s], and yaw rate to the left [rad/s].
+    steps_when_pushed : bool
+        Whether the robot takes steps to recover from pushes.
+    assumed_off : tuple of str
+        Names of terms of `EQUATION` that are switched off in the controller's model.
+    actual_off : tuple of str
+        Names of terms of `EQUATION` that are switched off in the simulation.
+    leg : str
+        Contact whose force the term "forces" switches off.
+    start_time : float
+        Time at which the gait or the ellipse was selected [s].
+
+    Raises
+    ------
+    InputError
+        If a value has the wrong type or is out of range.
+    UnknownNameError
+        If a gait or a term does not exist. Names of feet and the robot's gaits are checked by
+        `Session`, which knows the robot.
     """
 
     friction: tuple[float, float] = (0.7, 0.7)
@@ -92,7 +119,7 @@ class Settings(Value):
         ):
             numbers = [as_number(name, x, unit, -limit, limit) for x in self._entries(name)]
             self._keep(name, [round(x, 6) for x in numbers])
-        self._keep("facets", as_integer("facets", self.facets, 3, _MAX_FACETS))
+        self._keep("facets", as_integer("facets", self.facets, 3, MAX_FACETS))
         self._keep("nod", as_positive("nod", self.nod, "rad", True, 0.5 * math.pi))
         fraction = as_positive("torque_fraction", self.torque_fraction, maximum=1.0)
         self._keep("torque_fraction", fraction)
@@ -112,29 +139,40 @@ class Settings(Value):
                     raise unknown_name(f"term of {name}", off, terms)
 
     def _entries(self, name: str) -> list[float]:
-        """The numbers of a field, as many as its default has."""
-        n = len(getattr(type(self), name))  # of its default
+        """Return the numbers of a field, as many as its default has."""
+        n = len(getattr(type(self), name))  # entries of the default
         entries: list[float] = as_array(name, getattr(self, name), (n,)).tolist()
         return entries
 
     def _keep(self, name: str, value: object) -> None:
-        """Set a checked field: numbers rounded, several as a tuple."""
+        """Store a checked field: numbers rounded, sequences as tuples."""
         if isinstance(value, (list, dict)):
             value = tuple(six_digits(x) if isinstance(x, float) else x for x in value)
         object.__setattr__(self, name, six_digits(value) if isinstance(value, float) else value)
 
     @property
     def normals(self) -> tuple[list[float], ...]:
-        """(3,) normals of the ground, believed and true, world."""
+        """Nominal and actual normal of the ground, shape (3,) each, world frame."""
         angles = [math.radians(slope) for slope in self.slope]
         return tuple([round(-math.sin(a), 6), 0.0, round(math.cos(a), 6)] for a in angles)
 
     @property
     def kp(self) -> float:
-        """1/s², of the tasks of motion. A lag of ω rad/s becomes unstable beyond 4 ω²."""
+        """Gain of the motion tasks [1/s²]; a lag of ω rad/s makes gains above 4 ω² unstable."""
         return float(f"{min(IDEAL_KP, (2.0 * math.pi * self.bandwidth[0]) ** 2):.4g}")
 
 
 def six_digits(x: float) -> float:
-    """A number as it is written with six digits."""
+    """Round a number to six significant digits.
+
+    Parameters
+    ----------
+    x : float
+        Number to round [-].
+
+    Returns
+    -------
+    float
+        The rounded number.
+    """
     return float(f"{x:.6g}")

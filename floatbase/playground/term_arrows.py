@@ -1,4 +1,4 @@
-"""The terms of (7) as arrows in the picture, at the last instant of a record."""
+"""Terms of eq. (7) drawn as arrows, at the last instant of a record."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import Picture, markers, prefixed, shapes
 from floatbase.viewer.scene.colours import COM, MEASURED
 
-_ACCELERATION_SCALE = 0.03  # m of arrow per m/s², of the feet's drift
-_TEXT_SIZE = 0.06  # height of letters, over the size of the robot
-_TORQUE_LEVER = 0.3  # m, of the force that a torque is drawn as
+_ACCELERATION_SCALE = 0.03  # m of arrow per m/s², for the drift acceleration of the feet
+_TEXT_SIZE = 0.06  # height of letters, as a fraction of the size of the robot
+_TORQUE_LEVER = 0.3  # m, lever arm of the force that represents a torque
 _MIN_LENGTH = 5e-3  # m: shorter arrows are not drawn
 
 TERM_LEGEND = {  # term: (colour of its arrows, what they are)
     "inertia": (COM, "m a, mass times acceleration"),
     "velocity": (COM, "C q̇, Coriolis and centrifugal force"),
     "gravity": (COM, "m g, weight"),
-    "zeros": (MEASURED, "τ, torques of the joints"),
-    "drift": (COM, "J̇ q̇, drift of the feet"),
+    "zeros": (MEASURED, "τ, joint torques"),
+    "drift": (COM, "J̇ q̇, drift acceleration of the feet"),
 }
 _WORD_HEIGHTS = {
     "inertia": 0.25,
@@ -28,9 +28,9 @@ _WORD_HEIGHTS = {
     "gravity": 0.49,
     "zeros": 0.61,
     "drift": 0.73,
-}  # of words, over the robot's size
+}  # heights of the texts, as fractions of the robot's size
 _PROPORTIONAL_TO_MASS = ("inertia", "velocity", "gravity")
-_WORD_DISTANCE = 1.1  # times its size behind its centre of mass, where no arrow stands
+_WORD_DISTANCE = 1.1  # times the robot's size behind its centre of mass, where there are no arrows
 
 
 def term_arrows(
@@ -41,16 +41,31 @@ def term_arrows(
     off: tuple[str, ...] = (),
     mass: float = 1.0,
 ) -> Picture:
-    """The arrows of a term of `EQUATION` at the last row of a record; forces and cones are drawn by
-    the viewer itself.
+    """Draw a term of `EQUATION` at the last row of a record.
 
-    A term that is too small to be seen, or that the world does not have, is told in words behind
-    the robot.
-    scale: m/N, as the viewer draws forces.
-    size: of the robot, m.
-    off: terms that the world does not have: gravity and C q̇ have no arrow then.
-    mass: all masses of the world as a multiple of the data sheet's. M q̈, C q̇ and g are drawn with
-        it, as they truly are.
+    Forces and cones are drawn by the viewer itself. A text behind the robot replaces a term that is
+    too small to be seen or that is switched off in the simulation.
+
+    Parameters
+    ----------
+    term : str
+        Name of the term.
+    record : Rollout
+        Record with the state to draw.
+    scale : float
+        Length of a drawn force, as in the viewer [m/N].
+    size : float
+        Size of the robot [m].
+    off : tuple of str, optional
+        Names of terms that are switched off in the simulation. Gravity and C q̇ have no arrow then.
+    mass : float, optional
+        Actual masses as a multiple of the nominal ones, dimensionless. M q̈, C q̇ and g are scaled
+        by it.
+
+    Returns
+    -------
+    dict
+        Picture, path -> item; empty for a term without arrows of its own.
     """
     if term not in TERM_LEGEND:
         return {}
@@ -75,6 +90,7 @@ def term_arrows(
 
 
 def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Picture:
+    """Return an arrow with a label at its tip; nothing if it is too short."""
     if not np.isfinite(vector).all() or np.linalg.norm(vector) < _MIN_LENGTH:
         return {}
     tip = at + vector * (1.0 + 0.1 * size / np.linalg.norm(vector))
@@ -85,39 +101,40 @@ def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Pict
 
 
 def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """Mass times the acceleration of the centre of mass, by differences over the record."""
+    """Draw mass times the acceleration of the centre of mass, by differences over the record."""
     state = record.final
     if len(record) < 2:
         return {}
     first = record.state(0)
     rate = (state.com_velocity - first.com_velocity) / float(record.time[-1] - record.time[0])
-    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "true m a", size)
+    return _arrow("m a", np.array(state.com), scale * record.robot.mass * rate, "actual m a", size)
 
 
 def _gravity(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """The weight, as an arrow that ends at the centre of mass: below it there is the ground."""
+    """Draw the weight as an arrow that ends at the centre of mass, since the ground is below it."""
     at, weight = np.array(record.final.com), np.array([0.0, 0.0, -scale * record.robot.weight])
     words = shapes.label(
         at + [0.0, 0.25 * size, 0.5 * min(at[2], float(np.linalg.norm(weight)))],
-        "true m g",
+        "actual m g",
         _TEXT_SIZE * size,
     )
     return {"/m g": shapes.arrow(at - weight, weight, COM, size), "/m g label": words}
 
 
 def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """The force of C q̇ on the base."""
+    """Draw the force of C q̇ on the base."""
     state = record.final
     force = (state.h - state.replace(v=np.zeros(state.robot.nv)).h)[:3]
     pose = state.frame_pose("base")
     return _arrow(
-        "C v", np.array(pose.translation), scale * pose.rotation @ force, "true C q̇", size
+        "C v", np.array(pose.translation), scale * pose.rotation @ force, "actual C q̇", size
     )
 
 
 def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """A curled arrow around the axis of each joint, whose radius is that of the force with this
-    torque at a lever of 0.3 m.
+    """Draw each joint torque as a curled arrow around the joint's axis.
+
+    The radius is that of a force that has this torque at a lever arm of 0.3 m.
     """
     state, first = record.final, record.robot.nv - record.robot.d
     picture: Picture = {}
@@ -133,7 +150,7 @@ def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
 
 
 def _drift(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """What the velocities alone accelerate the feet by."""
+    """Draw the acceleration of the feet that the velocities alone cause."""
     contacts: Contacts = record.contacts_at(-1)
     eom = equations_of_motion(record.final, contacts)
     picture: Picture = {}

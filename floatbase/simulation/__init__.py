@@ -1,4 +1,4 @@
-"""Physics that shares no code with the controller: MuJoCo, built from the same URDF."""
+"""Simulation in MuJoCo, built from the same URDF and independent of the controller's code."""
 
 from floatbase.simulation.build import Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation

@@ -1,8 +1,8 @@
-"""From our convention for a state to MuJoCo's and back.
+"""Conversion of robot states between Pinocchio's convention and MuJoCo's.
 
-Ours is Pinocchio's: quaternion x y z w, base velocity in the base frame, joints in Pinocchio's
-order. MuJoCo's: quaternion w x y z, linear base velocity in the world frame and angular in the base
-frame, joints in the URDF's order.
+The package follows Pinocchio: quaternion x y z w, base velocity in the base frame, joints in
+Pinocchio's order. MuJoCo uses quaternion w x y z, the linear base velocity in the world frame, the
+angular base velocity in the base frame, and joints in the URDF's order.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from floatbase.robots import Robot
 
 
 class Conversion:
-    """Maps q and v of a robot to qpos and qvel of a MuJoCo model of it, and back."""
+    """Map q and v of a robot to qpos and qvel of its MuJoCo model, and back."""
 
     def __init__(self, robot: Robot, model: mujoco.MjModel):
         self._robot = robot
@@ -41,7 +41,7 @@ class Conversion:
         self._qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
 
     def q(self, qpos: Array) -> Array:
-        """Our q, shape (nq,), for MuJoCo's qpos."""
+        """Return q, shape (nq,), for MuJoCo's qpos."""
         q: Array = qpos[self._qpos_of_q]
         if self._cos_indices.size:
             q[self._cos_indices], q[self._cos_indices + 1] = (
@@ -51,20 +51,21 @@ class Conversion:
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
-        """Our v, shape (nv,), for MuJoCo's qpos and qvel."""
+        """Return v, shape (nv,), for MuJoCo's qpos and qvel."""
         v: Array = qvel[self._qvel_of_v]
         if self._n_base:
             v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
         return v
 
     def joint_state(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
-        """Angles (of joints without limits beyond π too), rad or m, and velocities, in the order of
-        τ, shape (d,) each.
+        """Return joint positions [rad or m] and velocities in the order of τ, shape (d,) each.
+
+        Positions of joints without limits may lie beyond π.
         """
         return qpos[self._qpos_indices], qvel[self._qvel_indices]
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """MuJoCo's qpos and qvel for our q and v."""
+        """Return MuJoCo's qpos and qvel for q and v."""
         qpos, qvel = np.empty(self._robot.d + (7 if self._n_base else 0)), np.empty(self._robot.nv)
         if self._n_base:
             qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
@@ -77,7 +78,7 @@ class Conversion:
 
 
 def rotation_matrix(wxyz: npt.ArrayLike) -> Array:
-    """Rotation matrix, shape (3, 3), of a unit quaternion w x y z."""
+    """Return the rotation matrix, shape (3, 3), of a unit quaternion w x y z."""
     R = np.empty(9)
     mujoco.mju_quat2Mat(R, wxyz)
     return R.reshape(3, 3)

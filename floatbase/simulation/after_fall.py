@@ -1,6 +1,4 @@
-"""What comes after a fall, or after a controller has failed: the motors damp the joints, and the
-robot lies down on its links.
-"""
+"""Motion after a fall or a controller failure, until the robot lies on its links."""
 
 from __future__ import annotations
 
@@ -12,17 +10,23 @@ from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.record import Recorder, Rollout
 
-# s, time constant with which the damping stops a joint that nothing else moves
+# s: time constant with which the damping stops a joint if nothing else moves it
 _DAMPING_TIME_CONSTANT = 0.05
-_REST_SPEED = 0.05  # m/s and rad/s: slower than this a robot is at rest
+_REST_SPEED = 0.05  # m/s and rad/s: a robot that is slower counts as at rest
 
 
 def joint_damping(sim: Simulation, period: float) -> Array:
-    """N·m·s/rad that each motor applies as a damper, shape (d,): its joint's effective inertia now,
-    1 / (M⁻¹)ᵢᵢ, over 0.05 s.
+    """Return the damping that each motor applies, shape (d,) [N·m·s/rad].
 
-    period: s, for which a torque is held; the time constant is twice as long at least, or it would
-        shake the joint.
+    It is the joint's effective inertia in the present state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05 s.
+
+    Parameters
+    ----------
+    sim : Simulation
+        The simulation.
+    period : float
+        Time for which a torque is held [s]. The time constant is at least twice as long, because a
+        shorter one would make the joint oscillate.
     """
     inverse_inertia = np.diag(np.linalg.inv(sim.state.M))[sim.robot.nv - sim.robot.d :]
     return np.array(1.0 / (max(_DAMPING_TIME_CONSTANT, 2.0 * period) * inverse_inertia))
@@ -36,9 +40,7 @@ def record_settling(
     substeps: int,
     pushes: tuple[Push, ...],
 ) -> None:
-    """Add ticks to a record in which the controller is off, τ = -d q̇ with `joint_damping`, and
-    links touch the ground.
-    """
+    """Add control steps with the controller off, under `joint_damping` and link collisions."""
     if not ticks:
         return
     record.enable_link_collisions()
@@ -57,7 +59,7 @@ def record_settling(
 def settling_rollout(
     sim: Simulation, previous: Rollout, ticks: int, substeps: int, pushes: tuple[Push, ...]
 ) -> Rollout:
-    """Record the next ticks after a record at whose end the controller is off."""
+    """Record the next control steps after a record at whose end the controller is off."""
     stance = previous.contacts_at(-1) if len(previous) else previous.contacts
     record = Recorder(sim, stance, ticks, substeps)
     record_settling(sim, record, stance, ticks, substeps, pushes)
@@ -65,5 +67,5 @@ def settling_rollout(
 
 
 def is_at_rest(sim: Simulation) -> bool:
-    """Whether hardly anything moves, or nothing can be said any more."""
+    """Return whether every velocity is below 0.05 m/s or rad/s, or the simulation has diverged."""
     return sim.diverged or bool(np.all(np.abs(sim.v) < _REST_SPEED))

@@ -1,7 +1,7 @@
-"""A MuJoCo model from a robot's URDF: ground, feet, torque motors.
+"""MuJoCo models built from a robot's URDF, with ground, feet and torque motors.
 
-Balls at the feet and hulls of the links can touch the ground's planes, and nothing else touches.
-Links that are welded together are one body, which has all their inertia.
+Balls at the feet and convex hulls of the links can collide with the planes of the ground. There are
+no other collisions. Links that are welded together become one body with their combined inertia.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_half_spaces, as_positive, read_only
+from floatbase._validation import Array, Value, as_half_spaces, as_positive, checked, read_only
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
@@ -23,7 +23,7 @@ from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-# friction as stiff as the normal force: feet creep less under a steady load
+# of friction to the normal force: stiffer friction makes feet creep less under a steady load
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
@@ -33,69 +33,99 @@ _CONTACT_IMPEDANCE = (
     0.001,
     0.5,
     2.0,
-)  # MuJoCo's default with 0.95 and 0.99 for 0.9 and 0.95: less give
+)  # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-# s in which a link comes out that was in the ground before it touched
+# s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
 # m: a flat foot stands on small balls whose lowest points are its corners
 _CORNER_BALL_RADIUS = 0.005
-# m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+# m: MuJoCo has no balls of radius 0, which is the radius of a foot without a size
 _MIN_BALL_RADIUS = 1e-4
-_MIN_INERTIA = 1e-15  # kg m²: MuJoCo takes principal inertias below it for zero (mjMINVAL)
-# relative: a thin plate meets the triangle inequality of principal inertias with equality, but for
+_MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero (mjMINVAL)
+# relative: for a thin plate the triangle inequality of principal inertias is an equality, up to
 # rounding
 _RELATIVE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Ground(Value):
-    """The ground: a plane, or several planes that all are solid below, as the two sides of a
-    valley.
+    """The ground: a plane, or several planes that are all solid below, as the sides of a valley.
 
-        valley = fb.Ground(normal=[[0, -0.34, 0.94], [0, 0.34, 0.94]])
+    Parameters
+    ----------
+    mu : float, optional
+        Coefficient of friction between the ground and the feet, positive [-].
+    normal : array_like, shape (3,) or (n, 3), optional
+        Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
+        it is normalized.
+    offset : float or array_like, shape (n,), optional
+        Offset of each plane, which holds the points with normal · x = offset [m]. One number
+        applies to all planes; a plane with offset 0 goes through the origin.
 
-    mu: coefficient of friction with the feet.
-    normal: world, out of the ground, made unit: (3,) for one plane, (n, 3) for several.
-    offset: m, of the points normal · x = offset of a plane: one number for all planes, or (n,); 0
-        goes through the origin.
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> valley = fb.Ground(normal=[[0.0, -0.34, 0.94], [0.0, 0.34, 0.94]])
+    >>> valley.offsets
+    array([0., 0.])
     """
 
-    mu: float = 1.0
+    mu: float = field(default=1.0, metadata=checked(as_positive))
     normal: Array = field(default_factory=lambda: UP)
     offset: float | Array = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
         single_plane = np.ndim(self.normal) == 1
-        object.__setattr__(
-            self, "mu", as_positive("friction coefficient mu of the ground", self.mu)
-        )
         object.__setattr__(self, "normal", normals[0] if single_plane else normals)
         object.__setattr__(self, "offset", float(offsets[0]) if single_plane else offsets)
 
     @property
     def normals(self) -> Array:
-        """Unit normals of all planes, shape (n, 3), world."""
+        """Unit normals of all planes, shape (n, 3), world frame."""
         return np.atleast_2d(self.normal)
 
     @property
     def offsets(self) -> Array:
-        """Offsets of all planes, shape (n,), m."""
+        """Offsets of all planes, shape (n,) [m]."""
         return read_only(np.atleast_1d(self.offset))
 
     def clearances(self, points: npt.ArrayLike) -> Array:
-        """Distances of points from each plane, shape (…, n), m, negative below it. points: (…, 3),
-        m, world.
+        """Compute the distances of points from each plane.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Points in the world frame [m].
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Distance from each of the n planes, negative below it [m].
         """
         return np.asarray(points) @ self.normals.T - self.offsets
 
 
 def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
-    """The robot on the ground as a MuJoCo model with a timestep, s; geoms are called as contact
-    points, motors as joints.
+    """Build the MuJoCo model of a robot on the ground.
 
-    The ground touches the feet and the links' hulls. Raises `SimulationError` when MuJoCo cannot
-    build it.
+    The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
+    and motors the names of the joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    ground : Ground
+        The ground.
+    timestep : float
+        Timestep of the simulation [s].
+
+    Raises
+    ------
+    SimulationError
+        If MuJoCo cannot build the model.
     """
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
@@ -106,7 +136,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     contact.condim, contact.friction = (
         3,
         [ground.mu, 0.0, 0.0],
-    )  # no resistance to spinning or rolling
+    )  # no torsional or rolling friction
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
@@ -125,7 +155,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         plane = spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal
         )
-        plane.size[2] = 0.05  # MuJoCo wants one, and does not use it
+        plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
     for foot, feet in zip(robot.feet, Contacts.feet(robot).friction_contacts, strict=True):
         _add_foot_balls(spec, foot, feet.point_names)
@@ -133,25 +163,28 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     try:
         model = spec.compile()
     except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot build {robot.name}: {error}") from None
+        raise SimulationError(
+            f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
+        ) from None
     if model.nv != robot.nv:
         raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, which has "
-            f"{robot.nv}: "
-            "its model was changed after it was read from the URDF."
+            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
+            f"robot has {robot.nv}. Its model was changed after it was read from the URDF; load "
+            f"the robot again."
         )
     return model
 
 
 def body_name(link: str) -> str:
-    """Name in MuJoCo of a floating robot's link: its own, but for "world": MuJoCo would weld it to
-    the ground.
+    """Return MuJoCo's name of a floating robot's link.
+
+    It is the link's own name, except for "world": MuJoCo would weld that link to the ground.
     """
     return "world of the robot" if link == "world" else link
 
 
 def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
-    """The URDF as MuJoCo reads it, welded links fused into one body."""
+    """Return the URDF as MuJoCo reads it, with welded links fused into one body."""
     root = ElementTree.fromstring(robot.urdf)
     if robot.is_floating:
         for link in root.findall("link"):
@@ -164,7 +197,9 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
     except ValueError as error:
-        raise SimulationError(f"MuJoCo cannot read {robot.name}: {error}") from None
+        raise SimulationError(
+            f"MuJoCo cannot read {robot.name}. Correct the URDF: {error}"
+        ) from None
     spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
     inertias = {
@@ -185,22 +220,20 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         body.mass, body.ipos, body.iquat = inertia.mass, inertia.lever, [1.0, 0.0, 0.0, 0.0]
         diagonal = (
             tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
-        )  # MuJoCo's word for none
+        )  # how MuJoCo marks a missing inertia
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
 
 
 def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
-    """The inertia of a body and of all that is welded to it from below, in its own frame, as the
-    URDF gives it.
-    """
+    """Return the URDF's inertia of a body and all links welded below it, in the body's frame."""
     inertia = (
         pin.Inertia.Zero()
-    )  # the constructor refuses tensors that are not positive definite, and a sum may mend them
+    )  # the constructor rejects tensors that are not positive definite, but their sum may be so
     if body.explicitinertial:  # else the URDF gives none
         ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(
             body.fullinertia
-        )  # MuJoCo notes NaN for a tensor of zeros
+        )  # MuJoCo stores NaN for a tensor of zeros
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
         tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
         inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
@@ -213,7 +246,7 @@ def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
 
 
 def _is_physically_consistent(inertia: pin.Inertia) -> bool:
-    """Whether some mass distribution has this inertia; none at all does not count."""
+    """Return whether some mass distribution has this inertia; a mass of zero does not count."""
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
     return bool(
         inertia.mass > 0.0
@@ -223,32 +256,29 @@ def _is_physically_consistent(inertia: pin.Inertia) -> bool:
 
 
 def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.Inertia) -> str:
-    """What to say of bodies that MuJoCo cannot move; inertia: that of the first."""
+    """Return the message about bodies that MuJoCo cannot move; `inertia` is that of the first."""
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
     others = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
     joints = [joint.name for body in bodies for joint in body.joints]
     weld = (
-        f", or weld such links to the ones they hang from with locked={joints} of fb.load"
-        if joints
-        else ""
+        f", or weld such links to their parents with locked={joints} of fb.load" if joints else ""
     )
     return (
-        f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}: with all that is "
-        f"welded to it, it has "
+        f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}. Together with the "
+        f"links welded to it, it has "
         f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} "
-        f"kg m². They must be above "
-        f"zero, and none above the sum of the two others. Correct the URDF{weld}."
+        f"kg m². All of these must be positive, and no principal inertia may exceed the sum of the "
+        f"other two. Correct the URDF{weld}."
     )
 
 
 def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
-    """A ball for each of the foot's contact points, so that the ball's lowest point is the contact
-    point.
-    """
+    """Add a ball for each contact point of a foot, with the contact point as its lowest point."""
     body = spec.body(body_name(foot.frame))
     if body is None:
         raise SimulationError(
-            f"the foot {foot.frame} is no link of the URDF; give feet by the names of their links."
+            f"The foot {foot.frame} is not a link of the URDF. Give feet by the names of their "
+            f"links."
         )
     if foot.corners is None:
         centres, radius = foot.centre[None], max(foot.radius, _MIN_BALL_RADIUS)
@@ -261,12 +291,10 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
 
 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The hulls of links, without mass: they stop at once where they hit the ground, and come out
-    of it slowly.
-    """
+    """Add the massless hulls of links; they stop at once on impact and leave the ground slowly."""
     impact_time = max(_IMPACT_TIME, 4.0 * spec.option.timestep)
     for joint_id, points in link_hulls(robot):
-        joint = spec.joint(robot.model.names[joint_id])  # the free base's has another name
+        joint = spec.joint(robot.model.names[joint_id])  # None for the free joint: its name differs
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
         mesh = spec.add_mesh(name=f"hull of {body.name}", uservert=points.ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX

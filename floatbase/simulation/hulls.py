@@ -1,5 +1,6 @@
-"""Hulls of a robot's links, with which it lies on the ground after a fall, from the URDF's
-collision shapes.
+"""Convex hulls of a robot's links, made from the URDF's collision shapes.
+
+After a fall, the robot lies on them.
 """
 
 from __future__ import annotations
@@ -15,20 +16,29 @@ import pinocchio as pin
 from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 
-_MIN_THICKNESS = 1e-3  # m: flatter points have no hull for MuJoCo
-_PRISM_SIDES = 24  # of the prism that stands for a cylinder: it is within 1 % of the radius
-_BLOCK_SIZE = 1024  # points at a time: what one core's cache holds
+_MIN_THICKNESS = 1e-3  # m: MuJoCo builds no hull from flatter sets of points
+_PRISM_SIDES = 24  # of the prism that approximates a cylinder: it is within 1 % of the radius
+_BLOCK_SIZE = 1024  # points at a time: as many as one core's cache holds
 # a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
 _N_DIRECTIONS = 1000
 
 
 @lru_cache(maxsize=16)
 def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
-    """Pinocchio's number of the joint that moves a link, and points whose hull it fills, shape (n,
-    3), m, in the joint's frame.
+    """Return the joints that move links, each with the points that span its links' hull.
 
-    All that one joint moves has one hull: a plane touches a body where it touches its hull. A robot
-    that is bolted to the ground has none.
+    All links that one joint moves share one hull, because a plane touches a body exactly where it
+    touches the body's hull. A robot with a fixed base has no hulls.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    tuple of (int, ndarray, shape (n, 3))
+        Pinocchio's id of each joint, and points in the joint's frame [m].
     """
     if not robot.is_floating:
         return ()
@@ -47,8 +57,9 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
 
 
 def _collision_objects(robot: Robot) -> list[Any]:
-    """The links' collision shapes, or what is seen of links without; no meshes where one of their
-    files is missing.
+    """Return the links' collision shapes, or visual shapes where a link has no collision shape.
+
+    Meshes are left out if the file of any of them is missing.
     """
     root = ElementTree.fromstring(robot.urdf)
     for link in root.findall("link"):
@@ -66,11 +77,11 @@ def _collision_objects(robot: Robot) -> list[Any]:
 
 
 def _read_geometry(robot: Robot, root: ElementTree.Element) -> list[Any]:
-    """The collision shapes of a URDF. Raises `ValueError` where a file of a mesh is missing."""
+    """Return the collision shapes of a URDF; a missing mesh file raises `ValueError`."""
     urdf = ElementTree.tostring(root, encoding="unicode")
     loader = coal.CachedMeshLoader(
         coal.BV_OBB
-    )  # legs share files; of other kinds of trees Python cannot see the vertices
+    )  # legs share files; Python cannot read the vertices of other kinds of trees
     folders = [str(folder) for folder in robot.package_dirs]
     return list(
         pin.buildGeomFromUrdfString(
@@ -80,9 +91,7 @@ def _read_geometry(robot: Robot, root: ElementTree.Element) -> list[Any]:
 
 
 def _shape_points(shape: Any) -> Array:
-    """Points whose hull is a shape, in its own frame, shape (n, 3), m; none for a kind that is not
-    known.
-    """
+    """Return points whose hull is a shape, shape (n, 3), in its frame [m]; none if unknown."""
     match shape:
         case coal.Box():
             half_sides: Array = np.array(shape.halfSide).ravel()
@@ -101,9 +110,7 @@ def _shape_points(shape: Any) -> Array:
 
 
 def _thickness(points: Array) -> float:
-    """The least extension along the principal axes of points, shape (n, 3); 0 for fewer than four
-    points.
-    """
+    """Return the least extent of points along their principal axes; 0 for fewer than four."""
     if len(points) < 4:
         return 0.0
     centred = points - points.mean(axis=0)
@@ -112,7 +119,7 @@ def _thickness(points: Array) -> float:
 
 
 def _extreme_points(points: Array) -> Array:
-    """Those points, shape (m, 3), that are the farthest in some direction: enough for a hull."""
+    """Return the points that are farthest in some direction, shape (m, 3): enough for a hull."""
     directions = _sphere_directions()
     best, support = np.zeros(len(directions), dtype=int), np.full(len(directions), -np.inf)
     for first in range(0, len(points), _BLOCK_SIZE):
@@ -125,9 +132,7 @@ def _extreme_points(points: Array) -> Array:
 
 
 def _sphere_directions() -> Array:
-    """Unit vectors that cover a sphere evenly along a golden spiral, shape (n, 3), the six axes
-    among them.
-    """
+    """Return unit vectors, shape (n, 3), along a golden spiral on a sphere, then the six axes."""
     i = np.arange(_N_DIRECTIONS)
     z, angle = 1.0 - (2.0 * i + 1.0) / _N_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
     radius = np.sqrt(1.0 - z**2)

@@ -1,4 +1,4 @@
-"""A rollout that goes on in the background at the speed of real time, for pages and sliders."""
+"""`LiveSimulation`: a rollout that runs in the background in real time, for pages and sliders."""
 
 from __future__ import annotations
 
@@ -20,30 +20,47 @@ from floatbase.simulation.rollout import Actuators, Controller, check_actuators,
 
 _SLICE_DURATION = (
     1.0 / 30.0
-)  # s of simulated time in a slice, about: as often as a picture is drawn
+)  # s of simulated time in a slice, roughly: as often as a picture is drawn
 _JOIN_TIMEOUT = 5.0  # s that `close` waits for a slice: far longer than one takes
-_MAX_SETTLING_TIME = 1.5  # s after a fall in which a robot comes to lie, at most
+_MAX_SETTLING_TIME = 1.5  # s, at most, after a fall until the robot lies still
 Status = Literal["running", "paused", "idle", "fell", "diverged", "controller failed", "stopped"]
-ACTIVE_STATUSES = ("running", "paused", "idle")  # of a run that nothing has ended
+ACTIVE_STATUSES = ("running", "paused", "idle")  # of a run that has not ended
 
 
 class LiveSimulation:
-    """Runs `rollout` in slices of a 30th of a second, in a thread of its own, and hands each slice
-    to `show`.
+    """A rollout that runs in the background, in real time, in slices of a 30th of a second.
 
-    sim, controller, control_period (s), actuators: as for `rollout`.
-    show: called with each slice's record, in that thread.
-    after_reset: called after each reset, in that thread, to reset what has a memory of its own,
-        such as the actuators.
-    idle_timeout: s without any call here after which the run pauses by itself, so that a forgotten
-        page costs nothing.
-    push_memory: s for which the `pushes` of a slice still have those that are over.
+    The run has its own thread, which passes the record of each slice to `show`. Calls take effect
+    between slices, and none but `close` waits.
 
-    `status` is "running", "paused", "idle" after `idle_timeout`, or why the run stopped: "fell",
-    "diverged", "controller failed", or "stopped" by an exception, which `error` holds. `reason` is
-    the message of the error. A fall or a failure is reported at once; slices go on with the
-    controller off, as `settling_time` of `rollout` says, until the robot lies still, or for 1.5 s
-    at most. Calls act between slices, and none but `close` waits.
+    A fall or a failure is reported immediately. The simulation then continues with the controller
+    off, as with `settling_time` of `rollout`, until the robot lies still, but for at most 1.5 s.
+
+    Parameters
+    ----------
+    sim : Simulation
+        The simulation, as for `rollout`.
+    controller : Controller
+        The controller, as for `rollout`.
+    show : callable
+        Called as show(record) in the run's thread, with the `Rollout` of each slice.
+    control_period : float, optional
+        Time between two calls of the controller [s].
+    actuators : Actuators, optional
+        Model that converts the controller's torques, as for `rollout`.
+    after_reset : callable, optional
+        Called as after_reset() in the run's thread after each reset, to reset other objects with a
+        state, such as the actuators.
+    idle_timeout : float, optional
+        Time without any call of a method after which the run pauses by itself [s], so that a
+        forgotten page uses no computing time.
+    push_memory : float, optional
+        Time for which the `pushes` of a slice still include pushes that are over [s].
+
+    Attributes
+    ----------
+    error : Exception or None
+        The exception that stopped the run.
     """
 
     def __init__(
@@ -76,56 +93,67 @@ class LiveSimulation:
         self._idle_timeout = as_positive("idle_timeout", idle_timeout, "s")
         self._push_memory = as_positive("push_memory", push_memory, "s", allow_zero=True)
         self._time_scale = 1.0
-        self._lock = threading.Lock()  # over all that follows
+        self._lock = threading.Lock()  # protects all attributes below
         self._pushes: tuple[Push, ...] = ()  # of the last slice
         self._requested_pushes: list[Push] = []  # for the next one
         self._reset_requested = False
         self._calls: list[Callable[[], None]] = []
         self._status: Status = "paused"
         self._reason = ""
-        # the last slice where the controller is off; only the thread has to do with it
+        # the last slice, if the controller is off; used only by the thread
         self._last_record: Rollout | None = None
         self._listener: Callable[[Status], None] | None = None
         self._last_call = time.monotonic()
-        self._stop = threading.Event()  # ends the present thread; set while paused
+        self._stop = threading.Event()  # ends the present thread; is set while paused
         self._stop.set()
         self._thread: threading.Thread | None = None
 
     @property
     def status(self) -> Status:
-        """ "running", "paused", "idle", or why it stopped: see the class."""
+        """Status of the run.
+
+        It is "running", "paused", "idle" (paused after `idle_timeout`), or the reason why the run
+        ended: "fell", "diverged", "controller failed", or "stopped" by the exception in `error`.
+        """
         return self._status
 
     @property
     def reason(self) -> str:
-        """The message of the error that ended the run; "" if none did."""
+        """Message of the error that ended the run, or ""."""
         return self._reason
 
     @property
     def controller(self) -> Controller:
-        """What gives the torques now."""
+        """The present controller."""
         return self._controller
 
     @property
     def is_simulating(self) -> bool:
-        """Whether the thread moves the robot: while the status is "running", and a little longer
-        after a fall or failure.
-        """
+        """Whether the thread is simulating: while running, and briefly after a fall or failure."""
         return not self._stop.is_set()
 
     def on_status(self, listener: Callable[[Status], None] | None) -> None:
-        """Call `listener(status)` whenever the status changes, in the thread that changed it."""
+        """Register a function that is called when the status changes.
+
+        Parameters
+        ----------
+        listener : callable or None
+            Called as listener(status) in the thread that changed the status. It replaces the
+            previous listener; None removes it.
+        """
         self._listener = (
             None if listener is None else as_callable("listener", listener, "listener(status)")
         )
 
     def start(self) -> None:
-        """Run, or go on after a pause. A fallen robot is put back on its feet."""
+        """Run, or continue after a pause; a fallen robot is reset to standing first."""
         self._request_run()
 
     def pause(self) -> None:
-        """Stop after the present slice; `start` goes on from there. What has stopped already stays
-        as it is, or in mid-fall.
+        """Pause after the present slice; `start` continues from there.
+
+        The status of a run that has ended does not change, but a robot that is still falling stops
+        in mid-fall.
         """
         with self._lock:
             self._stop.set()
@@ -133,12 +161,22 @@ class LiveSimulation:
         self._notify(changed)
 
     def reset(self) -> None:
-        """Put the robot back on its feet and run. Pushes requested before are forgotten."""
+        """Reset the robot to standing and run; pushes requested before are discarded."""
         self._request_run(reset=True)
 
     def push(self, force: npt.ArrayLike, duration: float = 0.1, frame: str = "base") -> None:
-        """Push now, and run: as `Push`. A fallen robot is put back on its feet first, and the push
-        begins with it, at 0 s.
+        """Push the robot now, and run.
+
+        A fallen robot is reset to standing first; the push then begins at time 0.
+
+        Parameters
+        ----------
+        force : array_like, shape (3,)
+            Force in the world frame, applied at the origin of `frame` [N].
+        duration : float, optional
+            Duration of the push [s].
+        frame : str, optional
+            Name of a frame of the robot; "base" is the base link.
         """
         self._request_run(push=Push(force, 0.0, duration, frame))  # type: ignore[arg-type]
 
@@ -150,11 +188,19 @@ class LiveSimulation:
         actuators: Actuators | EllipsisType | None = ...,
         control_period: float | None = None,
     ) -> None:
-        """Use another controller from the next slice on, and what else is given.
+        """Replace the controller, and optionally other parts of the run, from the next slice on.
 
-        controller, sim, actuators: as for `rollout`; without actuators the present ones stay, and
-            None removes them.
-        control_period: s.
+        Parameters
+        ----------
+        controller : Controller
+            The controller, as for `rollout`.
+        sim : Simulation, optional
+            The simulation; by default the present one.
+        actuators : Actuators or None, optional
+            Model that converts the controller's torques; by default the present one. None removes
+            it.
+        control_period : float, optional
+            Time between two calls of the controller [s]; by default the present one.
         """
         as_callable("the controller", controller, "controller(q, v, t)")
         if actuators is not ...:
@@ -167,16 +213,21 @@ class LiveSimulation:
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
             if sim is not None and sim is not self.sim and self._status != "running":
-                self._stop.set()  # it is not the other simulation's robot that falls
+                self._stop.set()  # a fall in the former simulation is not one in the new one
             self.sim = self.sim if sim is None else as_instance("sim", sim, Simulation)
             self._actuators = self._actuators if actuators is ... else actuators
             self._period, self._slice_duration = period, _slice_duration_for(period)
 
     def call_soon(self, call: Callable[[], None]) -> None:
-        """Call `call()` in the run's thread before its next slice, where nothing else touches the
-        simulation.
+        """Call a function in the run's thread before the next slice.
 
-        An exception of it ends the run, as one of the controller does.
+        Nothing else uses the simulation at that time. An exception ends the run, like one of the
+        controller.
+
+        Parameters
+        ----------
+        call : callable
+            Called as call().
         """
         as_callable("call", call, "call()")
         with self._lock:
@@ -184,7 +235,13 @@ class LiveSimulation:
             self._calls.append(call)
 
     def set_time_scale(self, scale: float) -> None:
-        """Simulated time per real time, 1 by default."""
+        """Set the ratio of simulated time to real time, which is 1 by default.
+
+        Parameters
+        ----------
+        scale : float
+            Simulated time per real time, positive [-].
+        """
         scale = as_positive("scale", scale)
         with self._lock:
             self._last_call, self._time_scale = time.monotonic(), scale
@@ -197,8 +254,9 @@ class LiveSimulation:
             thread.join(_JOIN_TIMEOUT)
 
     def _request_run(self, reset: bool = False, push: Push | None = None) -> None:
-        """Run, after a reset where it is requested or needed: all under one lock, so that no slice
-        comes between.
+        """Run, after a reset if requested or needed.
+
+        Everything happens under one lock, so that no slice runs in between.
         """
         with self._lock:
             self._last_call = time.monotonic()
@@ -217,30 +275,30 @@ class LiveSimulation:
         self._notify(changed)
 
     def _set_status(self, status: Status, reason: str = "") -> bool:
-        """Take a status; whether it differs from the one before."""
+        """Set the status, and return whether it changed."""
         previous, self._status, self._reason = self._status, status, reason
         return previous != status
 
     def _notify(self, changed: bool) -> None:
-        """Never under the lock: the listener may call back."""
+        """Call the listener; never under the lock, because the listener may call methods."""
         if changed and self._listener is not None:
             self._listener(self._status)
 
     def _loop(self, stop: threading.Event, previous: threading.Thread | None) -> None:
-        """Slice after slice until `stop`, once the previous thread has ended."""
+        """Run slices until `stop` is set, after the previous thread has ended."""
         if previous is not None:
             previous.join()
         due = time.monotonic()
         while not stop.is_set():
             self._run_slice(stop)
-            # a machine that falls behind does not catch up by more than a slice
+            # a computer that falls behind catches up by at most one slice
             due = max(
                 due + self._slice_duration / self._time_scale, time.monotonic() - _SLICE_DURATION
             )
             stop.wait(max(0.0, due - time.monotonic()))
 
     def _run_slice(self, stop: threading.Event) -> None:
-        """Run what was called for, simulate a slice and show it, and go on or stop."""
+        """Make the requested calls, simulate and show a slice, then continue or stop."""
         try:
             self._run_calls()
             record = self._simulate_slice(self._start_of_slice())
@@ -250,7 +308,7 @@ class LiveSimulation:
             outcome: Outcome | Literal["stopped"] = record.outcome
             reason = "" if record.error is None else str(record.error)
         except Exception as error:
-            # whatever a learner's controller raises must show, or the picture just stands still
+            # show every exception of a learner's controller, or the picture just freezes
             outcome, reason = "stopped", f"{type(error).__name__}: {error}"
             self.error, self._last_record = error, None
         self._end_slice(stop, outcome, reason)
@@ -263,7 +321,7 @@ class LiveSimulation:
             call()
 
     def _start_of_slice(self) -> list[Push]:
-        """Reset the robot if that is requested; returns the pushes that begin now."""
+        """Reset the robot if requested, and return the pushes that begin now."""
         with self._lock:
             requested, reset = self._requested_pushes, self._reset_requested
             self._requested_pushes, self._reset_requested = [], False
@@ -275,7 +333,7 @@ class LiveSimulation:
         return requested
 
     def _simulate_slice(self, requested: list[Push]) -> Rollout:
-        """Run one slice of physics, with the controller or after a fall without."""
+        """Simulate one slice, with the controller or, after a fall, without it."""
         with self._lock:
             sim, controller, actuators = self.sim, self._controller, self._actuators
             period, duration = self._period, self._slice_duration
@@ -295,9 +353,9 @@ class LiveSimulation:
     def _end_slice(
         self, stop: threading.Event, outcome: Outcome | Literal["stopped"], reason: str
     ) -> None:
-        """Take the status that follows from a slice, and stop where it ends the run."""
+        """Set the status that follows from a slice, and stop if the run has ended."""
         with self._lock:
-            if self._reset_requested:  # the outcome is about a robot that is put back next
+            if self._reset_requested:  # the outcome no longer matters: the robot is reset next
                 return
             status: Status
             if outcome != "completed":
@@ -316,7 +374,7 @@ class LiveSimulation:
 
     @property
     def _has_settled(self) -> bool:
-        """Whether a robot whose controller is off lies still, or has had its time."""
+        """Whether a robot with its controller off lies still, or its settling time is over."""
         since = (
             self.sim.time - (self._last_record.controller_off_time or 0.0)
             if self._last_record is not None
@@ -326,5 +384,5 @@ class LiveSimulation:
 
 
 def _slice_duration_for(period: float) -> float:
-    """s of a slice: a whole number of ticks, each of `period` s."""
+    """Return the duration of a slice [s], a whole number of control periods [s]."""
     return max(1, round(_SLICE_DURATION / period)) * period

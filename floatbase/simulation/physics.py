@@ -1,4 +1,4 @@
-"""A robot in MuJoCo: torques and pushes in, states and contact forces out."""
+"""`Simulation`: a robot in MuJoCo, driven by torques and pushes."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     cross,
+    refuse_new_attributes,
 )
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
@@ -27,34 +28,61 @@ from floatbase.simulation.build import Ground, body_name, build_model
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.push import Push, as_pushes
 
-# part of the base's height at the last reset: a crouch keeps more, lying down does not
+# fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
 _FALLEN_HEIGHT_FRACTION = 0.4
 _FALLEN_COSINE = float(
     np.cos(np.deg2rad(60.0))
-)  # of the base's tilt since the last reset: no leg brings it back from there
-# m: a base that begins lower than this lies on the ground, and its height measures no fall
+)  # of the base's tilt since the last reset: no leg can recover from more
+# m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
-_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm meanwhile, and no contact of 4 ms is followed
+_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
-)  # this warning of MuJoCo and the later ones: its numbers mean nothing any more
+)  # after this warning of MuJoCo or a later one, its numbers are meaningless
 
 
 class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
-    MuJoCo reads the robot's own URDF. A floating base gets a free joint, each foot a ball (a flat
-    foot one at each corner), each joint a torque motor with the robot's limit and rotor inertia,
-    the ground planes with friction. Joint friction and damping are off, as in (1)-(7); the URDF's
-    joint limits are on. Only feet and ground touch, after a fall `link_collisions` too.
+    MuJoCo reads the robot's own URDF. A floating base gets a free joint, each point foot one ball,
+    and each flat foot a ball at each corner. Each joint gets a torque motor with the robot's torque
+    limit and rotor inertia. Joint friction and joint damping are off, as in eqs. (1)-(7); the joint
+    limits of the URDF are on. Only the feet collide with the ground; after a fall the links can
+    collide with it, too (`link_collisions`).
 
-    robot as from `fb.load`; ground: a `Ground`, or the coefficient of friction of a level one;
-    timestep in s. `model` and `data` are MuJoCo's own, `feet` the robot's feet as `Contacts`.
-    Raises `SimulationError` when MuJoCo cannot build the robot. What it was made with cannot
-    be set; what `model` and `data` hold may change. A copy has `model` and `data` of its own.
+    Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
+    copy has a `model` and `data` of its own.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, as from `fb.load`.
+    ground : Ground or float, optional
+        The ground, or the coefficient of friction of level ground [-].
+    timestep : float, optional
+        Length of a step [s].
+
+    Raises
+    ------
+    SimulationError
+        If MuJoCo cannot build the robot.
+
+    Notes
+    -----
+    The physics engine is MuJoCo ([Todorov2012]_).
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> robot = fb.load("go2")
+    >>> sim = fb.Simulation(robot, ground=0.8)
+    >>> sim.reset(robot.standing())
+    >>> sim
+    Simulation(go2, t=0.000 s, timestep=0.001 s)
     """
 
     _example = "fb.Simulation(robot)"
+    __setattr__ = refuse_new_attributes
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self._robot = as_instance("robot", robot, Robot)
@@ -67,7 +95,7 @@ class Simulation:
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
-        self.foot_contacts = FootContacts(self.model, self.ground, self.point_names)
+        self._foot_contacts = FootContacts(self.model, self.ground, self.point_names)
         self._planes = list(
             zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
         )
@@ -83,12 +111,10 @@ class Simulation:
         self.reset()
 
     def __copy__(self) -> Self:
-        return copy.deepcopy(self)  # two robots with the same data would move each other
+        return copy.deepcopy(self)  # two simulations that share data would move each other's robot
 
     def _refresh_views(self) -> None:
-        """Views into MuJoCo's memory of what every tick looks at: to ask MuJoCo for them takes
-        longer than to look.
-        """
+        """Keep views into MuJoCo's memory for values of each step: asking MuJoCo takes longer."""
         data = self.data
         self._qpos, self._qvel, self._warnings = (
             data.qpos,
@@ -101,7 +127,7 @@ class Simulation:
         )  # origin and z axis
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """A copy has MuJoCo's data of its own."""
+        """Restore a copy, which has MuJoCo data of its own."""
         vars(self).update(state)
         self._refresh_views()
 
@@ -112,7 +138,7 @@ class Simulation:
 
     @property
     def ground(self) -> Ground:
-        """The ground that it stands on."""
+        """The ground."""
         return self._ground
 
     @property
@@ -122,12 +148,12 @@ class Simulation:
 
     @property
     def feet(self) -> Contacts:
-        """The robot's feet."""
+        """Contacts of all the robot's feet."""
         return self._feet
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's model; while `link_collisions` are on, another one."""
+        """MuJoCo's model; switching `link_collisions` changes it."""
         return self._model
 
     @property
@@ -137,21 +163,24 @@ class Simulation:
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """Names of the points of the robot that can touch the ground: feet, or corners of flat
-        feet.
-        """
+        """Names of the robot's contact points: point feet, and corners of flat feet."""
         return self.feet.point_names
 
     @property
+    def foot_contacts(self) -> FootContacts:
+        """Reader of the feet's contacts."""
+        return self._foot_contacts
+
+    @property
     def time(self) -> float:
-        """s since the last reset."""
+        """Time since the last reset [s]."""
         return float(self.data.time)
 
     @property
     def q(self) -> Array:
         """Configuration in the package's convention, shape (nq,).
 
-        `sim.reset(sim.state.replace(q=…))` puts the robot into another one, at time 0.
+        Use `sim.reset(sim.state.replace(q=...))` to change it; this also sets the time to 0.
         """
         return self._conversion.q(self._qpos)
 
@@ -162,30 +191,24 @@ class Simulation:
 
     @property
     def joint_state(self) -> tuple[Array, Array]:
-        """Angles, rad (or m), and velocities of the actuated joints, shape (d,) each, as
-        `Actuators` take them.
-        """
+        """Positions [rad or m] and velocities of the actuated joints, shape (d,) each."""
         return self._conversion.joint_state(self._qpos, self._qvel)
 
     @property
     def state(self) -> State:
-        """The robot's state now."""
+        """Present state of the robot."""
         return State(self.robot, self.q, self.v)
 
     @property
     def diverged(self) -> bool:
-        """Whether positions, velocities, accelerations or torques became infinite, NaN or larger
-        than MuJoCo takes.
-        """
-        # MuJoCo itself finds out only in the next step; a velocity that is not finite has made a
-        # position that is none
+        """Whether a position, velocity, acceleration or torque became infinite, NaN or too big."""
+        # MuJoCo itself notices only in the next step; by then, a velocity that is not finite has
+        # already made a position not finite
         return not isfinite(self._qpos.dot(self._qpos)) or any(self._warnings.tolist())
 
     @property
     def fallen(self) -> bool:
-        """Whether a floating base has lost 60 % of its height, or tilts by 60°, since the last
-        reset.
-        """
+        """Whether a floating base lost 60 % of its height or tilted by 60° since the last reset."""
         if not self.robot.is_floating:
             return False
         sunk = (
@@ -196,11 +219,12 @@ class Simulation:
 
     @property
     def link_collisions(self) -> bool:
-        """Whether the ground touches links, too, not only feet: the hulls of the URDF's collision
-        shapes. A reset ends it.
+        """Whether the links can collide with the ground, too, through hulls of their shapes.
 
-        A fallen robot lies on them, as `rollout(…, settling_time=1.0)` shows. Before a fall only
-        feet touch, as in (7), and links in the ground come out slowly. Links go through each other.
+        They are off until a fall, so that only feet touch the ground, as in eq. (7), and a reset
+        switches them off again. `rollout(..., settling_time=1.0)` switches them on after a fall, so
+        that the robot comes to lie on its links. Links that are below the ground at that time come
+        out slowly. Links never collide with each other.
         """
         return self._link_collisions
 
@@ -213,21 +237,30 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
 
     def _set_hulls_touch(self, enabled: bool) -> None:
-        """Let the ground touch the links' hulls, or not."""
+        """Switch collisions between the ground and the links' hulls on or off."""
         self._link_collisions = enabled
         self.model.geom_conaffinity[self._hull_geoms] = enabled
-        self.model.body_conaffinity[self._hull_bodies] = enabled  # bodies that MuJoCo looks at
+        self.model.body_conaffinity[self._hull_bodies] = enabled  # MuJoCo checks bodies first
 
     def reset(self, state: State | None = None) -> None:
-        """Put the robot into a state, standing on the ground by default, at time 0.
+        """Put the robot into a state, at time 0.
 
-        By default it is turned with a slope; on a ground of several planes its base is as the
-        posture has it.
+        Parameters
+        ----------
+        state : State, optional
+            The state. By default the robot stands on the ground. On a single plane it is tilted
+            with the slope; on several planes, the base is oriented as in the standing posture.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
         if state.robot != self.robot:
             raise InputError(
-                f"this simulation holds {self.robot.name}; the state belongs to another robot."
+                f"The state belongs to another robot than this simulation, which has "
+                f"{self.robot.name}. Give a state of the simulation's robot."
             )
         self.link_collisions = False
         mujoco.mj_resetData(self.model, self.data)
@@ -237,18 +270,32 @@ class Simulation:
         self._start_vertical = self._base_vertical.tolist()
         if (
             self._nominal_height <= _MIN_INITIAL_HEIGHT
-        ):  # it lies: a fall is measured by the way to the centre of mass
+        ):  # it lies on the ground: measure a fall by the distance to the centre of mass
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
-        """Advance by one timestep under torques, shape (d,), N·m, clipped to the motors' limits,
-        and present pushes.
+        """Advance the simulation by one timestep.
+
+        Parameters
+        ----------
+        tau : array_like, shape (d,)
+            Joint torques, clipped to the motors' limits [N·m].
+        pushes : tuple of Push, optional
+            External forces; each acts during its own time.
         """
         self.advance(as_array("torques", tau, (self.robot.d,), "N·m"), as_pushes(pushes))
 
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
-        """`step` without its check, for loops that have checked the torques already: float64,
-        finite, shape (d,).
+        """Advance by one timestep without the checks of `step`.
+
+        It is meant for loops that have checked the torques.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (d,)
+            Joint torques, float64 and finite, clipped to the motors' limits [N·m].
+        pushes : tuple of Push, optional
+            External forces; each acts during its own time.
         """
         self.data.ctrl[self._actuator_ids] = tau
         self.data.xfrc_applied[:] = 0.0
@@ -259,40 +306,98 @@ class Simulation:
         mujoco.mj_step(self.model, self.data)
 
     def torques(self) -> Array:
-        """Torques of the motors during the last step, within their limits, shape (d,), N·m."""
+        """Return the motor torques of the last step, within the motors' limits.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Joint torques [N·m].
+        """
         return self.torques_of(self.data.actuator_force)
 
     def torques_of(self, actuator_force: Array) -> Array:
-        """`torques` for MuJoCo's forces of all its actuators, shape (…, d), unchecked."""
+        """Convert MuJoCo's actuator forces to joint torques, without checks.
+
+        Parameters
+        ----------
+        actuator_force : ndarray, shape (..., d)
+            Forces of all actuators in MuJoCo's order [N·m].
+
+        Returns
+        -------
+        ndarray, shape (..., d)
+            Joint torques in the robot's order [N·m].
+        """
         return actuator_force[..., self._actuator_ids]
 
     def contact_forces(self) -> Array:
-        """Forces of the ground on the robot during the last step, shape (n_points, 3), N, world,
-        ordered as `point_names`.
+        """Return the contact forces on the robot during the last step.
+
+        Returns
+        -------
+        ndarray, shape (points, 3)
+            Force on each point of `point_names`, in the world frame [N].
         """
         geoms, contact_frame_forces = self.read_contacts()
         forces: Array = self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
         return forces
 
     def read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """The feet's contacts now, as `FootContacts.read` gives them."""
+        """Return the present contacts of the feet in MuJoCo's terms, for `contact_forces_of`.
+
+        Returns
+        -------
+        geoms : ndarray, shape (n, 2)
+            MuJoCo's ids of plane and ball of each contact.
+        contact_frame_forces : ndarray, shape (3 n,)
+            Forces in the contact frames, normal component first [N].
+        """
         return self.foot_contacts.read(self.model, self.data, self._link_collisions)
 
     def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """`contact_forces` at N instants, shape (N, n_points, 3), N, for what `read_contacts` gave
-        then, unchecked.
+        """Convert contacts that `read_contacts` returned at N instants to forces, without checks.
+
+        Parameters
+        ----------
+        geoms : ndarray, shape (N, n, 2)
+            MuJoCo's ids of plane and ball; geom 0 stands for no contact.
+        contact_frame_forces : ndarray, shape (N, 3 n)
+            Forces in the contact frames [N].
+
+        Returns
+        -------
+        ndarray, shape (N, points, 3)
+            Force on each point of `point_names`, in the world frame [N].
         """
         return self.foot_contacts.forces(geoms, contact_frame_forces)
 
     def contact_positions(self) -> Array:
-        """World positions of the points, shape (n_points, 3), m: the point of each ball that is
-        nearest to the ground.
+        """Return the positions of the contact points: the point of each ball nearest to the ground.
+
+        Returns
+        -------
+        ndarray, shape (points, 3)
+            Position of each point of `point_names`, in the world frame [m].
         """
         return self.foot_contacts.positions(self.data.geom_xpos[self.foot_contacts.geoms])
 
     def pushed_body(self, push: Push) -> int:
-        """MuJoCo's number of the body that a push acts on; `InputError` for a link that is bolted
-        to the ground.
+        """Return MuJoCo's id of the body that a push acts on.
+
+        Parameters
+        ----------
+        push : Push
+            The push.
+
+        Returns
+        -------
+        int
+            MuJoCo's id of the body.
+
+        Raises
+        ------
+        InputError
+            If the pushed link is fixed to the ground.
         """
         frame = self.robot.model.frames[self.robot.frame_id(as_instance("push", push, Push).frame)]
         joint = self.robot.model.names[frame.parentJoint]
@@ -305,14 +410,15 @@ class Simulation:
             for f in self.robot.model.frames
             if f.parentJoint > 0 and f.type == pin.FrameType.BODY
         )
-        reason = f"{self.robot.name} is bolted to the ground there"
         raise InputError(
-            f"a push at {push.frame!r} moves nothing: {reason}. Push a link that moves: {moving}."
+            f"A push at {push.frame!r} has no effect, because {self.robot.name} is fixed to the "
+            f"ground there. Push a link that moves: {moving}."
         )
 
     def _apply_push(self, push: Push, force: Array) -> None:
-        """Add a force at the origin of a push's frame: MuJoCo takes it at the body's centre of
-        mass.
+        """Apply a force at the origin of a push's frame.
+
+        MuJoCo applies forces at the body's centre of mass, so a moment is added.
         """
         frame, body = (
             self.robot.model.frames[self.robot.frame_id(push.frame)],
@@ -325,7 +431,7 @@ class Simulation:
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
     def _standing_state(self) -> State:
-        """The robot standing on the ground, turned with a slope so that every foot touches."""
+        """Return the robot standing on the ground, tilted with a slope so that all feet touch."""
         if len(self._planes) > 1:
             return self.robot.standing(normal=self.ground.normals, offset=self.ground.offsets)
         state = self.robot.standing()
@@ -338,7 +444,7 @@ class Simulation:
         return state.replace(q=np.concatenate([position, orientation.coeffs(), state.q[7:]]))
 
     def _base_height(self) -> float:
-        """Height of the base's origin over the nearest plane of the ground, m."""
+        """Return the height of the base's origin above the nearest plane of the ground [m]."""
         position = self._base_position.tolist()
         height: float = min([_dot(normal, position) - offset for normal, offset in self._planes])
         return height
@@ -348,5 +454,5 @@ class Simulation:
 
 
 def _dot(a: list[float], b: list[float]) -> float:
-    """aᵀ b of three numbers each; numpy's own takes three times as long."""
+    """Return aᵀ b of two lists of three numbers; NumPy takes three times as long."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

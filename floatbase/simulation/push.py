@@ -1,4 +1,4 @@
-"""`Push`: a force on the robot for a while."""
+"""`Push`: a force on the robot for a limited time."""
 
 from __future__ import annotations
 
@@ -24,14 +24,28 @@ _CLOCK_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Push(Value):
-    """A force on the robot for a while.
+    """A constant force on the robot for a limited time.
 
-    A timestep that the push covers in part gets that part of the force: its impulse is force times
-    duration.
+    If the push covers only a fraction of a timestep, that fraction of the force acts during the
+    step. The impulse is therefore always force times duration.
 
-    force: (3,) N, world, at the origin of the frame.
-    start, duration: s, on the simulation's clock.
-    frame: name of a frame of the robot; "base" is the base link.
+    Parameters
+    ----------
+    force : array_like, shape (3,)
+        Force in the world frame, applied at the origin of `frame` [N].
+    start : float, optional
+        Time at which the push begins, on the simulation's clock [s].
+    duration : float, optional
+        Duration of the push [s].
+    frame : str, optional
+        Name of a frame of the robot; "base" is the base link.
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> push = fb.Push([0.0, 30.0, 0.0], start=0.5)
+    >>> push.acts_at(0.55), push.acts_at(0.65)
+    (True, False)
     """
 
     force: Array = field(metadata=checked(as_array, (3,), "N"))
@@ -40,21 +54,45 @@ class Push(Value):
     frame: str = field(default="base", metadata=checked(as_string))
 
     def acts_at(self, t: float) -> bool:
-        """Whether the push acts at t, s."""
+        """Return whether the push acts at a given time.
+
+        Parameters
+        ----------
+        t : float
+            Time on the simulation's clock [s].
+
+        Returns
+        -------
+        bool
+            True from `start` on, and before `start + duration`.
+        """
         t = as_number("t", t, "s")
         return self.start - _CLOCK_TOLERANCE <= t < self.start + self.duration - _CLOCK_TOLERANCE
 
     def active_fraction(self, t: float, timestep: float) -> float:
-        """The part of the step from t to t + timestep, s, in which the push acts: 0 to 1."""
+        """Return the fraction of a timestep during which the push acts.
+
+        Parameters
+        ----------
+        t : float
+            Time at which the step begins [s].
+        timestep : float
+            Length of the step [s].
+
+        Returns
+        -------
+        float
+            Fraction from 0 to 1 [-].
+        """
         active_time = min(self.start + self.duration, t + timestep) - max(self.start, t)
         return max(0.0, active_time) / timestep
 
 
 def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
-    """A list of pushes as a tuple, checked."""
+    """Return a list of pushes as a tuple, checked."""
     if not isinstance(pushes, Sequence):
         raise InputError(
-            f"pushes must be a list, as in pushes=[fb.Push(…)], not {short_repr(pushes)}."
+            f"pushes must be a list, as in pushes=[fb.Push(…)]; it is {short_repr(pushes)}."
         )
     return tuple(
         as_instance("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])")
@@ -63,7 +101,7 @@ def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
 
 
 def active_pushes(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ...]:
-    """Those that act at any time from begin to end, s."""
+    """Return the pushes that act at any time from `begin` to `end` [s]."""
     return tuple(
         p
         for p in pushes

@@ -1,6 +1,4 @@
-"""`push_recovery`: the largest push that a controller survives in each direction, and what theory
-says beside it.
-"""
+"""`push_recovery`: the largest push that a controller survives in each direction."""
 
 from __future__ import annotations
 
@@ -33,29 +31,38 @@ from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.row_store import require
 from floatbase.simulation.sweep import sweep
 
-_MIN_DIRECTIONS = 3  # directions: fewer are no closed line
-_FACETS = 16  # of the polyhedra in the friction cones: they leave out 2 % of them
-# of the robot's weight: a push that is survived beyond it is not carried by the ground
+_MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
+_FACETS = 16  # of the polyhedra inside the friction cones: they leave out 2 % of the cones
+# times the robot's weight: if a larger push is survived, it is not the ground that resists it
 _MAX_FORCE_IN_WEIGHTS = 100.0
-# least cosine between direction and an edge's normal: less is an edge along the direction, never
-# met
+# least cosine between a direction and an edge's normal: below it, the edge is parallel to the
+# direction, which never meets it
 _MIN_COSINE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class PushRecovery(Value):
-    """The largest push that was survived in each of n directions, and theory's curves beside it.
-    All pushes are in N.
-
-    directions: (n,) rad, of the pushes, in the world's horizontal plane, from x towards y.
-    pushes: (n,) N, survived; a push that is `resolution` larger was not.
-    resolution: N, spacing of the pushes that are tried.
-    duration: s, of each push.
-    frame: the frame that was pushed.
-    state, contacts: the robot and its stance, as the simulation began, before anything pushed.
+    """Largest survived push in each of n horizontal directions, with theoretical bounds.
 
     `floatbase.viewer.plots.push_recovery_plots` plots it, and draws it on the ground below the
     robot.
+
+    Parameters
+    ----------
+    directions : array_like, shape (n,)
+        Directions of the pushes in the world's horizontal plane, from x towards y [rad].
+    pushes : array_like, shape (n,)
+        Largest survived push in each direction [N]. A push larger by `resolution` was not survived.
+    resolution : float
+        Spacing of the pushes that were tried [N].
+    duration : float
+        Duration of each push [s].
+    frame : str
+        Name of the frame that was pushed.
+    state : State
+        State at the beginning of the simulation, before the push.
+    contacts : Contacts
+        Contacts at the beginning of the simulation.
     """
 
     directions: Array
@@ -73,17 +80,21 @@ class PushRecovery(Value):
 
     @cached_property
     def unit_vectors(self) -> Array:
-        """The directions as horizontal vectors, shape (n, 3), world."""
+        """Directions as horizontal unit vectors, shape (n, 3), world frame."""
         return _unit_vectors(self.directions)
 
     @cached_property
     def static_bound(self) -> Array:
-        """(20)(21)(28) The largest push that the stance bears for ever without moving, shape (n,),
-        N.
+        """Largest constant push in static equilibrium, shape (n,) [N].
 
-        The contact forces must carry the weight and hold against the push, all inside their
-        friction cones: `WrenchSet.max_scaling`. 0 where the stance cannot carry the weight alone,
-        even if a push would help it to.
+        The contact forces must support the weight and balance the push, all inside their friction
+        cones, as in `WrenchSet.max_scaling`. The bound is 0 if the stance cannot support the weight
+        alone, even if a push would help.
+
+        Notes
+        -----
+        [FBR]_, eqs. (20), (21), (28). Static equilibrium with friction is studied in
+        [BretlLall2008]_.
         """
         wrenches = wrench_set(self.state, self.contacts, facets=_FACETS)
         lever = self.state.frame_pose(self.frame).translation - wrenches.reference_point
@@ -99,15 +110,19 @@ class PushRecovery(Value):
 
     @cached_property
     def capture_point_bound(self) -> Array:
-        """The push of `duration` T that ends with the capture point on the border of the support
-        region, shape (n,), N.
+        """Push that moves the capture point to the edge of the support region, shape (n,) [N].
 
-        The linear inverted pendulum of height h, ω = √(g/h), pushed at the centre of mass, at rest
-        at first. As long as its capture point ξ = x + ẋ/ω is in the support region, a robot can
-        stop without a step. During the push F the best that it can do is to stand on the border, at
-        distance s: ξ̇ = ω (ξ - s) + F / (m ω), so F = m ω² s / (1 - exp(-ω T)). A short push is an
-        impulse F T = m ω s; a long one is steady, F h = m g s. What a robot does with its angular
-        momentum, and with its height, is left out. The ground is level.
+        The model is a linear inverted pendulum of height h with ω = √(g/h), which is pushed at the
+        centre of mass for `duration` T and is initially at rest. While its capture point ξ = x +
+        ẋ/ω is in the support region, a robot can stop without a step. During the push F, the best
+        response is a centre of pressure at the edge, at distance s. Then ξ̇ = ω (ξ - s) + F / (m
+        ω), and F = m ω² s / (1 - exp(-ω T)). A short push is an impulse F T = m ω s; a long push is
+        constant, F h = m g s. The effects of angular momentum and of changes in height are
+        neglected. The ground is level.
+
+        Notes
+        -----
+        Capture points are from [Pratt2006]_.
         """
         robot, com = self.state.robot, self.state.com
         height = com[2] - self.contacts.positions(self.state)[:, 2].mean()
@@ -139,30 +154,54 @@ def push_recovery(
     cluster: Any = None,
     progress: bool = True,
 ) -> PushRecovery:
-    """The largest horizontal push that a controller survives on the physics, in each of several
-    directions, by bisection.
+    """Find the largest horizontal push that a controller survives, in each of several directions.
 
-    A push is survived when `rollout` comes to its end: the robot has not fallen, nothing diverged,
-    no controller failed. Each push has a simulation and a controller of its own, so that none
-    remembers the one before. Bisection takes for granted that whoever survives a push survives
-    every smaller one in that direction; it does not look for gaps.
+    The search is a bisection. A push is survived if `rollout` completes: the robot does not fall,
+    the simulation does not diverge, and the controller does not fail. Each push gets a new
+    simulation and controller, so pushes do not influence each other. The bisection assumes that a
+    controller that survives a push also survives every smaller push in that direction; it does not
+    search for gaps.
 
-    controller: one that has a `robot`, as `fb.WholeBodyController`, and stands on level ground with
-        friction 1; or a function without parameters that makes one, or makes a pair (simulation,
-        controller): each push starts in that simulation.
-    directions: how many, evenly spaced from the world's x axis.
-    duration: s, of the push.
-    frame: name of the frame at whose origin it acts.
-    start: s, before the push: the robot settles.
-    observation_time: s, after the push: a slow fall must happen within it.
-    initial_force: N, the first push tried, by default the robot's weight; it is doubled while it is
+    Parameters
+    ----------
+    controller : Controller or callable
+        A controller with an attribute `robot`, such as `fb.WholeBodyController`, which stands on
+        level ground with friction coefficient 1. Alternatively, a function without parameters that
+        returns a controller, or a pair (simulation, controller) in whose state each push begins.
+    directions : int, optional
+        Number of directions, at least 3, evenly spaced from the world's x axis.
+    duration : float, optional
+        Duration of the push [s].
+    frame : str, optional
+        Name of the frame at whose origin the push acts.
+    start : float, optional
+        Time before the push, in which the robot settles [s].
+    observation_time : float, optional
+        Time after the push [s]. A fall is noticed only if it happens within this time.
+    initial_force : float, optional
+        First push to try, by default the robot's weight [N]. It is doubled as long as it is
         survived.
-    resolution: N, spacing of the pushes that are tried: pushes are multiples of it.
-    workers, cluster, progress: as for `fb.sweep`; a direction is a point.
+    resolution : float, optional
+        Spacing of the pushes to try [N]: all pushes are multiples of it.
+    workers : int, optional
+        Number of processes, as for `fb.sweep`; each direction is a point of the sweep.
+    cluster : distributed.Client or str, optional
+        Dask cluster, as for `fb.sweep`.
+    progress : bool, optional
+        Whether to show a progress bar.
 
-    Raises `InputError` for numbers that do not fit, and for a robot that is bolted to the ground;
-    `SimulationError` where the robot falls without a push, and where it survives a hundred times
-    its weight.
+    Returns
+    -------
+    PushRecovery
+        Largest survived push in each direction, with theoretical bounds.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or if the robot's base is fixed to the ground.
+    SimulationError
+        If the robot falls without a push, or if the next push to try exceeds a hundred times the
+        robot's weight.
     """
     if (
         isinstance(directions, bool)
@@ -177,7 +216,8 @@ def push_recovery(
     robot, contacts = sim.robot, getattr(example, "contacts", None)
     if not robot.is_floating:
         raise InputError(
-            f"{robot.name} is bolted to the ground and cannot fall: it has no push recovery."
+            f"{robot.name} is fixed to the ground and cannot fall. push_recovery needs a robot "
+            f"with a floating base."
         )
     robot.frame_id(frame)
     settings = {
@@ -191,7 +231,7 @@ def push_recovery(
         / resolution
     )
 
-    def largest_push(direction: float) -> float:  # the bar shows this name
+    def largest_push(direction: float) -> float:  # the progress bar shows this name
         return _largest_survived(direction, make, frame, first, **settings)
 
     angles = 2.0 * np.pi * np.arange(directions) / directions
@@ -200,7 +240,7 @@ def push_recovery(
     )
     for angle, error in zip(angles, table["error"], strict=True):
         if isinstance(error, str):
-            raise SimulationError(f"The push towards {np.rad2deg(angle):.0f}° ended with {error}")
+            raise SimulationError(f"The push towards {np.rad2deg(angle):.0f}° failed. {error}")
     return PushRecovery(
         read_only(angles), read_only(table["result"].to_numpy(dtype=float)),
         settings["resolution"], settings["duration"],
@@ -210,14 +250,11 @@ def push_recovery(
 
 
 def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
-    """A function that makes a simulation and a controller, from what `push_recovery` was given; it
-    can be sent to a worker.
-    """
-    needs = "a controller that has a robot, or a function without parameters that makes one"
+    """Return a picklable function that makes a simulation and a controller for `push_recovery`."""
+    needs = "a controller with a robot, or a function without parameters that returns one"
     if not callable(controller):
         raise InputError(
-            f"push_recovery needs {needs} or makes a pair (simulation, controller), not "
-            f"{controller!r}."
+            f"push_recovery needs {needs} or a pair (simulation, controller), not {controller!r}."
         )
     if not hasattr(controller, "robot"):
         if fault := signature_error(controller):
@@ -230,20 +267,19 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         )
     except Exception as error:
         raise InputError(
-            f"this controller cannot be copied for each push ({type(error).__name__}: {error}): "
-            f"give a function without "
-            "parameters that makes it."
+            f"This controller cannot be copied for each push ({type(error).__name__}: {error}). "
+            f"Give a function without parameters that returns it."
         ) from error
 
 
 def _simulation_and_controller(make: Callable[[], Any]) -> tuple[Simulation, Any]:
-    """What a function makes, a controller or (simulation, controller), as a pair."""
+    """Return what a function makes, a controller or (simulation, controller), as a pair."""
     made = make()
     if isinstance(made, tuple) and len(made) == 2 and isinstance(made[0], Simulation):
         return made
     if not callable(made) or not hasattr(made, "robot"):
         raise InputError(
-            f"the function must make a controller that has a robot, or a pair (simulation, "
+            f"The function must return a controller with a robot, or a pair (simulation, "
             f"controller), not {made!r}."
         )
     return Simulation(made.robot), made
@@ -259,8 +295,9 @@ def _largest_survived(
     observation_time: float,
     resolution: float,
 ) -> float:
-    """The largest multiple of `resolution`, N, that is survived as a push in a direction, rad;
-    `initial_steps` of them are tried first.
+    """Return the largest survived push in a direction [rad], a multiple of `resolution` [N].
+
+    The first push tried is `initial_steps` times the resolution.
     """
 
     def pushed(steps: int) -> Rollout:
@@ -279,28 +316,33 @@ def _largest_survived(
         survived, fatal = fatal, 2 * fatal
         if fatal * resolution > _MAX_FORCE_IN_WEIGHTS * make()[0].robot.weight:
             raise SimulationError(
-                f"a push of {survived * resolution:g} N is survived, and the doubled one is too "
-                f"large to be sensible."
+                f"The robot survived a push of {survived * resolution:g} N, and twice that is more "
+                f"than {_MAX_FORCE_IN_WEIGHTS:g} times its weight. Check that the push acts."
             )
     while fatal - survived > 1:
         middle = (survived + fatal) // 2
         survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
     if survived == 0 and (unpushed := pushed(0)).outcome != "completed":
-        how = f"the controller fails without a push: {unpushed.error}"
-        raise SimulationError("the robot falls without a push." if unpushed.error is None else how)
+        reason = f"The controller fails without a push: {unpushed.error}"
+        raise SimulationError(
+            "The robot falls without a push. Give a controller that stands."
+            if unpushed.error is None
+            else reason
+        )
     return survived * resolution
 
 
 def _unit_vectors(directions: Any) -> Array:
-    """Horizontal unit vectors, shape (…, 3), for directions, rad."""
+    """Return horizontal unit vectors, shape (..., 3), for directions [rad]."""
     return read_only(
         np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
     )
 
 
 def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> float:
-    """The largest multiple of a push that can go with what is carried; 0 where rounding puts that
-    beyond the set's border.
+    """Return the largest multiple of a push that the stance withstands together with the weight.
+
+    It is 0 if rounding puts the weight itself outside the set.
     """
     try:
         return max(0.0, wrenches.max_scaling(push, weight_wrench))
@@ -309,10 +351,21 @@ def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> floa
 
 
 def _distance_to_border(polygon: Array, point: Array, directions: Array) -> Array:
-    """How far it is from a point to the border of a convex polygon, shape (n,), m; 0 for a point
-    that is not inside.
+    """Return the distance of a point to the border of a convex polygon in each direction.
 
-    polygon: (k, 2), m, counter-clockwise. point: (2,), m. directions: (n, 2), unit.
+    Parameters
+    ----------
+    polygon : ndarray, shape (k, 2)
+        Corners, counter-clockwise [m].
+    point : ndarray, shape (2,)
+        The point [m].
+    directions : ndarray, shape (n, 2)
+        Unit vectors.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Distances; 0 for a point that is not inside [m].
     """
     if len(polygon) < 3:
         return np.zeros(len(directions))

@@ -1,4 +1,4 @@
-"""`Rollout`: what happened under a controller, row by row; `Recorder` collects it."""
+"""`Rollout`: the record of a simulation run; `Recorder` collects it."""
 
 from __future__ import annotations
 
@@ -28,33 +28,50 @@ Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
 @dataclass(frozen=True, eq=False)
 class Rollout(Value):
-    """What happened: one row for each of n control ticks. Read-only.
+    """Read-only record of a simulation run, with one row for each of n control steps.
 
-    contacts: all that the controller had at any time; its stance at row i is `contacts_at(i)`.
+    Times and states are those at the beginning of each control step. Torques and measured forces
+    are means over the control step.
 
-    Before the tick:
-    time: (n,) s, the simulation's clock.
-    q, v: (n, nq) and (n, nv), as in `State`.
-    foot_positions: (n, points, 3) m, world, of the contacts' points; NaN for points that the
-        physics does not have.
-
-    During the tick:
-    tau: (n, d) N·m, the torques applied, within the motors' limits; their mean.
-    tau_desired: (n, d) N·m, the controller's.
-    planned: (n, k) N, world, the controller's forces at `contacts`: 0 at those that its stance did
-        not have, NaN where it gave no forces.
-    measured: (n, k) N, world, the physics' forces at `contacts`, whether or not the stance had
-        them; their mean. NaN for contacts that the physics does not have.
-
-    pushes: those handed to `rollout`.
-    outcome: why the record ends there, or the controller does: "completed", "fell", "diverged" or
-        "controller failed".
-    error: of a controller that failed: the exception it raised, or one that names the NaN or
-        infinite torque it gave.
-    stances: the controller's contacts at each row; empty where they were `contacts` throughout.
-    controller_off_time: s, from when on the controller is off, since the robot fell or the
-        controller failed; None in other cases. A rollout that settles has rows from then on:
-        τ_desired is that of the joint damping, planned forces are NaN.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        All contacts that the controller used at any time; `contacts_at(i)` returns its stance at
+        row i.
+    time : ndarray, shape (n,)
+        Time on the simulation's clock before the control step [s].
+    q : ndarray, shape (n, nq)
+        Configuration before the control step, as in `State`.
+    v : ndarray, shape (n, nv)
+        Velocity before the control step, as in `State`.
+    tau : ndarray, shape (n, d)
+        Mean applied torques, within the motors' limits [N·m].
+    tau_desired : ndarray, shape (n, d)
+        Torques that the controller requested [N·m].
+    planned : ndarray, shape (n, k)
+        The controller's planned forces at `contacts`, in the world frame [N]. Contacts outside its
+        stance have 0; rows without planned forces have NaN.
+    measured : ndarray, shape (n, k)
+        Mean forces in the simulation at `contacts`, in the world frame, whether or not they were in
+        the stance [N]. Contacts that the simulation does not have are NaN.
+    foot_positions : ndarray, shape (n, points, 3)
+        Positions of the contact points before the control step, in the world frame [m]. Points that
+        the simulation does not have are NaN.
+    pushes : tuple of Push
+        All pushes given to `rollout`.
+    outcome : {"completed", "fell", "diverged", "controller failed"}
+        Why the run ended, or why the controller was switched off.
+    error : FloatbaseError or None
+        Exception of a controller that failed, or an exception that names the NaN or infinite
+        torque.
+    stances : tuple of Contacts
+        The controller's contacts at each row; empty if they were always `contacts`.
+    controller_off_time : float or None
+        Time at which the controller was switched off after a fall or a failure [s], otherwise None.
+        With a settling time, the rollout has rows from then on: `tau_desired` is the joint damping
+        and `planned` is NaN.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -78,18 +95,51 @@ class Rollout(Value):
         return int(self.time.size)
 
     def state(self, i: int) -> State:
-        """The state at row i."""
+        """Return the state at row `i`.
+
+        Parameters
+        ----------
+        i : int
+            Number of the row; negative numbers count from the end.
+
+        Returns
+        -------
+        State
+            State before that control step.
+        """
         i = as_integer("row", i, -len(self), len(self) - 1)
         return State(self.robot, self.q[i], self.v[i])
 
     def contacts_at(self, i: int) -> Contacts:
-        """The controller's stance at row i."""
+        """Return the controller's stance at row `i`.
+
+        Parameters
+        ----------
+        i : int
+            Number of the row; negative numbers count from the end.
+
+        Returns
+        -------
+        Contacts
+            The contacts that the controller used.
+        """
         i = as_integer("row", i, -len(self), len(self) - 1)
         return self.stances[i] if self.stances else self.contacts
 
     def force(self, contact: str, kind: Literal["measured", "planned"] = "measured") -> Array:
-        """The force of a contact, such as "FL_foot", through time, shape (n, 3), N, world: of a
-        flat foot the resultant.
+        """Return the force at a contact over time; for a flat foot, the resultant force.
+
+        Parameters
+        ----------
+        contact : str
+            Name of the contact, such as "FL_foot".
+        kind : {"measured", "planned"}, optional
+            Whether to return the force in the simulation or the controller's planned force.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Force in the world frame [N].
         """
         if not isinstance(kind, str) or kind not in ("measured", "planned"):
             raise unknown_name("kind of force", kind, ("measured", "planned"))
@@ -99,26 +149,34 @@ class Rollout(Value):
 
     @property
     def final(self) -> State:
-        """The state at the last row."""
+        """State at the last row."""
         self._check_not_empty()
         return self.state(-1)
 
     @cached_property
     def com(self) -> Array:
-        """Centre of mass at each row, shape (n, 3), m, world."""
+        """Centre of mass at each row, shape (n, 3), world frame [m]."""
         model, data, com = self.robot.model, self.robot.model.createData(), np.empty((len(self), 3))
         for row, q in zip(com, self.q, strict=True):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
 
     def slip(self, include_rolling: bool = True) -> Array:
-        """How far each contact point strayed, at most, from where it began to stand, shape
-        (points,), m.
+        """Compute the largest distance of each contact point from where its stance began.
 
-        It stands while the controller's stance has it; 0 where it never did.
+        A point is in stance while the controller's contacts include it. Points that were never in
+        stance have 0.
 
-        include_rolling: whether the way that a ball rolls counts, too: its lowest point moves with
-            it, and nothing slides.
+        Parameters
+        ----------
+        include_rolling : bool, optional
+            Whether to count the distance that a ball rolls, too: rolling moves its lowest point
+            without any sliding.
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            Largest distance of each point in any of its stances [m].
         """
         self._check_not_empty()
         positions = (
@@ -137,9 +195,7 @@ class Rollout(Value):
         return read_only(max_distance)
 
     def _stance_intervals(self, contact: str) -> list[tuple[int, int]]:
-        """First row, and the row after the last, of each time that the controller's stance has a
-        contact.
-        """
+        """Return the first row of each stance of a contact, and the row after its last one."""
         if not self.stances:
             return [(0, len(self))]
         in_stance = {stance: contact in stance.names for stance in dict.fromkeys(self.stances)}
@@ -148,8 +204,14 @@ class Rollout(Value):
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
     def rolling_displacement(self) -> Array:
-        """How far each point's ball has rolled, shape (n, points, 3), m, world: the integral of ω ×
-        radius · normal.
+        """Compute how far the ball at each contact point has rolled.
+
+        It is the integral of ω × radius · normal.
+
+        Returns
+        -------
+        ndarray, shape (n, points, 3)
+            Displacement in the world frame since the first row [m].
         """
         arms = [
             (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
@@ -168,22 +230,33 @@ class Rollout(Value):
         return np.concatenate([np.zeros((1, len(arms), 3)), np.cumsum(steps, axis=0)])
 
     def _check_not_empty(self) -> None:
+        """Raise `InputError` if the record has no rows."""
         if not len(self):
             raise InputError(
-                f"this record is empty: "
-                f"{self.outcome}{'' if self.error is None else f', {self.error}'}"
+                f"This record has no rows. Its outcome is {self.outcome!r}"
+                f"{'.' if self.error is None else f': {self.error}'}"
             )
 
     def __repr__(self) -> str:
-        span = f"{len(self)} rows to {self.time[-1]:.3f} s" if len(self) else "no row"
+        span = f"{len(self)} rows to {self.time[-1]:.3f} s" if len(self) else "no rows"
         return f"Rollout({self.robot.name}, {span}, {self.outcome})"
 
 
 class Recorder:
-    """Collects the rows of a rollout that begins in a stance: `before_tick`, `after_step` and
-    `complete_tick` in each tick.
+    """Collector of the rows of a rollout.
 
-    ticks: at most so many rows. substeps: timesteps in each.
+    Call `before_tick`, `after_step` for each timestep, and `complete_tick` in each control step.
+
+    Parameters
+    ----------
+    sim : Simulation
+        The simulation.
+    stance : Contacts
+        The controller's contacts at the beginning.
+    ticks : int
+        Largest number of rows.
+    substeps : int
+        Timesteps in each control step.
     """
 
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
@@ -195,7 +268,7 @@ class Recorder:
             np.empty((ticks, sim.robot.nv)),
         )
         self._tau_desired = np.empty((ticks, d))
-        # MuJoCo's own numbers, which `to_rollout` turns into ours, all rows at once
+        # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
         self._step_actuator_forces = np.empty((ticks * substeps, sim.model.nu))
@@ -204,12 +277,10 @@ class Recorder:
         self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
-        self._rows_with_plan: list[int] = []  # the rows of those
+        self._rows_with_plan: list[int] = []  # the rows that have planned forces
 
     def enable_link_collisions(self) -> None:
-        """Go on with links that touch. Timesteps of a tick that was begun and is not completed are
-        forgotten.
-        """
+        """Switch link collisions on, and discard the timesteps of an unfinished control step."""
         self._sim.link_collisions = True
         first = self._n * self._substeps
         self._step_contact_geoms[first : self._n_steps] = 0
@@ -217,14 +288,14 @@ class Recorder:
         self._n_steps = first
 
     def before_tick(self, t: float, q: Array, v: Array) -> None:
-        """Keep clock, state and feet before a tick. They count when `complete_tick` does."""
+        """Record time, state and feet before a control step; `complete_tick` makes them a row."""
         n = self._n
         self._time[n], self._q[n], self._v[n] = t, q, v
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
 
     def after_step(self) -> None:
-        """Keep what motors and ground did in a timestep of the tick."""
+        """Record motor forces and contacts of a timestep within the control step."""
         i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = (
@@ -234,15 +305,23 @@ class Recorder:
         self._n_steps += 1
 
     def complete_tick(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
-        """Complete the row: the controller's torques (d,), N·m, its stance, and the forces (k,), N,
-        it planned there.
+        """Complete a row.
+
+        Parameters
+        ----------
+        tau_desired : ndarray, shape (d,)
+            Torques that the controller requested [N·m].
+        stance : Contacts
+            The controller's contacts.
+        planned : ndarray, shape (k,), or None
+            Forces that it planned at the contacts, in the world frame [N].
         """
         n = self._n
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
             more = planned.size - self._planned_forces.shape[1]
-            if more > 0:  # a larger stance than any before
+            if more > 0:  # larger than any stance before
                 self._planned_forces = np.pad(self._planned_forces, ((0, 0), (0, more)))
             self._planned_forces[n, : planned.size] = planned
             self._rows_with_plan.append(n)
@@ -255,8 +334,28 @@ class Recorder:
         error: FloatbaseError | None = None,
         controller_off_time: float | None = None,
     ) -> Rollout:
-        """The record. Raises `InputError` where a contact was of one kind in one stance and of
-        another in a later one.
+        """Return the record as a `Rollout`.
+
+        Parameters
+        ----------
+        pushes : tuple of Push
+            All pushes given to `rollout`.
+        outcome : {"completed", "fell", "diverged", "controller failed"}
+            Why the run ended.
+        error : FloatbaseError, optional
+            Exception of a controller that failed.
+        controller_off_time : float, optional
+            Time at which the controller was switched off [s].
+
+        Returns
+        -------
+        Rollout
+            The record of all completed rows.
+
+        Raises
+        ------
+        InputError
+            If a contact was a point in one stance and a flat foot in another.
         """
         contacts = self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
@@ -264,9 +363,9 @@ class Recorder:
                 contacts += Contacts([contact])
             elif contact.k != contacts[contact.name].k:
                 raise InputError(
-                    f"contact {contact.name} had {contacts[contact.name].k} force numbers at first "
-                    f"and now has {contact.k}; "
-                    "in one rollout it must stay a point, or a flat foot."
+                    f"Contact {contact.name} had {contacts[contact.name].k} force components at "
+                    f"first and now has {contact.k}. During one rollout it must remain a point or "
+                    f"remain a flat foot."
                 )
         measured, positions = self._measured_at(contacts)
         return Rollout(
@@ -292,11 +391,11 @@ class Recorder:
         )
 
     def _complete_rows(self, rows: Array) -> Array:
-        """The rows that are complete, without a copy."""
+        """Return the completed rows, without a copy."""
         return frozen(rows)[: self._n]
 
     def _mean_over_substeps(self, steps: Array) -> Array:
-        """The means over the timesteps of each row, shape (n, …), of numbers at all timesteps."""
+        """Return the mean over the timesteps of each row, shape (n, ...)."""
         if self._substeps > 1:
             steps = (
                 steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1)
@@ -305,7 +404,7 @@ class Recorder:
         return read_only(steps)
 
     def _planned_at(self, contacts: Contacts) -> Array:
-        """Planned forces at the contacts, shape (n, k)."""
+        """Return the planned forces at the contacts, shape (n, k) [N]."""
         forces, entries_of_all = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
         rows: dict[Contacts, list[int]] = {stance: [] for stance in self._stances}
         for i in self._rows_with_plan:
@@ -319,11 +418,10 @@ class Recorder:
         return read_only(forces)
 
     def _measured_at(self, contacts: Contacts) -> tuple[Array, Array]:
-        """Forces (n, k) and positions (n, points, 3) of the contacts from those of the physics'
-        feet; NaN where it has none.
+        """Return measured forces (n, k) and positions (n, points, 3) of contacts, NaN if unknown.
 
-        A point contact in the middle of a flat foot takes the sum of its corners' forces and the
-        mean of their positions.
+        A point contact in the middle of a flat foot has the sum of the corners' forces and the mean
+        of their positions.
         """
         sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)

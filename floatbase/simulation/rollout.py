@@ -1,4 +1,4 @@
-"""`rollout`: the one loop that closes a controller with the physics."""
+"""`rollout`: the loop of controller and simulation."""
 
 from __future__ import annotations
 
@@ -29,35 +29,46 @@ from floatbase.simulation.record import Outcome, Recorder, Rollout
 
 _MAX_STEPS = (
     10**7
-)  # of one record: three hours at 1 ms, and 10 GB; the next rollout goes on where this one ends
-# part of a period by which a time may miss a whole number of them: how people round
+)  # of one record: three hours at 1 ms, and 10 GB; the next rollout continues where this one ends
+# fraction of a period by which a time may differ from a whole number of periods: user rounding
 _PERIOD_TOLERANCE = 1e-6
-_TIME_TOLERANCE = 1e-9  # part of the time by which it may: the rounding of many periods
+_TIME_TOLERANCE = 1e-9  # additional fraction of the time itself: rounding over many periods
 
 
 class Controller(Protocol):
-    """Anything that gives torques for a state: its answer has `.tau`, shape (d,), N·m, and may have
-    `.forces`, shape (k,), N.
+    """A callable that returns joint torques for the present state.
 
-    It may have an attribute `contacts`, a `Contacts`: the stance that its last answer was for,
-    which may change from one tick to the next. Without it all feet are taken.
+    The result has an attribute `tau`, shape (d,) [N·m], and optionally `forces`, shape (k,) [N], in
+    the world frame. The controller itself may have an attribute `contacts` of type `Contacts`: the
+    stance of its last result, which may change from one control step to the next. Without this
+    attribute, all feet are used.
     """
 
     def __call__(self, q: Array, v: Array, t: float) -> Any:
-        """The command for configuration q and velocity v at time t, s."""
+        """Return the command for configuration q and velocity v at time t [s]."""
 
 
 class Actuators(Protocol):
-    """What stands between the torques that a controller desires and those that the joints get; it
-    may have a memory.
-    """
+    """A model that converts desired torques into joint torques, and may have a state."""
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
-        """The torques of the next dt s, shape (d,), N·m.
+        """Return the torques of the next timestep.
 
-        tau_desired: (d,) N·m, the controller's.
-        q_joints, v_joints: (d,) rad and rad/s, of the joints now.
-        dt: s.
+        Parameters
+        ----------
+        tau_desired : ndarray, shape (d,)
+            Torques that the controller requested [N·m].
+        q_joints : ndarray, shape (d,)
+            Joint positions at the beginning of the step [rad or m].
+        v_joints : ndarray, shape (d,)
+            Joint velocities at the beginning of the step [rad/s or m/s].
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Joint torques [N·m].
         """
 
 
@@ -71,27 +82,62 @@ def rollout(
     settling_time: float = 0.0,
     progress: bool = False,
 ) -> Rollout:
-    """Run a controller on the physics from its present state.
+    """Simulate a robot under a controller from the simulation's present state.
 
-    sim: the physics; where it ends, the next rollout goes on.
-    controller: called as controller(q, v, t) once in each control period; see `Controller`.
-    duration: s, a whole number of control periods.
-    pushes: forces on the robot; they start on the simulation's clock, which a reset sets to 0.
-    control_period: s, a whole number of the simulation's timesteps; one by default.
-    actuators: what the controller's torques pass through in every timestep, such as
-        `HydraulicActuators`; without it the joints get the controller's torques, within the motors'
-        limits. Its memory lasts from one rollout to the next: reset it with the simulation.
-    settling_time: s, a whole number of control periods, for which a robot goes on after a fall or a
-        controller's failure, to lie on the ground in the end: controller and actuators are off, the
-        motors damp the joints, `sim.link_collisions` is on. See `Rollout.controller_off_time`.
-    progress: whether a bar shows how far it is.
+    Parameters
+    ----------
+    sim : Simulation
+        The simulation; the next rollout continues where this one ends.
+    controller : Controller
+        Called as controller(q, v, t) once in each control period; see `Controller`.
+    duration : float
+        Simulated time [s], a whole number of control periods.
+    pushes : sequence of Push, optional
+        Forces on the robot. Their start refers to the simulation's clock, which a reset sets to 0.
+    control_period : float, optional
+        Time between two calls of the controller [s], a whole number of timesteps; by default one
+        timestep.
+    actuators : Actuators, optional
+        Model such as `HydraulicActuators` that converts the controller's torques in every timestep.
+        Without it, the joints get the controller's torques, within the motors' limits. Its state is
+        kept from one rollout to the next, so reset it together with the simulation.
+    settling_time : float, optional
+        Time for which the simulation continues after a fall or a controller failure, so that the
+        robot comes to lie on the ground [s]; a whole number of control periods. Meanwhile,
+        controller and actuators are off, the motors damp the joints, and `sim.link_collisions` is
+        on. See `Rollout.controller_off_time`.
+    progress : bool, optional
+        Whether to show a progress bar.
 
-    A fall, a divergence of the physics, an error of the package that the controller raises, torques
-    that are no finite numbers end the rollout: `outcome` says so, and the rows up to there are
-    returned. Raises `InputError` for a control period or a duration that is no whole number of
-    periods, for a push that moves nothing, for a controller that cannot be called as controller(q,
-    v, t), and for an answer without `.tau`. Warns (`SimulationWarning`) where pushes are given and
-    none acts in this rollout.
+    Returns
+    -------
+    Rollout
+        One row for each control step. A fall, a divergence of the simulation, an error of this
+        package raised by the controller, or torques that are not finite numbers end the rollout.
+        The rows up to that time are returned, and `outcome` gives the reason.
+
+    Raises
+    ------
+    InputError
+        If a duration is not a whole number of periods, if a push has no effect, if the controller
+        cannot be called as controller(q, v, t), or if its result has no `tau`.
+
+    Warns
+    -----
+    SimulationWarning
+        If pushes are given, but none acts during this rollout.
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> robot = fb.load("go2")
+    >>> standing = robot.standing()
+    >>> contacts = fb.Contacts.points(robot, mu=0.7)
+    >>> controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(standing))
+    >>> push = fb.Push([0.0, 30.0, 0.0], start=0.01)
+    >>> run = fb.rollout(fb.Simulation(robot), controller, duration=0.05, pushes=[push])
+    >>> run.outcome, len(run)
+    ('completed', 50)
     """
     pushes = as_pushes(pushes)
     _check_arguments(sim, controller, pushes, actuators)
@@ -104,8 +150,8 @@ def rollout(
     steps = (ticks + settling_ticks) * substeps
     if steps > _MAX_STEPS:
         raise InputError(
-            f"duration {duration:g} s has {steps} timesteps; at most {_MAX_STEPS} fit in one "
-            f"record."
+            f"A duration of {duration:g} s has {steps} timesteps, but a record holds at most "
+            f"{_MAX_STEPS}. Use several rollouts; each continues where the last one ended."
         )
     warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if warning:
@@ -121,7 +167,7 @@ def rollout(
 
     bar: Iterable[int] = range(ticks)
     if as_bool("progress", progress):
-        from tqdm.auto import tqdm  # takes long to load
+        from tqdm.auto import tqdm  # slow to load
 
         bar = tqdm(bar, "rollout", unit=" ticks")
     for _ in bar:
@@ -147,8 +193,9 @@ def rollout(
 
 
 def _period_count(name: str, time: float, unit: str, period: float, minimum: int = 1) -> int:
-    """How many periods, s, make up a time, s: `InputError` where that is no whole number, or less
-    than `minimum`, 0 or 1.
+    """Return how many periods [s] make up a time [s].
+
+    Raises `InputError` if that is not a whole number, or less than `minimum`, which is 0 or 1.
     """
     time = as_positive(name, time, "s", allow_zero=minimum == 0)
     count = round(time / period)
@@ -158,44 +205,44 @@ def _period_count(name: str, time: float, unit: str, period: float, minimum: int
     ):
         near = max(count, 1) * period
         raise InputError(
-            f"{name} {time:g} s is not a whole multiple of {unit} {period:g} s; {near:g} s would "
-            f"be."
+            f"{name} is {time:g} s; it must be a whole multiple of {unit}, {period:g} s, such as "
+            f"{near:g} s."
         )
     return count
 
 
 def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -> str:
-    """What is said where there are pushes and none acts from begin to end, s: "" where one does."""
+    """Return a warning if there are pushes and none acts from `begin` to `end` [s], else ""."""
     if not pushes or active_pushes(pushes, begin, end):
         return ""
     first = pushes[0]
-    several = (
-        f"none of the {len(pushes)} pushes acts: the first"
+    what = (
+        f"None of the {len(pushes)} pushes acts during this rollout. The first one"
         if len(pushes) > 1
-        else "the push does not act: it"
+        else "The push does not act during this rollout. It"
     )
     if first.start < begin:
-        what = f"sim.reset() starts the clock again, or give start=sim.time + {first.start:g}"
+        advice = f"Call sim.reset() to restart the clock, or use start=sim.time + {first.start:g}"
     else:
-        what = f"a duration of more than {first.start - begin:g} s reaches it"
+        advice = f"Use a duration of more than {first.start - begin:g} s"
     span = (
-        f"goes from {first.start:g} to {first.start + first.duration:g} s, this rollout from "
-        f"{begin:g} to {end:g} s"
+        f"acts from {first.start:g} to {first.start + first.duration:g} s, but the rollout goes "
+        f"from {begin:g} to {end:g} s"
     )
-    return f"{several} {span}; {what}."
+    return f"{what} {span}. {advice}."
 
 
 def _check_arguments(
     sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None
 ) -> None:
-    """Raise `InputError` for what is of another kind or of another robot."""
+    """Raise `InputError` for arguments of the wrong type or of another robot."""
     as_instance("sim", sim, Simulation)
     timestep = sim.model.opt.timestep
     if timestep != sim.timestep:
         raise InputError(
-            f"sim.model.opt.timestep is {timestep:g} s; the simulation was made with "
-            f"{sim.timestep:g} s, and control periods "
-            f"count in that: make another, fb.Simulation(robot, timestep={timestep:g})."
+            f"sim.model.opt.timestep is {timestep:g} s, but the simulation was made with "
+            f"{sim.timestep:g} s, and control periods are multiples of that. Make a new "
+            f"simulation with fb.Simulation(robot, timestep={timestep:g})."
         )
     as_callable("the controller", controller, "controller(q, v, t)")
     check_actuators(actuators)
@@ -203,32 +250,33 @@ def _check_arguments(
         robot = getattr(part, "robot", sim.robot)
         if robot != sim.robot:
             raise InputError(
-                f"the {name} for {robot!r}, the simulation holds {sim.robot!r}: load both with the "
-                f"same arguments."
+                f"The {name} for {robot!r}, but the simulation is for {sim.robot!r}. Load both "
+                f"robots with the same arguments."
             )
     for push in pushes:
         sim.pushed_body(push)
 
 
 def check_actuators(actuators: Actuators | None) -> None:
-    """Raise `InputError` for what has no method `step`."""
+    """Raise `InputError` for actuators without a method `step`."""
     if actuators is not None and (
         isinstance(actuators, type) or not callable(getattr(actuators, "step", None))
     ):
         raise InputError(
-            f"actuators must have a method step, as HydraulicActuators have; "
+            f"actuators must have a method step, as HydraulicActuators have, but "
             f"{short_repr(actuators)} has none."
         )
 
 
 class _NonFiniteTorques(InputError):
-    """Torques that are NaN, infinite or no numbers: they end the rollout, other mistakes in a
-    controller are raised.
+    """Torques that are NaN, infinite or not numbers.
+
+    They end the rollout; other errors in a controller are raised.
     """
 
 
 def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
-    """The controller's contacts now; all feet when it names none."""
+    """Return the controller's present contacts, or all feet if it has none."""
     contacts = getattr(controller, "contacts", None)
     return contacts if isinstance(contacts, Contacts) else sim.feet
 
@@ -241,15 +289,15 @@ def _run_substeps(
     actuators: Actuators | None,
     record: Recorder,
 ) -> None:
-    """Go on for a control period under the desired torques, shape (d,), N·m."""
+    """Simulate one control period under the desired torques, shape (d,) [N·m]."""
     if actuators is not None:
-        desired = read_only(desired)  # they must not write into the controller's own
+        desired = read_only(desired)  # actuators must not write into the controller's array
     tau = desired
     for _ in range(substeps):
         if actuators is not None:
             tau = _as_torques(
                 sim,
-                "the actuators' torques",
+                "The actuators' torques",
                 actuators.step(desired, *sim.joint_state, sim.timestep),
             )
         sim.advance(tau, pushes)
@@ -257,18 +305,20 @@ def _run_substeps(
 
 
 def _desired_torques(sim: Simulation, command: Any) -> Array:
-    """The torques of a command, shape (d,), N·m."""
+    """Return the torques of a command, shape (d,) [N·m]."""
     if not hasattr(command, "tau"):
         raise InputError(
-            f"a controller must answer with .tau, shape ({sim.robot.d},), N·m, as a Command does; "
-            f"got {command!r}. Any "
-            f"object with .tau will do: types.SimpleNamespace(tau=…)."
+            f"A controller must return an object with an attribute tau, shape ({sim.robot.d},) "
+            f"[N·m], such as a Command or types.SimpleNamespace(tau=…). This one returned "
+            f"{command!r}."
         )
-    return _as_torques(sim, "the controller's torques", command.tau)
+    return _as_torques(sim, "The controller's torques", command.tau)
 
 
 def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
-    """Torques as an array, shape (d,). Raises `_NonFiniteTorques`, or `InputError` for another
+    """Return torques as an array, shape (d,) [N·m].
+
+    Raises `_NonFiniteTorques` if an entry is not a finite number, and `InputError` for another
     shape.
     """
     if (
@@ -277,7 +327,7 @@ def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
         and tau.shape == (sim.robot.d,)
         and np.vdot(tau, tau) <= MAX_MAGNITUDE
     ):
-        return tau  # as most of them are
+        return tau  # the usual case
     try:
         return as_array(name, tau, (sim.robot.d,), "N·m")
     except InputError:
@@ -288,28 +338,27 @@ def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
             False
         )
         raise _NonFiniteTorques(
-            f"{name} hold {entries[i]} at {sim.robot.joint_names[i]} at {sim.time:.3f} s."
+            f"{name} contain {entries[i]} for joint {sim.robot.joint_names[i]} at {sim.time:.3f} "
+            f"s. All torques must be finite numbers."
         ) from None
 
 
 def _planned_forces(command: Any, stance: Contacts) -> Array | None:
-    """A command's forces, shape (k,), N, world, or None where it has none."""
+    """Return a command's forces, shape (k,), world frame [N], or None if it has none."""
     forces = getattr(command, "forces", None)
     if forces is None:
         return None
     is_float64 = (
         type(forces) is np.ndarray and forces.dtype.char == "d"
-    )  # float64, as most of them are
+    )  # float64 is the usual case
     planned = forces if is_float64 else numeric_copy(forces)
     if planned is None:
-        raise InputError(
-            f"the controller planned forces that are no numbers: {short_repr(forces)}."
-        )
+        raise InputError(f"The controller's forces must be numbers, not {short_repr(forces)}.")
     if planned.shape != (stance.k,):
         raise InputError(
-            f"the controller planned forces of shape {planned.shape}; its contacts "
-            f"({', '.join(stance.names)}) have "
-            f"{stance.k} numbers. A controller that changes its stance, or one around it, has the "
-            f"present one as .contacts."
+            f"The controller's forces have shape {planned.shape}, but its contacts "
+            f"({', '.join(stance.names)}) need shape ({stance.k},). A controller that changes its "
+            f"stance, or that wraps such a controller, must have the present stance as its "
+            f"attribute contacts."
         )
     return planned

@@ -1,4 +1,4 @@
-"""The rows of a sweep in a JSON Lines file, from which an interrupted sweep resumes."""
+"""Rows of a sweep in a JSON Lines file, from which an interrupted sweep resumes."""
 
 from __future__ import annotations
 
@@ -24,28 +24,45 @@ Row = dict[str, Any]
 
 
 def require(library: str) -> Any:
-    """Import an optional library of sweeps. Raises `InputError` if it is not installed."""
+    """Import an optional library of sweeps; raise `InputError` if it is not installed."""
     try:
         return import_module(library)
     except ImportError:
-        raise InputError(f'A sweep needs {library}: pip install "floatbase[sweep]".') from None
+        raise InputError(
+            f"A sweep needs {library}, which is not installed. Install it with "
+            'pip install "floatbase[sweep]".'
+        ) from None
 
 
 def read_sweep(path: str | Path) -> DataFrame:
-    """Read the file of a sweep, finished or not, as a `pandas.DataFrame` like that of `sweep`.
+    """Read the file of a sweep, finished or not.
 
-    The index holds the numbers of the points that are done. Raises `InputError` for a file that
-    cannot be read or holds no sweep.
+    Parameters
+    ----------
+    path : str or Path
+        Path of the file.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A table like that of `sweep`; its index holds the numbers of the completed points.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or was not written by a sweep.
     """
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+        raise InputError(
+            f"{path} cannot be read: {error.strerror}. Give the path of a sweep's file."
+        ) from None
     return as_frame(_read_rows(path, content))
 
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:
-    """Rows, number of the point -> row, as a `pandas.DataFrame` whose last column is "error"."""
+    """Return rows, as point number -> row, as a `pandas.DataFrame` that ends in "error"."""
     pandas, points = require("pandas"), sorted(rows)
     names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
     return pandas.DataFrame(
@@ -56,18 +73,24 @@ def as_frame(rows: Mapping[int, Row]) -> DataFrame:
 
 
 class RowStore:
-    """The rows of a sweep, number of the point -> row; with a path, also in a file, to which they
-    are added as they come.
+    """Rows of a sweep, as point number -> row, which are also written to a file if there is one.
 
-    The file is JSON Lines: first a line that says what is swept, then a line for each point that is
-    done. It is locked while the store is open. A last line that was not written to its end is cut
-    off.
+    The file is in JSON Lines format: the first line describes the sweep, and each further line is a
+    completed point. The file is locked while the store is open. An incomplete last line is removed.
 
-    path: of the file; None keeps nothing.
-    name: of the function.
-    points: parameters of all points, in plain values.
-    Raises `InputError` for a file that holds something else, that another sweep is writing to, or
-    that cannot be written to.
+    Parameters
+    ----------
+    path : str or Path or None
+        Path of the file; None stores nothing.
+    name : str
+        Name of the function.
+    points : sequence of dict
+        Parameters of all points, as JSON values.
+
+    Raises
+    ------
+    InputError
+        If the file holds something else, is in use by another sweep, or cannot be written to.
     """
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
@@ -76,9 +99,7 @@ class RowStore:
         if path is None:
             return
         if not isinstance(path, str | os.PathLike):
-            raise InputError(
-                f'file must be the path of a file, such as "rows.jsonl", not {short_repr(path)}.'
-            )
+            raise InputError(f'file must be a path, such as "rows.jsonl", not {short_repr(path)}.')
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -86,34 +107,37 @@ class RowStore:
         except BlockingIOError:
             self.close()
             raise InputError(
-                f"another sweep is writing to {path}; wait for its end, or give another file."
+                f"Another sweep is writing to {path}. Wait until it ends, or give another file."
             ) from None
         except OSError as error:
             self.close()
-            raise InputError(f"{path} cannot be written to: {error.strerror}.") from None
+            raise InputError(
+                f"{path} cannot be written to: {error.strerror}. Give another file."
+            ) from None
         except BaseException:
             self.close()
             raise
 
     def add(self, i: int, row: Row) -> None:
-        """Keep the row of point i, in plain values, and write it to the file at once.
+        """Store the row of point i, as JSON values, and write it to the file at once.
 
-        Raises `InputError` if the file cannot be written to, such as on a full disk.
+        Raises
+        ------
+        InputError
+            If the file cannot be written to, for example because the disk is full.
         """
         self.rows[i] = row
         if self._file >= 0:
             self._write(json.dumps({"point": i, **row}))
 
     def close(self) -> None:
-        """Close the file, and free it for others."""
+        """Close the file and release its lock."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
     def _resume(self, path: str | Path, header: Row) -> None:
-        """Read what the file holds, after checking that it is of this sweep; begin it where it is
-        empty.
-        """
+        """Read the file after checking that it belongs to this sweep, or begin an empty one."""
         content = Path(path).read_bytes()
         complete_lines = content[: content.rfind(b"\n") + 1]
         if not complete_lines and json.dumps(header).encode().startswith(content):
@@ -128,10 +152,10 @@ class RowStore:
         ):
             if found[key] != header[key]:
                 raise _wrong_file_error(
-                    path, f"of {what} {_joined(found[key])}, this sweep has {_joined(header[key])}"
+                    path, f"with {what} {_joined(found[key])}, not {_joined(header[key])}"
                 )
         if found["grid"] != header["grid"]:
-            raise _wrong_file_error(path, "of the same parameters at other values")
+            raise _wrong_file_error(path, "with the same parameters, but other values of them")
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
@@ -139,39 +163,37 @@ class RowStore:
                 point
             ):
                 raise _wrong_file_error(
-                    path, f"where point {i} has other parameters: it was changed by hand"
+                    path, f"whose point {i} has other parameters, because the file was edited"
                 )
         os.ftruncate(self._file, len(complete_lines))
 
     def _write(self, line: str) -> None:
+        """Write a line to the file."""
         data = line.encode() + b"\n"
         try:
-            while data:  # what a full disc takes is a part: the next attempt says why
+            while data:  # a full disk takes only part of a line: the next attempt gives the reason
                 data = data[os.write(self._file, data) :]
         except OSError as error:
-            again = (
-                "The rows before are kept: once the file takes more, the same sweep goes on "
-                "from them."
-            )
             raise InputError(
-                f"{self._path} cannot be written to: {error.strerror}. {again}"
+                f"{self._path} cannot be written to: {error.strerror}. All earlier rows are saved. "
+                "Once the file can be written to again, run the same sweep to resume."
             ) from None
 
 
 def as_json_value(what: str, value: Any) -> Any:
-    """A value as JSON gives it back: numbers, texts, booleans, None, lists and dicts of them;
-    numpy's become Python's.
+    """Convert a value to what JSON returns for it; NumPy's types become Python's.
 
-    Raises `InputError` with `what`, a name, for anything else.
+    Raises `InputError` with `what`, a name, for values that JSON cannot hold.
     """
     try:
         return json.loads(json.dumps(value, default=_from_numpy))
     except (TypeError, ValueError) as error:
-        kinds = "numbers, texts, booleans, None, and lists, dicts or numpy arrays of them"
-        raise InputError(f"{what} cannot be stored: {error}. A table holds {kinds}.") from None
+        kinds = "numbers, strings, booleans, None, and lists, dicts or NumPy arrays of them"
+        raise InputError(f"{what} cannot be stored: {error}. Use {kinds}.") from None
 
 
 def _from_numpy(value: Any) -> Any:
+    """Convert a value of NumPy for JSON."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
@@ -180,25 +202,25 @@ def _from_numpy(value: Any) -> Any:
 
 
 def _header(name: str, points: Sequence[Row]) -> Row:
-    """The first line of a file: what is swept."""
+    """Return the first line of a file, which describes the sweep."""
     parameters = list(dict.fromkeys(name for point in points for name in point))
     digest = hashlib.sha256("\n".join(json.dumps(point) for point in points).encode()).hexdigest()
     return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
 
 
 def _read_header(path: str | Path, content: bytes) -> Row:
-    """The first line of a file of a sweep."""
+    """Return the first line of a sweep's file, checked."""
     try:
         found = json.loads(content.split(b"\n", 1)[0])
         if set(found) == set(_header("", [])):
             return dict(found)
     except (ValueError, TypeError):
         pass
-    raise _wrong_file_error(path, "of no sweep")
+    raise _wrong_file_error(path, "that no sweep has written")
 
 
 def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
-    """Number of the point -> row, of all whole lines of a file of a sweep."""
+    """Return point number -> row for all complete lines of a sweep's file."""
     _read_header(path, content)
     rows: dict[int, Row] = {}
     for number, line in enumerate(content.split(b"\n")[1:-1], start=2):
@@ -206,18 +228,20 @@ def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
             row = json.loads(line)
             rows[int(row.pop("point"))] = row
         except (ValueError, TypeError, KeyError, AttributeError):
-            advice = "Remove it, and sweep again."
             raise InputError(
-                f"line {number} of {path} is no row of a sweep: {line[:80]!r}. {advice}"
+                f"Line {number} of {path} is not a row of a sweep: {line[:80]!r}. Remove the line, "
+                "and run the sweep again."
             ) from None
     return rows
 
 
 def _joined(value: Any) -> str:
+    """Return a value as a string; a list as its entries with commas."""
     return ", ".join(value) if isinstance(value, list) else str(value)
 
 
 def _wrong_file_error(path: str | Path, what: str) -> InputError:
+    """Return the error about a file of something else."""
     return InputError(
-        f"{path} is a file {what}; it is left as it is. Give another file, or remove this one."
+        f"{path} is a file {what}. It was not changed. Give another file, or remove this one."
     )

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
 _POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
 _MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep
-_PARENT_CHECK_PERIOD = 1.0  # s between checks that the program that sweeps is still alive
+_PARENT_CHECK_PERIOD = 1.0  # s between checks that the program that runs the sweep is alive
 _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
 _SINGLE_THREAD_ENV = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -52,51 +52,67 @@ def sweep(
 ) -> DataFrame:
     """Call a function at every point of a grid, in several processes, and return a table.
 
-        def setup():  # what is slow to make, made once in each process
-            robot = fb.load("go2")
-            contacts = fb.Contacts.points(robot, mu=0.7)
-            tasks = fb.standing_tasks(robot.standing())
-            return fb.Simulation(robot), fb.WholeBodyController(robot, contacts, tasks)
+    Functions, lambdas and classes of a notebook or script are sent to the processes by value.
+    Modules that they import must be importable there.
 
-        def push(made, force, angle):
-            sim, controller = made
-            sim.reset()
-            forces = [force * np.cos(angle), force * np.sin(angle), 0.0]
-            run = fb.rollout(sim, controller, 0.6, [fb.Push(forces)])
-            return {"outcome": run.outcome, "moved": run.com[-1] - run.com[0]}
+    Parameters
+    ----------
+    function : callable
+        Called with a point's parameters as keyword arguments, after the result of `setup` if there
+        is one. It returns a dict with one entry for each column, or one value for the column
+        "result". Values may be numbers, strings, booleans, lists, and NumPy arrays, which become
+        lists. If the function raises an exception, the row's "error" holds it, and the sweep
+        continues.
+    grid : dict or iterable of dict
+        Values of each parameter, name -> values, for all combinations; the last name changes
+        fastest. Alternatively, one dict of parameters for each point.
+    setup : callable, optional
+        Called once in each process (on Dask once in each thread), for objects that are slow to make
+        or cannot be pickled. An exception that it raises ends the sweep, and is raised here.
+    file : str or Path, optional
+        Path of a JSON Lines file to which each row is written as it finishes. Running the same
+        sweep with the same file resumes it, even after it was killed; at most two points for each
+        worker are computed again. The file identifies the function by its name, so use another file
+        after changing what the function does. `read_sweep` reads a file.
+    workers : int, optional
+        Number of processes, by default one for each core. Each process uses one thread for linear
+        algebra, so that the rows are bit-identical for any number of workers.
+    cluster : distributed.Client or str, optional
+        A Dask client or the address of a scheduler, to run the sweep there. It needs `pip install
+        "floatbase[cluster]"`.
+    progress : bool, optional
+        Whether to show a progress bar.
 
-        grid = {"force": [50.0, 100.0, 150.0], "angle": np.linspace(0.0, np.pi, 7)}
-        table = fb.sweep(push, grid, setup=setup, file="pushes.jsonl")
-        table.groupby("force")["outcome"].value_counts()
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each point, in the order of the grid, with parameters, results, and "error",
+        which is None or the type and message of an exception.
 
-    function: takes the parameters by their names, after the result of `setup` if there is one.
-        It returns a dict, one entry for each column, or one value for the column "result". Values
-        are numbers, strings, booleans, lists and numpy arrays, which become lists. An exception is
-        stored in the row's "error", and the sweep continues.
-    grid: name -> values, for all combinations, the last name changing fastest; or a list of dicts,
-        one for each point.
-    setup: called once in each process (on Dask in each thread), for objects that are slow to make
-        or cannot be sent.
-    file: path of a JSON Lines file to which each row is written as it finishes. The same sweep with
-        the same file resumes, also after it was killed; at most two points for each worker are
-        computed again. The function is identified by its name: after changing what it does, use
-        another file. A file of another function or grid is refused. `read_sweep` reads a file.
-    workers: number of processes, by default one for each core. Each uses one thread for linear
-        algebra, so the rows are bit-identical for any number of workers.
-    cluster: a `dask.distributed.Client` or the address of a scheduler, to work there. Install it
-        with pip install "floatbase[cluster]".
-    progress: whether to show a progress bar.
+    Raises
+    ------
+    InputError
+        If the grid does not fit the function, if a result cannot be stored, or if the file belongs
+        to another sweep or cannot be written to.
+    SimulationError
+        If a process or the cluster breaks down. Rows in the file are kept, also after an interrupt.
 
-    Returns a `pandas.DataFrame`, a row for each point in the order of the grid: parameters,
-    results, and "error", None or the type and message of an exception.
-
-    Functions, lambdas and classes of a notebook or script are sent by value. Modules that they
-    import must be importable in the workers.
-
-    Raises `InputError` for a grid that does not fit the function, for a result that cannot be
-    stored, and for a file of another sweep or one that cannot be written to; `SimulationError` when
-    a process or the cluster breaks down; and what `setup` raises. Rows in the file are kept, also
-    after an interrupt.
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> def setup():  # called once in each process
+    ...     robot = fb.load("go2")
+    ...     contacts = fb.Contacts.points(robot, mu=0.7)
+    ...     tasks = fb.standing_tasks(robot.standing())
+    ...     return fb.Simulation(robot), fb.WholeBodyController(robot, contacts, tasks)
+    >>> def push(made, force):
+    ...     sim, controller = made
+    ...     sim.reset()
+    ...     run = fb.rollout(sim, controller, 0.1, [fb.Push([0.0, force, 0.0])])
+    ...     return {"outcome": run.outcome}
+    >>> table = fb.sweep(push, {"force": [30.0, 60.0]}, setup=setup, workers=1, progress=False)
+    >>> table["outcome"].tolist()
+    ['completed', 'completed']
     """
     points = _grid_points(grid)
     json_points = [
@@ -106,8 +122,11 @@ def sweep(
     name = _function_name(function, file)
     _check_function(function, setup, points)
     if cluster is not None and workers is not None:
-        raise InputError("workers counts processes on this machine; a cluster has its own.")
-    require("pandas")  # before hours of work
+        raise InputError(
+            "workers is the number of processes on this computer, so it cannot be combined with "
+            "cluster. Give one of the two."
+        )
+    require("pandas")  # missing libraries are reported before hours of work
     job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
     with closing(RowStore(file, name, json_points)) as store:
         pending = [i for i in range(len(points)) if i not in store.rows]
@@ -137,18 +156,21 @@ class _Job(NamedTuple):
 
 
 def _grid_points(grid: Any) -> list[Row]:
-    """The parameters of every point."""
+    """Return the parameters of every point."""
     if isinstance(grid, Mapping):
         axes = {}
         for name, values in grid.items():
             if isinstance(values, str) or not isinstance(values, Iterable):
                 raise InputError(
-                    f"the grid's {name!r} must be a list of values, not {values!r}; for one value, "
-                    f"[{values!r}]."
+                    f"The grid's {name!r} must be a list of values, not {values!r}. For a single "
+                    f"value, use [{values!r}]."
                 )
             axes[name] = list(values)
             if not axes[name]:
-                raise InputError(f"the grid's {name!r} has no values, so the grid has no points.")
+                raise InputError(
+                    f"The grid's {name!r} has no values, so the grid has no points. Give at least "
+                    f"one value."
+                )
         points = (
             [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
             if axes
@@ -159,83 +181,81 @@ def _grid_points(grid: Any) -> list[Row]:
         for point in points:
             if not isinstance(point, Mapping):
                 raise InputError(
-                    f"a grid that is a list holds a dict for each point, name -> value; it has "
+                    f"A grid that is a list must hold a dict, name -> value, for each point, not "
                     f"{point!r}."
                 )
         points = [dict(point) for point in points]
     else:
         raise InputError(
-            f"the grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
+            f"The grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
         )
     if not points:
-        raise InputError("the grid has no points.")
+        raise InputError("The grid has no points. Give at least one.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
-                f"a parameter cannot be called {name!r}; {' and '.join(RESERVED_NAMES)} are the "
-                f"table's own names."
+                f"A parameter cannot be called {name!r}. Use another string; the names "
+                f"{' and '.join(RESERVED_NAMES)} are reserved."
             )
     return points
 
 
 def _function_name(function: Any, file: Any) -> str:
-    """What the function is called in the file and beside the bar."""
+    """Return the function's name for the file and the progress bar."""
     if not callable(function):
-        raise InputError(f"sweep needs a function first, not {function!r}.")
+        raise InputError(f"The first argument of sweep must be a function, not {function!r}.")
     name = getattr(function, "__qualname__", None)
     if file is not None and (name is None or name.endswith("<lambda>")):
         raise InputError(
-            f"a file knows its function by its name, and {function!r} has none: write it as a def, "
-            f"and its constants as "
-            "parameters of the grid."
+            f"A file identifies its function by its name, and {function!r} has none. Write the "
+            "function with def, and make its constants parameters of the grid."
         )
     return type(function).__name__ if name is None else name.rpartition("<locals>.")[2]
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
-    """Raise `InputError` for parameters that the function does not take, and for a setup that is no
-    function.
-    """
+    """Raise `InputError` if the function does not fit the parameters or setup is no function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)
     for names in dict.fromkeys(tuple(point) for point in points):
         if fault := signature_error(function, *made, **dict.fromkeys(names)):
             raise InputError(
-                f"the grid gives {'what setup returns, then ' if made else ''}{', '.join(names)}; "
-                f"{fault}."
+                f"The function must accept {'the result of setup, then ' if made else ''}"
+                f"the parameters of the grid, {', '.join(names)}, but {fault}."
             )
 
 
 def _worker_count(workers: Any) -> int:
+    """Return the number of processes, checked."""
     if workers is None:
         return int(require("loky").cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
         raise InputError(
             f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
-            f"on each core."
+            f"process on each core."
         )
     return int(workers)
 
 
 def _make_job(function: Any, setup: Any) -> _Job:
+    """Pickle the function and setup."""
     try:
         return _Job(uuid.uuid4().hex, require("cloudpickle").dumps((function, setup)))
     except InputError:
         raise
     except Exception as error:
         raise InputError(
-            f"the function cannot be sent to other processes ({type(error).__name__}: {error}). "
-            f"Make what it uses in a "
-            "function, and hand that in as setup."
+            f"The function cannot be sent to other processes ({type(error).__name__}: {error}). "
+            "Make the objects that it uses in a function, and pass that function as setup."
         ) from error
 
 
 @contextmanager
 def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
-    """Processes on this machine or the cluster's, and how many points to submit at a time.
+    """Yield an executor on this computer or the cluster, and how many points to submit at a time.
 
-    On an exception, points that are not finished are dropped.
+    On an exception, unfinished points are dropped.
     """
     if cluster is None:
         executor = require("loky").get_reusable_executor(
@@ -261,7 +281,7 @@ def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
 
 
 def _watch_parent(parent: int) -> None:
-    """In a worker: end soon after the program that started it was killed."""
+    """Exit this worker soon after the program that started it was killed."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -273,15 +293,18 @@ def _watch_parent(parent: int) -> None:
 
 @contextmanager
 def _dask_client(cluster: Any) -> Iterator[Any]:
-    """The Dask client that was handed in, or one for an address."""
+    """Yield the given Dask client, or a new one for an address."""
     try:
         from distributed import Client
         from distributed.comm import parse_host_port
     except ImportError:
-        raise InputError('a cluster needs Dask: pip install "floatbase[cluster]".') from None
+        raise InputError(
+            "A cluster needs Dask, which is not installed. Install it with "
+            'pip install "floatbase[cluster]".'
+        ) from None
     if isinstance(cluster, Client):
         if cluster.status != "running":
-            raise InputError(f"the Dask client is {cluster.status}; make a new one.")
+            raise InputError(f"The Dask client is {cluster.status}. Make a new one.")
         yield cluster
         return
     if not isinstance(cluster, str):
@@ -293,9 +316,8 @@ def _dask_client(cluster: Any) -> Iterator[Any]:
         client = Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {cluster} ({error}). An address looks like "
-            f"tcp://127.0.0.1:8786; "
-            "`dask scheduler` prints its own."
+            f"No Dask scheduler answers at {cluster} ({error}). Give the address that "
+            "`dask scheduler` prints, such as tcp://127.0.0.1:8786."
         ) from None
     with client:
         yield client
@@ -307,7 +329,7 @@ def _completed_points(
     points: list[Row],
     pending: list[int],
 ) -> Generator[tuple[int, Row], None, None]:
-    """Number and row of each pending point, as they finish."""
+    """Yield the number and row of each pending point as it finishes."""
     if not pending:
         return
     remaining, submitted = iter(pending), dict[Future[Row | Exception], int]()
@@ -322,24 +344,26 @@ def _completed_points(
                     answer = future.result()
                 except BrokenExecutor as error:
                     raise SimulationError(
-                        "A worker process died at a point. Use fewer workers if it ran out of "
-                        "memory; otherwise compiled code crashed."
+                        "A worker process died. If it ran out of memory, use fewer workers; "
+                        "otherwise compiled code crashed."
                     ) from error
-                except Exception as error:  # of the cluster: `_run_point` raises nothing
+                except Exception as error:  # from the cluster: `_run_point` raises nothing
                     raise SimulationError(
-                        f"The cluster broke down at a point ({type(error).__name__}: {error})."
+                        f"The cluster broke down ({type(error).__name__}: {error}). Start it "
+                        "again, and run the same sweep to resume from its file."
                     ) from error
                 if isinstance(answer, Exception):
                     raise answer
                 yield submitted.pop(future), answer
 
 
-_this_thread = threading.local()  # of a worker: function and token of the sweep that it works for
+_this_thread = threading.local()  # of a worker: function and token of its present sweep
 
 
 def _run_point(job: _Job, point: Row) -> Row | Exception:
-    """In a worker: the row's results, or the exception that ends the sweep; raised here, Dask would
-    log it for each point.
+    """Return the results of a point, or the exception that ends the sweep.
+
+    It runs in a worker. It does not raise, because Dask would log the exception for each point.
     """
     try:
         return _evaluate(job, point)
@@ -350,16 +374,15 @@ def _run_point(job: _Job, point: Row) -> Row | Exception:
 
 
 def _evaluate(job: _Job, point: Row) -> Row:
-    """What the function returned at a point, in plain values, and "error"."""
+    """Return what the function returned at a point, as JSON values, and "error"."""
     if getattr(_this_thread, "token", None) != job.token:
         try:
             function, setup = pickle.loads(job.payload)
         except (ImportError, AttributeError) as error:
             raise InputError(
-                f"a worker cannot load the function: {error}. The workers must be able to import "
-                f"the module that it is "
-                "from. Functions of a notebook or a script are sent whole, but for those that "
-                "lru_cache wraps: use setup."
+                f"A worker cannot load the function: {error}. The workers must be able to import "
+                "the function's module. Functions of a notebook or a script are sent by value, "
+                "except those that lru_cache wraps; use setup instead."
             ) from error
         _this_thread.function = function if setup is None else partial(function, setup())
         _this_thread.token = job.token
@@ -368,14 +391,14 @@ def _evaluate(job: _Job, point: Row) -> Row:
     except (
         Exception,
         SystemExit,
-    ) as error:  # sys.exit would end the program that sweeps, without a word
+    ) as error:  # sys.exit would silently end the program that runs the sweep
         return {"error": f"{type(error).__name__}: {error}"}
     results = answer if isinstance(answer, Mapping) else {"result": answer}
     for name in results:
         if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
             raise InputError(
-                f"the function's result {name!r} must be called otherwise: a text that names no "
-                f"parameter."
+                f"The function's result {name!r} needs another name: a string that is neither "
+                f"reserved nor a parameter."
             )
     return {
         name: as_json_value(f"the function's result {name!r}", value)

@@ -14,8 +14,7 @@ try:
     from floatbase.viewer.live import PUSH_DISPLAY_TIME, status_message
     from floatbase.viewer.scene import colours, markers, shapes
     from floatbase.viewer.scene.options import PictureOptions
-    from floatbase.viewer.scene.painter import prefixed
-    from floatbase.viewer.scene.shapes import Item, Picture
+    from floatbase.viewer.scene.shapes import Item, Picture, prefixed
     from floatbase.viewer.viewer import Viewer
 except ModuleNotFoundError as error:
     if str(error.name).startswith("floatbase"):

@@ -20,7 +20,7 @@ from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.transport.window import Window
 
-COLUMNS = ("", "believed", "true")
+COLUMNS = ("", "model", "reality")
 
 
 class Controls:
@@ -53,7 +53,7 @@ class Controls:
         value: where it stands at first, and again after a double click.
         low, high, step: its range and its smallest step.
         section: heading that it stands under.
-        column: "believed" or "true" for a part of a row of two, whose name ends in that word.
+        column: "model" or "reality" for a part of a row of two, whose name ends in that word.
         at_most: a word that stands for its highest value, as "perfect".
         """
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
@@ -183,6 +183,6 @@ def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
         or not as_string("name", name).endswith(column)
     ):
         raise InputError(
-            f'column is {column!r} of {name!r}; it must be "believed" or "true", and end the name.'
+            f'column is {column!r} of {name!r}; it must be "model" or "reality", and end the name.'
         )
     return {"section": as_string("section", section), **({"column": column} if column else {})}

@@ -38,8 +38,8 @@ from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.scene.diff import ROOT, DiffRenderer
 from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes, displacement
 from floatbase.viewer.scene.options import PictureKeywords
-from floatbase.viewer.scene.painter import Painter, legend_kinds, prefixed
-from floatbase.viewer.scene.shapes import Picture
+from floatbase.viewer.scene.painter import Painter
+from floatbase.viewer.scene.shapes import Picture, prefixed
 from floatbase.viewer.transport.window import Window
 from floatbase.viewer.web import pages
 
@@ -262,7 +262,7 @@ class Viewer(Controls):
             self.window.put([self._following(ROBOT), *protocol.end_animation()])
             self._is_playing = False
         settings = (
-            *self._caption(legend_kinds(picture), title, ghost_name),
+            *self._caption(legend.kinds(picture), title, ghost_name),
             protocol.set_ground(self.painter.drawn_ground.planes),
         )
         self.renderer.draw(picture, *settings)  # at once: a second frame would wait
@@ -359,7 +359,7 @@ class Viewer(Controls):
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
         self.renderer.set(
-            *self._caption(set[str]().union(*map(legend_kinds, pictures)), title, ghost_name)
+            *self._caption(set[str]().union(*map(legend.kinds, pictures)), title, ghost_name)
         )
         self.window.put([moving.command])
         self._is_playing = True

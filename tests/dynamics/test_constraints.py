@@ -1,5 +1,7 @@
-"""Constraints beyond feet (5)(6), note 6: bolts, drives and rolling wheels, judged by closed forms
-and by integration.
+"""Constraints other than feet, eqs. (5) and (6) and note 6: fixed and driven frames, rolling
+wheels.
+
+Closed-form solutions and numerical integration give the expected results.
 """
 
 from __future__ import annotations
@@ -36,8 +38,8 @@ DISC = f"""<robot name="disc"><link name="disc"><inertial>
 <inertia ixx="{I_ACROSS}" ixy="0" ixz="0" iyy="{I_AXLE}" iyz="0" izz="{I_ACROSS}"/>
 </inertial></link></robot>"""
 
-# a body with a steered wheel, every axis and offset askew, so that no term of the drift is zero by
-# luck
+# a body with a steered wheel; every axis and offset is oblique, so that no term of the drift
+# vanishes by chance
 CART = """<robot name="cart">
 <link name="body"><inertial><origin xyz="0.02 -0.01 0.05"/><mass value="5"/>
 <inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="-0.01" izz="0.15"/></inertial></link>
@@ -54,7 +56,7 @@ CART = """<robot name="cart">
 
 
 def read(text: str, path: Path, **more: object) -> Robot:
-    """A robot of our own, from URDF text."""
+    """Load a robot from URDF text."""
     path.write_text(text)
     model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
     d = model.nv - 6
@@ -76,7 +78,7 @@ def cart(tmp_path: Path) -> Robot:
 def pose(
     robot: Robot, R: Array, position: npt.ArrayLike, omega: npt.ArrayLike, velocity: npt.ArrayLike
 ) -> fb.State:
-    """A floating body's state from world quantities."""
+    """Make the state of a floating body from world quantities."""
     q = np.concatenate([np.asarray(position, float), pin.Quaternion(R).normalized().coeffs()])
     return fb.State(
         robot,
@@ -88,8 +90,9 @@ def pose(
 def rolling(
     robot: Robot, R: Array, omega: npt.ArrayLike, place: npt.ArrayLike = (0.0, 0.0)
 ) -> fb.State:
-    """A disc on z = 0 with its axle along R's y axis that rolls with angular velocity ω: v_c = ω ×
-    (r u).
+    """Make a disc on z = 0 with its axle along R's y axis, rolling with angular velocity ω.
+
+    Its centre moves with v_c = ω × (r u).
     """
     axle = R[:, 1]
     u = Z - axle * axle[2]
@@ -103,15 +106,13 @@ def wheel_of_the_disc(normal: npt.ArrayLike = Z) -> RollingWheel:
 
 
 def motion(state: fb.State, *contacts: object, t: float = 0.0) -> tuple[Array, Array]:
-    """q̈ and λ under no torque."""
+    """Compute q̈ and λ without torque."""
     eom = fb.equations_of_motion(state, fb.Contacts(list(contacts)), t)
     return judges.constrained(eom, np.zeros(eom.d))
 
 
 def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:
-    """Linear acceleration of a floating body's origin and its angular acceleration, world:
-    Newton's, not the base frame's.
-    """
+    """Return linear and angular acceleration of a floating body's origin in the world frame."""
     R = judges.quaternion_rotation(state.q[3:7])
     return R @ (qdd[:3] + np.cross(state.v[3:6], state.v[:3])), R @ qdd[3:6]
 
@@ -145,9 +146,7 @@ def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_mult
 
 
 def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
-    """Note 6: A(q, q̇, t) q̈ = b(q, q̇, t). The force of the constraint at t is A(t)ᵀ λ, not A(0)ᵀ
-    λ.
-    """
+    """Note 6: in A(q, q̇, t) q̈ = b(q, q̇, t), the constraint force at t is A(t)ᵀ λ, not A(0)ᵀ λ."""
     state = judges.load("go2").random_state(0)
 
     def rows(s: fb.State, t: float) -> tuple[Array, Array]:
@@ -171,8 +170,9 @@ def test_a_number_of_rows_may_be_a_float() -> None:
 
 
 def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_of_mass() -> None:
-    """λ is what the ground does to the robot: + m g along z, and r × (+ m g z) about the frame, r
-    from the frame to the CoM.
+    """λ acts on the robot: + m g along z, and r × (+ m g z) about the frame.
+
+    Here r points from the frame to the centre of mass.
     """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
@@ -186,7 +186,7 @@ def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_
 
 
 def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls() -> None:
-    """With no torque at all λ = m (a_com - g): less than the weight, as the legs fall."""
+    """Without torque λ = m (a_com - g), which is less than the weight because the legs fall."""
     state = judges.load("go2").standing()
     qdd, wrench = motion(state, fixed_frame("base"))
     rate = objectives.centroidal_momentum_rate(state, qdd)
@@ -216,7 +216,7 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_ba
         assert judges.relative(qdd[6:], expected) < 1e-9
         assert np.max(np.abs(qdd[:6])) < 1e-9
         pin.rnea(model, data, state.q[7:], state.v[6:], expected)
-        # what the base link passes on to its children, plus its own weight
+        # force of the base link on its children, plus its own weight
         origin = pin.Force.Zero()
         for child in range(1, model.njoints):
             if model.parents[child] == 0:
@@ -224,16 +224,16 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_ba
         own = robot.model.inertias[1]
         f_own = -own.mass * np.array(model.gravity.linear)
         origin += pin.Force(f_own, np.cross(own.lever, f_own))
-        # the links that pin welds into the world keep their weight out of data.f; robot.inertias[1]
-        # holds them all
+        # data.f does not include the weight of links that Pinocchio fixes to the world;
+        # robot.inertias[1] includes all of them
         wrench = dynamics.forces_from_torques(eom)(tau)
         assert np.allclose(R.T @ wrench[:3], origin.linear, atol=1e-7)
         assert np.allclose(R.T @ wrench[3:], origin.angular, atol=1e-7)
 
 
 def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() -> None:
-    """§1: fixed bases are fully actuated. η of a bolted robot is onto the joints; of a standing one
-    it is not.
+    """Section 1: a fixed base is fully actuated. η reaches all joint accelerations when the robot
+    is fixed, but not when it stands.
     """
     state = judges.load("go2").standing()
     bolted = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base")]))
@@ -259,9 +259,7 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
 
 
 def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Robot) -> None:
-    """(6) by central differences of J(q) v with v fixed, on states that neither roll nor stand, on
-    leaning grounds.
-    """
+    """Eq. (6) by central differences of J(q) v with fixed v, at random states on slopes."""
     rng = np.random.default_rng(0)
     for seed in range(20):
         q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
@@ -313,7 +311,7 @@ def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(
     linear, angular = world_acceleration(state, qdd)
     assert np.allclose(linear, 2.0 / 3.0 * G * np.sin(slope) * down, atol=1e-10)
     assert np.allclose(angular, [0.0, 2.0 / 3.0 * G * np.sin(slope) / R_DISC, 0.0], atol=1e-9)
-    # friction takes the third that gravity does not give, up the slope
+    # friction acts up the slope with the remaining third
     assert np.allclose(
         force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9
     )
@@ -323,8 +321,9 @@ def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(
 def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
     disc: Robot, lean: float, radius: float
 ) -> None:
-    """Steady motion with angle α between disc and ground, centre on a circle of radius b: Ω² = 4 g
-    cot α / (6 b + r cos α).
+    """Steady rolling at angle α between disc and ground, with the centre on a circle of radius b.
+
+    The rate is Ω² = 4 g cot α / (6 b + r cos α).
     """
     rate = np.sqrt(4.0 * G / np.tan(lean) / (6.0 * radius + R_DISC * np.cos(lean)))
     out, along = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -346,7 +345,7 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
     assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
     faster = state.replace(
         v=1.2 * state.v
-    )  # at another rate the circle is not kept: the lean changes
+    )  # at another rate the lean changes, and the path is not a circle
     assert (
         np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular)
         > 1.0
@@ -354,11 +353,10 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
 
 
 def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) -> None:
-    """Roll, turn, roll back, turn back: never a slip, and in the end the disc stands beside where
-    it was, nothing else changed.
+    """Roll, turn, roll back, turn back: without any slip the disc ends beside its first position.
 
-    Straight there it may not go. So the same place is reached or refused by the way, which no φ(q)
-    = 0 can tell apart.
+    The disc cannot go there directly. Whether it can reach this place depends on the path, which no
+    position constraint φ(q) = 0 can express.
     """
     wheel, turn, way = wheel_of_the_disc(), 0.7, 0.5
 
@@ -394,9 +392,9 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) 
 def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(
     cart: Robot,
 ) -> None:
-    """The height of the centre, r √(1 - (n·a)²), is a position constraint; its derivative is the
-    normal row. The curl of the tangential rows is not zero on the motions they allow (Frobenius),
-    so no position constraint stands behind them.
+    """The height of the centre, r √(1 - (n·a)²), is a position constraint with the normal row as
+    its derivative. The curl of the tangential rows is not zero on the allowed motions (Frobenius),
+    so they are not the derivative of any position constraint.
     """
     rng = np.random.default_rng(4)
     q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.4, 0.4, cart.nv))
@@ -410,8 +408,9 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
     assert np.allclose(judges.jacobian_of(height, state)[0], n @ wheel.jacobian(state), atol=1e-8)
 
     def bracket(contact: object) -> float:
-        """Largest A [X, Y] over pairs of constant allowed directions: what a small parallel-parking
-        loop gains, per area.
+        """Return the largest A [X, Y] over pairs of constant allowed directions.
+
+        It is the gain of a small parallel-parking loop per area.
         """
         N = linear_algebra.null_space(contact.constraint(state)[0])
         gains = []
@@ -424,7 +423,9 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
         return max(gains)
 
     def lie(x: Array, y: Array) -> Array:
-        """Lie bracket of two body-fixed directions: se(3) for the free flyer, zero for joints."""
+        """Compute the Lie bracket of two body-fixed directions: se(3) for the free flyer, else
+        zero.
+        """
         out = np.zeros(cart.nv)
         out[:6] = (pin.Motion(x[:3], x[3:6]) ^ pin.Motion(y[:3], y[3:6])).vector
         return out

@@ -1,6 +1,4 @@
-"""Contacts: Jacobians against MuJoCo, drifts by finite differences, how they are named, chosen and
-stacked.
-"""
+"""Contacts: Jacobians against MuJoCo, drifts by finite differences, names, selection, stacking."""
 
 from __future__ import annotations
 
@@ -24,7 +22,7 @@ name = judges.every_floating_robot
 
 
 def tilted(name: str, seed: int) -> fb.Contacts:
-    """A robot's stance on grounds that lean every which way."""
+    """Make a robot's contacts on grounds with random inclinations."""
     robot = judges.load(name)
     normals = judges.random_normals(len(robot.feet), seed)
     make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
@@ -37,7 +35,7 @@ def owners(contacts: fb.Contacts) -> list[str]:
 
 @dataclass
 class Pad:
-    """A contact of a user's own, compared by ==, which two arrays cannot be."""
+    """A user-defined contact with a == comparison that fails for arrays."""
 
     name: str
     normal: np.ndarray
@@ -110,7 +108,7 @@ def test_b_is_minus_the_change_of_a_v_along_v(name: str) -> None:
 
 
 def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
-    """A ball whose contact rows hold moves its centre by ω × (r n): the closed form of rolling."""
+    """A ball that satisfies its contact rows moves its centre by ω × (r n), as in pure rolling."""
     robot = judges.load("go2")
     n = judges.random_normals(1, 4)[0]
     contact = PointContact("FL_foot", n, 0.7, 0.05)
@@ -156,7 +154,7 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None
 
 @pytest.mark.parametrize("name", judges.FLAT)
 def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name: str) -> None:
-    """Why a flat foot is 6 rows: J q̈ = -J̇ q̇ at the corners has no solution where the foot turns."""
+    """A flat foot needs 6 rows: at the corners, J q̈ = -J̇ q̇ has no solution if the foot turns."""
     state = judges.load(name).random_state(0, spread=1.0)
     contact = next(iter(judges.stance(state.robot)))
     J = contact.jacobian(state)

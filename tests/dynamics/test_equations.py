@@ -1,5 +1,6 @@
-"""(1)(4)(7): inertia, bias force and acceleration, judged by MuJoCo and by Pinocchio's recursive
-algorithm.
+"""Eqs. (1), (4), (7): inertia, bias force and acceleration.
+
+MuJoCo and Pinocchio's recursive algorithm give the expected results.
 """
 
 from __future__ import annotations
@@ -67,9 +68,7 @@ def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algo
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_torques_cannot_move_the_centre_of_mass_or_turn_the_robot_in_free_fall(name: str) -> None:
-    """ẍ_c = g by differences, and no angular momentum about the centre of mass, whatever the joints
-    do.
-    """
+    """For any joint motion, ẍ_c = g by differences, and the angular momentum stays zero."""
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         eom = fb.equations_of_motion(state, fb.Contacts.none())
@@ -104,8 +103,8 @@ def test_rotor_inertia_counts() -> None:
 
 @pytest.mark.parametrize("name", fb.catalogue())
 def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name: str) -> None:
-    """(8): pushing with unit forces one by one, the contact points accelerate by the columns of J
-    M⁻¹ Jᵀ.
+    """Eq. (8): unit forces, one at a time, accelerate the contact points by the columns of J M⁻¹
+    Jᵀ.
     """
     state = judges.states(name, 1)[0]
     contacts = (
@@ -128,3 +127,11 @@ def test_matrices_are_computed_on_first_use_and_can_be_replaced() -> None:
     assert heavy.J is eom.J and heavy.b is eom.b
     with raises(TypeError, "mass"):
         replace(eom, mass=2.0)
+
+
+def test_tau_and_forces_have_the_size_of_the_matrices_that_were_given() -> None:
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    other = replace(eom, S=np.eye(eom.nv), J=eom.J[:3])
+    assert (other.d, other.k) == (eom.nv, 3)
+    assert other.acceleration(np.ones(eom.nv), np.zeros(3)).shape == (eom.nv,)

@@ -1,5 +1,6 @@
-"""App. A: h taken apart, judged by MuJoCo without gravity, finite differences, energy; straight
-paths seen turning.
+"""App. A: the parts of h, and straight paths seen from a rotating frame.
+
+MuJoCo without gravity, finite differences and the energy give the expected results.
 """
 
 from __future__ import annotations
@@ -39,14 +40,14 @@ def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name: str
 def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(
     name: str,
 ) -> None:
-    """MuJoCo's own forces: of a free joint the linear velocity is in the world's axes, the angular
-    one in the base's.
+    """In MuJoCo, the linear velocity of a free joint is in world axes, and the angular velocity in
+    the axes of the base.
     """
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.gravity[:] = 0.0
     for state in judges.states(name, N, spread=1.0):
         raw = judge.move_to(state).data.qfrc_bias
-        to_raw = judge.T.copy()  # of velocities in our order to MuJoCo's
+        to_raw = judge.T.copy()  # maps velocities from our order to MuJoCo's
         if state.robot.is_floating:
             R = state.frame_pose("base").rotation
             to_raw[:3, :3], to_raw[3:6, 3:6] = np.eye(3), R.T
@@ -56,8 +57,8 @@ def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_
 def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(
     name: str,
 ) -> None:
-    """p̈ of the base, in the world, when h alone acts: M q̈ = -h in the base's axes, T ᵀ M T u̇ =
-    -h in the world's.
+    """World acceleration of the base if h alone acts: M q̈ = -h in base axes, Tᵀ M T u̇ = -h in
+    world axes.
     """
     for state in judges.states(name, N, spread=1.0):
         own, world = bias_forces(state), bias_forces(state, axes="world")
@@ -82,8 +83,8 @@ def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bo
 
 
 def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axes() -> None:
-    """A base that glides is the artefact: the base's axes count m ω × v, the world's only what
-    tumbles.
+    """The force on a gliding base is an artefact of its axes: base axes add m ω × v, while world
+    axes leave only the effect of tumbling.
     """
     state = judges.load("go2").random_state(5)
     mass, v = state.robot.mass, np.zeros(18)
@@ -99,7 +100,7 @@ def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axe
 
 
 def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None:
-    """Judged by MuJoCo's own potential energy."""
+    """MuJoCo computes the potential energy."""
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
 
@@ -124,7 +125,7 @@ def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grow
 
 
 def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str) -> None:
-    """Σ_{i<j} of what i and j feel together and not alone, by MuJoCo without gravity."""
+    """Sum over i < j of the forces that need both velocities, by MuJoCo without gravity."""
     state = judges.load(name).random_state(4, spread=1.0)
     judge = judges.Mujoco(state.robot)
     judge.model.opt.gravity[:] = 0.0
@@ -158,8 +159,9 @@ def test_inertia_changes_as_finite_differences_along_v_say(name: str) -> None:
 
 
 def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name: str) -> None:
-    """vᵀ (Ṁ - 2 C) v = 0 with Ṁ from differences of M: not for the C of half the velocity, nor for
-    one without a column.
+    """vᵀ (Ṁ - 2 C) v = 0 with Ṁ from differences of M.
+
+    It does not hold for the C of half the velocity, or for C without one column.
     """
     worst = np.zeros(3)
     for state in judges.states(name, N, spread=1.0):
@@ -170,13 +172,14 @@ def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name
         M_rate = judges.derivative(lambda s: s.M, state, state.v, 1e-5)
         found = [state.v @ (M_rate - 2.0 * each) @ state.v for each in (C, 0.5 * C, wrong)]
         worst = np.maximum(worst, np.abs(found) / power)
-    assert worst[0] < 1e-8  # the differences leave 2e-10
+    assert worst[0] < 1e-8  # finite differences have an error of 2e-10
     assert np.all(worst[1:] > 1e-3)
 
 
 def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
-    """go2 whirls its legs for 0.2 s under fictitious forces alone: energy moves between joints and
-    base, none is lost.
+    """go2 moves its legs for 0.2 s under fictitious forces alone.
+
+    Energy moves between joints and base, but the total is constant.
     """
     state = judges.load("go2").random_state(5, spread=1.0)
     state = state.replace(v=8.0 * state.v)
@@ -196,11 +199,11 @@ def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
     assert np.ptp(joints) > 0.3 * joints[0]
 
 
-# a particle seen from a turning frame
+# a particle seen from a rotating frame
 
 
 def wandering(t: float) -> np.ndarray:
-    """An angular velocity that changes in size and direction, rad/s."""
+    """Return an angular velocity that changes in size and direction [rad/s]."""
     return np.array([np.sin(2.0 * t), 1.5 + 0.5 * t, np.cos(3.0 * t)])
 
 
@@ -222,7 +225,7 @@ def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> No
         view.centrifugal,
         view.coriolis,
         view.euler,
-    ):  # leaving one out would not explain it
+    ):  # two of the three terms are not enough
         assert np.max(np.abs(term)) > 0.5
 
 
@@ -243,8 +246,8 @@ def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
 
 
 def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns_evenly() -> None:
-    """p' = (r cos ωt, -r sin ωt): Coriolis pulls inward twice as hard as centrifugal pushes
-    outward.
+    """p' = (r cos ωt, -r sin ωt): the inward Coriolis acceleration is twice the outward centrifugal
+    acceleration.
     """
     time = np.linspace(0.0, 5.0, 101)
     r, w = 0.8, 1.3

@@ -1,6 +1,4 @@
-"""What contacts and equations of motion refuse: the type of each error, and the names and numbers
-in it.
-"""
+"""Errors of contacts and equations of motion: their types, and the names and numbers in them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""ζ, η, C, B and their spaces (8)-(14)(16)(17): counted, solved and measured by others.
+"""ζ, η, C, B and their spaces, eqs. (8)-(14), (16), (17).
 
-Counts come from MuJoCo's matrices and elimination with complete pivoting, forces from Pinocchio's
-constrained dynamics and from MuJoCo's contacts.
+Ranks come from MuJoCo's matrices and elimination with complete pivoting. Forces come from
+Pinocchio's constrained dynamics and from MuJoCo's contacts.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from floatbase.robots import Foot
 
 
 def stances(name: str) -> list[fb.Contacts]:
-    """Every subset of a robot's feet as points, and as flat feet where they are; no contacts for a
-    robot without feet.
+    """Make every subset of a robot's feet as points, and as flat feet if they are flat.
+
+    A robot without feet gets no contacts.
     """
     robot = judges.load(name)
     frames = [foot.frame for foot in robot.feet]
@@ -38,7 +39,7 @@ def stances(name: str) -> list[fb.Contacts]:
 
 
 def straight(name: str) -> fb.State:
-    """Standing posture with every knee straight."""
+    """Return the standing posture with every knee straight."""
     robot = judges.load(name)
     q = np.array(robot.posture)
     for joint in robot.joint_names:
@@ -49,8 +50,9 @@ def straight(name: str) -> fb.State:
 
 @cache
 def clear_states(name: str, n: int) -> list[fb.State]:
-    """n random states where every stance has its rank beyond doubt: no singular value near what
-    contacts resolve, 1e-4.
+    """Draw n random states in which the rank of every stance is clear.
+
+    No singular value is near the limit 1e-4 below which a direction is not resolved.
     """
 
     def clear(state: fb.State) -> bool:
@@ -66,7 +68,7 @@ def clear_states(name: str, n: int) -> list[fb.State]:
 
 
 def configurations(name: str) -> dict[str, fb.State]:
-    """Standing, straight knees, all joints at zero, and two random ones."""
+    """Return standing, straight knees, all joints at zero, and two random configurations."""
     robot = judges.load(name)
     random = {f"random {i}": state for i, state in enumerate(clear_states(name, 2))}
     return {
@@ -79,7 +81,7 @@ def configurations(name: str) -> dict[str, fb.State]:
 
 @cache
 def cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
-    """Every configuration × every stance of a robot."""
+    """Combine every configuration with every stance of a robot."""
     return [
         (f"{name} {where} on {contacts.names}", fb.equations_of_motion(state, contacts))
         for where, state in configurations(name).items()
@@ -88,8 +90,9 @@ def cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
 
 
 def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
-    """Rank by Gaussian elimination with complete pivoting, rows scaled to unit length: no singular
-    values.
+    """Compute a rank by Gaussian elimination with complete pivoting, without singular values.
+
+    The rows are scaled to unit length.
     """
     A = np.array(A, dtype=np.float64)
     lengths = np.linalg.norm(A, axis=1, keepdims=True)
@@ -108,7 +111,7 @@ def eliminated(A: npt.ArrayLike, tolerance: float = 1e-8) -> int:
 
 
 def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """M and J from MuJoCo."""
+    """Return M and J from MuJoCo."""
     judge = judges.mujoco_of(eom.robot.name).move_to(eom.state)
     owners = [
         contact.name for contact in eom.contacts.friction_contacts for _ in contact.point_names
@@ -119,14 +122,14 @@ def judged(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 
 def held(eom: EquationsOfMotion) -> EquationsOfMotion:
-    """The same with the velocity nearest to its own that the contacts allow: A v = 0."""
+    """Return the equations at the nearest velocity that the contacts allow, A v = 0."""
     v = eom.state.v - np.linalg.pinv(eom.A, rcond=1e-9) @ (eom.A @ eom.state.v)
     return fb.equations_of_motion(eom.state.replace(v=v), eom.contacts)
 
 
 @cache
 def held_cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
-    """`cases`, in motion that the contacts allow."""
+    """Return `cases` with velocities that the contacts allow."""
     return [(case, held(eom)) for case, eom in cases(name)]
 
 
@@ -160,8 +163,8 @@ def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: 
 
 @pytest.mark.parametrize("name", judges.KINDS)
 def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(name: str) -> None:
-    """rank V_q̈ = d - rank J + rank J_b, and it is the number of accelerations that torques reach
-    with the contacts held.
+    """rank V_q̈ = d - rank J + rank J_b is the number of accelerations that torques can produce
+    while the contacts hold.
     """
     for case, eom in cases(name):
         M, J = judged(eom)
@@ -176,8 +179,8 @@ def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(nam
 def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(
     name: str,
 ) -> None:
-    """k - rank J_b from geometry alone: points that are one, on a line, or not leave 3, 5 or 6 ways
-    to push a rigid body.
+    """k - rank J_b from geometry alone: one point, points on a line, and other points have 3, 5 or
+    6 independent wrenches on a rigid body.
     """
     for case, eom in cases(name):
         points = eom.contacts.positions(eom.state)
@@ -195,8 +198,8 @@ def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_g
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -> None:
-    """τ changes by -J_jᵀ λ for an internal λ: the acceleration by Pinocchio's recursion stays what
-    it was.
+    """If τ changes by -J_jᵀ λ for an internal λ, the acceleration by Pinocchio's recursion is the
+    same.
     """
     rng = np.random.default_rng(0)
     for case, eom in cases(name)[:: 3 if name != "talos" else 1]:
@@ -210,7 +213,7 @@ def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -
         assert np.allclose(before, after, atol=1e-7 * max(1.0, np.abs(before).max())), case
         if (
             np.linalg.norm(eom.J.T @ squeeze) > 1.0
-        ):  # one that is not in null(Jᵀ) needs those torques
+        ):  # a squeeze outside null(Jᵀ) needs these torques
             assert np.linalg.norm(judges.aba(eom, tau, forces + squeeze) - before) > 1e-2, case
 
 
@@ -238,8 +241,8 @@ def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_els
 
 
 def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_rank() -> None:
-    """The base still moves: 12 contact rows stay independent although each leg's own 3 × 3 Jacobian
-    is singular.
+    """The base can move, so 12 contact rows stay independent, although the 3 × 3 Jacobian of each
+    leg is singular.
     """
     state = judges.load("go2").neutral()  # legs straight down
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
@@ -259,12 +262,13 @@ def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
         assert (
             found.rank_V_qdd == 12 - found.rank_J + 6 == lost
-        )  # how many ways the legs can still move: bent, none
+        )  # independent motions of the legs; none if they are bent
 
 
 def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
-    """solo8 on four feet, 10^-exponent away from where it loses rank, moving with noise of `speed`
-    m/s and rad/s.
+    """Make equations of solo8 on four feet near a loss of rank, with velocity noise.
+
+    The distance is 10^-exponent, and the noise is `speed` [m/s, rad/s].
     """
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
@@ -275,8 +279,8 @@ def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
 
 
 def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_rank() -> None:
-    """A simulated solo8 is never quite symmetric: whatever rank J is said to have, all other
-    numbers must follow from it.
+    """A simulated solo8 is never exactly symmetric. All numbers must be consistent with the rank
+    that J is assigned.
     """
     for exponent in range(1, 13):
         found = dynamics.dimensions(near_singular(exponent))
@@ -288,7 +292,7 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
 def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth() -> (
     None
 ):
-    """A q̈ = b to 1e-10 of |q̈| along the resolved directions, and along the others to their
+    """A q̈ = b holds to 1e-10 of |q̈| along the resolved directions, and along the others to their
     singular value times |q̈|.
     """
     for exponent in range(1, 13):
@@ -303,11 +307,11 @@ def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_te
 
 
 def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
-    """The torques that hold solo8 still at the singular stance: nearby they make the same forces to
+    """The torques that keep solo8 at rest in the singular stance produce the same forces nearby, to
     1 % of the weight.
 
-    To the letter of (9), joint angles off by 1e-6 rad and a velocity off by 0.1 need more than 1e8
-    N.
+    Eq. (9) taken literally needs more than 1e8 N for joint angles off by 1e-6 rad and a velocity
+    off by 0.1.
     """
     robot = judges.load("solo8")
     standing, contacts = robot.standing(), fb.Contacts.points(robot)
@@ -327,13 +331,11 @@ def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
         space = dynamics.feasible_space(eom)
         assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, (
             case
-        )  # the smallest point of all; q̈ in rad/s² is in it
+        )  # the point of smallest norm, which includes q̈ in rad/s²
 
 
 def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank() -> None:
-    """Also for forces along directions that the contacts resolve badly: they act a little, and q̈
-    says so.
-    """
+    """It also holds for forces along poorly resolved directions, which have a small effect on q̈."""
     for exponent in range(1, 13):
         eom = near_singular(exponent, 0.1)
         space = dynamics.feasible_space(eom)
@@ -345,8 +347,8 @@ def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_lo
 
 
 def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_forbid_it() -> None:
-    """A leaning of 1e-4 rad is below what contacts resolve: torques that roll the base meet no wall
-    of 500 N there.
+    """An inclination of 1e-4 rad is below the resolution of the contacts, so torques that roll the
+    base do not meet a reaction of 500 N.
     """
     robot = judges.load("solo8")
     contacts, sim = fb.Contacts.points(robot), fb.Simulation(robot)
@@ -359,13 +361,13 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     assert 1e-6 < s[10] / s[0] < dynamics.CONSTRAINT_RANK_TOLERANCE
     rolling = (
         0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
-    )  # N·m, torques along the badly resolved direction
+    )  # N·m, torques along the poorly resolved direction
     change, rolls = [], []
     motors = [sim.model.joint(joint).dofadr[0] for joint in robot.joint_names]
     sim.data.ctrl[:] = 0.0
     for tau in (run.tau[-1], run.tau[-1] + rolling):
         sim.data.qfrc_applied[motors] = tau
-        for _ in range(3):  # the contact solver starts from its last answer
+        for _ in range(3):  # the contact solver starts from its last solution
             mujoco.mj_forward(sim.model, sim.data)
         change.append(sim.contact_forces())
         rolls.append(sim.data.qacc[3])
@@ -376,7 +378,7 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
     assert (
         np.max(np.abs(found - (change[1] - change[0]))) < 0.3
-    )  # N; lateral shares are what softness decides
+    )  # N; the softness of the contacts decides the lateral forces
     to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
     assert np.max(np.abs(to_the_letter @ np.linalg.solve(eom.M, eom.S @ rolling))) > 100.0
 
@@ -398,7 +400,7 @@ def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_t
 
 
 def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
-    """A thruster is no contact: the rows must hold what the forces act along."""
+    """A thruster is not a contact: its rows must constrain the direction of its force."""
 
     class Thruster(PointContact):
         row_names = ("x", "y")
@@ -418,8 +420,8 @@ def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
 def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(
     name: str, unseen: int
 ) -> None:
-    """ζ answers -J_jᵀ λ with λ for an internal λ, without its part in null(Jᵀ): k - rank J_b - (k -
-    rank J) are left.
+    """For an internal λ, the change -J_jᵀ λ of the torques changes ζ(τ) by λ without its part in
+    null(Jᵀ). This leaves k - rank J_b - (k - rank J) directions.
     """
     state = judges.load(name).standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
@@ -457,8 +459,9 @@ def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name: str) -> 
 
 
 def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tuple[Array, Array]:
-    """q̈ and the contact forces [wrenches] of Pinocchio's constrained forward dynamics,
-    world-aligned, no Baumgarte terms.
+    """Compute q̈ and the contact forces or wrenches by Pinocchio's constrained forward dynamics.
+
+    They are in world axes, without Baumgarte terms.
     """
     robot, models = eom.robot, pin.StdVec_RigidConstraintModel()
     for contact in eom.contacts:
@@ -488,8 +491,8 @@ def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tup
 
 
 def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned() -> None:
-    """The judge's own convention, checked first: its forces, put on the links as external ones,
-    give its accelerations.
+    """Check the convention of the reference first: its forces, applied to the links as external
+    forces, give its accelerations.
     """
     state = judges.load("go2").random_state(0).replace(v=np.zeros(18))
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
@@ -501,8 +504,8 @@ def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_ali
 
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name: str) -> None:
-    """Feet of radius 0 where the balls' centres are, random states and torques, every stance with J
-    of full rank.
+    """Feet of radius 0 at the centres of the balls, random states and torques, and every stance
+    with J of full rank.
     """
     robot = fb.load(
         name, feet=[Foot(foot.frame, 0.0, foot.centre) for foot in judges.load(name).feet]
@@ -526,7 +529,9 @@ def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(n
 
 @pytest.mark.parametrize("name", judges.FLAT)
 def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: str) -> None:
-    """A foot's twelve corner forces are not unique, the six of its wrench are; in motion, too."""
+    """The twelve corner forces of a foot are not unique, but the six numbers of its wrench are,
+    also in motion.
+    """
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
         contacts = fb.Contacts.flat_feet(state.robot)
@@ -547,8 +552,8 @@ def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: st
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str) -> None:
-    """Every configuration and stance, rank lost or not, against one least-squares solve of the
-    whole system.
+    """Every configuration and stance, with and without loss of rank, against one least-squares
+    solution of the whole system.
     """
     rng = np.random.default_rng(0)
     for case, eom in held_cases(name):
@@ -564,8 +569,8 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str
 
 
 def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
-    """§2.2.1: a leg that presses its foot down is pushed up. Torques that make -z at the foot raise
-    λ_z.
+    """Section 2.2.1: a leg that presses its foot down is pushed up. Torques with an effect along -z
+    at the foot increase λ_z.
     """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
@@ -580,8 +585,8 @@ def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
 def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(
     name: str,
 ) -> None:
-    """Measured while swaying at 1 rad/s and 2 cm: 2e-5 of the weight: a rigid contact is a good
-    model of MuJoCo's stiffest.
+    """The difference is 2e-5 of the weight while swaying at 1 rad/s and 2 cm, so a rigid contact is
+    a good model of MuJoCo's stiffest contact.
     """
     robot = judges.load(name)
     standing, contacts = robot.standing(), judges.stance(robot)
@@ -607,8 +612,8 @@ def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> None:
-    """(10)(12) against (7) itself at points that solve nothing: what is left over is the residual,
-    b's part by MuJoCo's M.
+    """Eqs. (10) and (12) against eq. (7) at points that do not solve it: the residuals are equal.
+    The part of b is computed with MuJoCo's M.
     """
     rng = np.random.default_rng(4)
     for case, eom in cases(name):
@@ -644,7 +649,7 @@ def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_
         assert np.allclose(space.map.A @ space.map.A.T, N @ N.T, atol=1e-7), case
         C, a = dynamics.torque_force_matrix(eom)
         pairs = dynamics.torque_force_space(eom)
-        if dynamics.contact_space(eom).r == eom.k:  # C squares what J has small
+        if dynamics.contact_space(eom).r == eom.k:  # C squares the small singular values of J
             N = scipy.linalg.null_space(C, rcond=1e-10)
             assert np.allclose(pairs.A @ pairs.A.T, N @ N.T, atol=1e-6), case
             assert judges.relative(pairs.b, np.linalg.lstsq(C, a, rcond=1e-10)[0]) < 1e-5, case
@@ -655,8 +660,8 @@ def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(name: str) -> None:
-    """(7) to 1e-9 of its largest term, the dynamics by Pinocchio's recursion, in motion that the
-    contacts allow.
+    """Eq. (7) holds to 1e-9 of its largest term in motion that the contacts allow. Pinocchio's
+    recursion computes the dynamics.
     """
     rng = np.random.default_rng(0)
     for case, eom in held_cases(name):
@@ -673,8 +678,8 @@ def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(nam
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
-    """τ drawn at random, q̈ and λ by another solver, any part of null(Jᵀ) added: its coordinates
-    lead back to it.
+    """For a random τ, with q̈ and λ from another solver and any part of null(Jᵀ) added, the
+    coordinates map back to the same point.
     """
     rng = np.random.default_rng(1)
     for case, eom in held_cases(name):
@@ -704,8 +709,8 @@ def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str
 
 
 def test_with_inconsistent_contacts_the_dynamics_hold_and_motion_rows_are_met_nearest() -> None:
-    """solo8 with four feet that slide apart: A q̈ = b has no solution; Newton's law must not pay
-    for that.
+    """solo8 with four feet that slide apart: A q̈ = b has no solution, but Newton's law must still
+    hold.
     """
     state = judges.load("solo8").random_state(3, spread=0.6)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))

@@ -40,8 +40,11 @@ def test_a_push_goes_to_the_left_for_a_tenth_of_a_second() -> None:
     assert record.com[150, 1] - record.com[40, 1] > 1e-3 and record.outcome == "completed"
 
 
-def test_a_note_names_the_dearest_rows_first() -> None:
-    assert multiplier_text(make_controller()(STATE.q, STATE.v).solution) == "no row has a price"
+def test_a_note_names_the_constraints_with_the_largest_multipliers_first() -> None:
+    assert (
+        multiplier_text(make_controller()(STATE.q, STATE.v).solution)
+        == "no constraint has a multiplier above zero"
+    )
     solution = fb.solve(leaning_controller(0.5).qp(STATE))
     note = multiplier_text(solution)
     prices = [float(text) for text in re.findall(r"facet \d ([\d.]+)", note)]

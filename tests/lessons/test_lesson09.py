@@ -167,7 +167,7 @@ def test_one_sole_says_which_rows_are_broken(view: fb.Viewer) -> None:
         wrench = weight.copy()
         wrench[change[0]] = change[1]
         drawn = show_sole(view, STATE, LEFT, limits(), wrench)
-        assert kind in drawn and "the nearest miss it" in drawn
+        assert kind in drawn and "closest forces" in drawn
 
 
 def test_the_slice_is_as_wide_as_the_sole_and_as_high_as_the_twist(view: fb.Viewer) -> None:

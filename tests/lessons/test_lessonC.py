@@ -56,9 +56,9 @@ def test_the_lesson_goes_on_with_an_answer_only_if_it_is_right(
         next(answer for answer, hint in examples if hint == name) for name in ("", "nearest")
     )
     assert answer_or_default("C.2", mine, longest_step) is mine
-    assert "with yours" in capsys.readouterr().out
+    assert "with your answer" in capsys.readouterr().out
     assert answer_or_default("C.2", wrong, longest_step) is longest_step
-    assert "not yet right" in capsys.readouterr().out
+    assert "not right yet" in capsys.readouterr().out
 
 
 # problems in the plane ----------------------------------------------------------------------------
@@ -88,12 +88,12 @@ def test_every_bowl_of_the_game_can_be_solved_by_its_rows_and_by_no_others() -> 
 def test_the_game_tells_what_is_broken_what_pulls_and_what_has_no_point() -> None:
     game = ActiveSetGame([(0.5, -1.0)])
     assert (
-        "table is broken by 1;" in game.message and "0 clicks" in game.message and not game.solved
+        "table is violated by 1;" in game.message and "0 clicks" in game.message and not game.solved
     )
     game.rows["table"].click()
     assert "solved" in game.message and "1 click:" in game.message and game.solved
     game.rows["ramp"].click()
-    assert "ramp pulls: its price is -1.5" in game.message and not game.solved
+    assert "ramp pulls: its multiplier is -1.5" in game.message and not game.solved
     game.rows["roof"].click()
     assert "no point" in game.message and not game.solved
     assert (
@@ -207,14 +207,16 @@ def test_a_push_goes_where_it_is_sent() -> None:
 
 
 def test_pictures_show_what_they_are_given() -> None:
-    assert "does not touch" in show_table(1.0) and "price of the row: <b>3</b>" in show_table(-1.5)
+    assert "does not touch" in show_table(
+        1.0
+    ) and "multiplier of the constraint: <b>3</b>" in show_table(-1.5)
     edges = hexagon_table()
     ways = [(np.zeros(2), []), (np.array([1.0, 0.0]), [0])]
-    assert "on: no row" in show_solver_path(edges, ways, 0) and "on: edge 0" in show_solver_path(
-        edges, ways, 1
-    )
+    assert "on: no constraint" in show_solver_path(
+        edges, ways, 0
+    ) and "on: edge 0" in show_solver_path(edges, ways, 1)
     between = show_solver_path(edges, ways, 0.5)
-    assert "on: no row" in between and between != show_solver_path(edges, ways, 0)
+    assert "on: no constraint" in between and between != show_solver_path(edges, ways, 0)
     assert rounded(edges.objective(np.array([0.5, 0.0])), digits=3) in between
     problem: Any = plot_problem(edges, (1.5, 0.0))
     assert problem.lines[-1].get_xydata().tolist() == [[1.5, 0.0]]

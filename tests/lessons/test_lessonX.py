@@ -248,7 +248,7 @@ def test_pictures_of_a_box() -> None:
         play_box(view, box)
     finally:
         view.close()
-    assert told.endswith("(7) misses 0 N on the base") and later != told
+    assert told.endswith("0 N is missing in (7) on the base") and later != told
     drawn = draw_torque_comparison(box, lost[:, 6:], 8, 46.0)
     assert "RL_calf_joint" in drawn and drawn.count("<polyline") == 2 and "46 ms late" in drawn
     ticks = [float(tick) for tick in re.findall(r'text-anchor="end">([-\d.]+)<', drawn)]

@@ -197,7 +197,7 @@ def test_the_handle_pushes_where_it_points(
 
 def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(panel: Pushed) -> None:
     panel.push.click()
-    assert panel.line.value == "a push of 0 N: set how hard first"
+    assert panel.line.value == "The push is 0 N. Set the force first."
     assert panel.run.status == "paused"
     panel.force.value = 20.0
     until(lambda: panel.arrow is not None)
@@ -236,7 +236,7 @@ def test_a_reset_shows_what_the_run_does_and_no_old_word(panel: Pushed) -> None:
     panel.buttons["reset"].click()
     assert panel.line.value == "running"
     panel.push.click()
-    assert panel.line.value == "a push of 0 N: set how hard first"
+    assert panel.line.value == "The push is 0 N. Set the force first."
     panel.buttons["reset"].click()
     assert panel.line.value == "running"
 

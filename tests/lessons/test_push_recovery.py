@@ -86,7 +86,7 @@ def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float
 
 
 def test_lessons_without_a_rose_are_told() -> None:
-    with pytest.raises(InputError, match="no push rose"):
+    with pytest.raises(InputError, match="no push-recovery map"):
         measured_push_recovery("00")
     with pytest.raises(InputError, match="no controller to push"):
         controller_factory("00")

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +95,7 @@ def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_ag
     progress.append("99.1", {"tries": 1, "right": 1})  # of another course
     hand_in("Ada")
     said = capsys.readouterr().out
-    assert "1 of" in said and "your answers to 00.1: check them once more" in said
+    assert "1 of" in said and "your answers to 00.1. Check them once more" in said
     check("00.1", LIFTED)
     hand_in("Ada")
     assert "once more" not in capsys.readouterr().out
@@ -150,7 +152,7 @@ NO_FILE = (
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
 def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
     (learner / "a.json").write_text(text)
-    with pytest.raises(InputError, match="is not a file that hand_in"):
+    with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
     with pytest.raises(InputError, match="cannot be read"):
         grades.grade_file(learner / "none.json")
@@ -170,23 +172,55 @@ def test_nothing_to_hand_in_no_name_and_no_place_are_told(learner: Path) -> None
 
 def test_a_class_is_one_table(learner: Path) -> None:
     check("00.1", LIFTED)
-    files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1")]
+    files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1", "a;=2")]
     (learner / "holiday.json").write_text("{}")
     command = [sys.executable, "-m", "floatbase.lessons.publish", "grade", "holiday.json"]
     said = subprocess.run(
-        [*command, *files, "--table", "marks.csv"], capture_output=True, text=True, check=True
+        [*command, *files, "--table", "marks.csv"], capture_output=True, text=True
     )
+    assert said.returncode == 1  # a file could not be read
     assert (
-        said.stdout.count("1 of ") == 3
+        said.stdout.count("1 of ") == 4
         and "Émilie du Châtelet" in said.stdout
-        and "holiday.json is not a file" in said.stderr
+        and "holiday.json was not written" in said.stderr
     )
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
-    assert len(rows) == 3 * len(all_exercises())
+    assert len(rows) == 4 * len(all_exercises())
     assert {row["file"] for row in rows} == {Path(file).name for file in files}
-    assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1"}
-    with pytest.raises(InputError, match="No file is left to judge"):
+    assert {row["name"] for row in rows} == {"Ada", "Émilie du Châtelet", "'=1+1", "a,=2"}
+    with pytest.raises(InputError, match="There is no file to grade"):
         grades.grade_files([learner / "holiday.json"])
+
+
+def test_a_pipe_or_a_device_among_the_files_is_reported(
+    learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    check("00.1", LIFTED)
+    os.mkfifo(learner / "pipe.json")
+    (learner / "zero.json").symlink_to("/dev/zero")
+    good = hand_in("Ada")
+    found, unread = grades.grade_files([learner / "pipe.json", learner / "zero.json", good])
+    assert [one.name for one in found] == ["Ada"] and unread == 2
+    assert {"pipe.json", "zero.json"} <= {
+        Path(line.split()[0]).name for line in capsys.readouterr().err.splitlines()
+    }
+
+
+def test_of_two_files_of_a_learner_the_last_one_in_time_counts(learner: Path) -> None:
+    check("00.1", LIFTED)
+    files = []
+    for time in ("2026-05-02T10:00:00+00:00", "2026-05-01T10:00:00+00:00"):
+        data = json.loads(hand_in("Ada").read_text()) | {"time": time}
+        files.append(learner / f"{time[:10]}.json")
+        files[-1].write_text(json.dumps(data))
+    noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
+    for options, kept in (
+        ({}, {"2026-05-01.json", "2026-05-02.json"}),
+        ({"latest": True}, {"2026-05-02.json"}),
+        ({"latest": True, "before": noon}, {"2026-05-01.json"}),
+    ):
+        found, _ = grades.grade_files(files, **options)
+        assert {one.file for one in found} == kept
 
 
 def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:

@@ -69,7 +69,9 @@ def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> No
     claims = new_code_cell(
         "assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}}
     )
-    question.outputs = [new_output("stream", text="00.a: skipped. Running on is fine.")]
+    question.outputs = [
+        new_output("stream", text="00.a: skipped. You can go on without a prediction.")
+    ]
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
     prepare_workspace(course)
     copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells
@@ -104,7 +106,7 @@ def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
     write(folders[0] / LESSON, "first = 'my answer'")
     write(course / LESSON, "first = 2")
     assert prepare_workspace(course, folders[0]) == [
-        f"{LESSON}: yours is kept; the course's new text is in {NEW}"
+        f"{LESSON}: your copy is kept; the new text is in {NEW}"
     ]
     assert prepare_workspace(course, folders[1]) == [f"{LESSON}: updated"]
     assert not (course / MY_FOLDER).exists()
@@ -113,7 +115,7 @@ def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
 def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
-        match=r"there are no lessons in .*notebooks\. Install floatbase from its repository",
+        match=r"There are no lessons in .*notebooks\. Install floatbase from its repository",
     ):
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
@@ -134,7 +136,7 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
         update(mine.parent, n)
         if forget:
             (mine / ".from.json").unlink()
-        assert f"{LESSON}: yours is kept; the course's new text is in {name}" in prepare_workspace(
+        assert f"{LESSON}: your copy is kept; the new text is in {name}" in prepare_workspace(
             mine.parent
         )
         assert source(mine / name) == f"first = {n}"
@@ -260,14 +262,14 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_what_stands_in_the_way_of_one_file_is_told_and_the_others_are_brought_up_to_date(
+def test_what_stands_in_the_way_of_one_file_is_reported_and_the_others_are_updated(
     mine: Path, obstacle: str
 ) -> None:
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
     for _ in range(2):
-        (told,) = [line for line in prepare_workspace(mine.parent) if "not brought" in line]
+        (told,) = [line for line in prepare_workspace(mine.parent) if "not updated" in line]
         assert told.startswith((f"{LESSON}: ", ".from.json: "))
     assert files(mine) - before <= {NEW, "01_b.new.ipynb", "page.new.md"}
     texts = {path.read_text() for path in mine.glob("page*.md")}
@@ -294,11 +296,11 @@ def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> N
 @pytest.mark.parametrize(
     "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
 )
-def test_a_folder_that_cannot_be_is_told_in_words(
+def test_a_folder_that_cannot_be_created_is_reported(
     course: Path, make: Callable[[Path], object]
 ) -> None:
     make(course / MY_FOLDER)
-    with pytest.raises(InputError, match="must be a folder"):
+    with pytest.raises(InputError, match="can write to"):
         prepare_workspace(course)
 
 
@@ -317,7 +319,7 @@ def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) ->
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the record, none for the lesson
-        assert "not brought up to date: File too large" in prepare_workspace(mine.parent)[0]
+        assert "not updated: File too large" in prepare_workspace(mine.parent)[0]
     assert source(mine / LESSON) == "first = 1"
     assert files(mine) == {LESSON, "01_b.ipynb", "page.md"}
     write(mine / LESSON, "first = 'my answer'")

@@ -1,6 +1,4 @@
-"""The centre of mass steered by forces (20)-(25), judged by momentum that MuJoCo and Pinocchio
-compute, and by cvxpy.
-"""
+"""Centroidal dynamics, eqs. (20)-(25), against momentum from MuJoCo and Pinocchio, and cvxpy."""
 
 from __future__ import annotations
 
@@ -35,8 +33,8 @@ name = judges.every_floating_robot
 
 
 def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:
-    """Linear momentum and angular momentum about the centre of mass of the whole robot in MuJoCo,
-    world, shape (6,).
+    """Compute MuJoCo's linear and angular momentum about the centre of mass, world frame, shape
+    (6,).
     """
     judge.data.qpos[:], judge.data.qvel[:] = qpos, qvel
     mujoco.mj_fwdPosition(judge.model, judge.data)
@@ -49,10 +47,8 @@ def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:
 def mujocos_momentum_rate(
     state: fb.State, contacts: fb.Contacts, forces: Array, tau: Array
 ) -> tuple[Array, Array]:
-    """d/dt of MuJoCo's momentum when forces act at the contact points and torques on the joints, no
-    ground: differences.
-
-    And q̈ of MuJoCo, in our coordinates.
+    """Differentiate MuJoCo's momentum under forces at the contact points and joint torques, without
+    ground. Return MuJoCo's q̈ in our coordinates, too.
     """
     judge = judges.Mujoco(state.robot).move_to(state)
     model, data = judge.model, judge.data
@@ -76,15 +72,15 @@ def mujocos_momentum_rate(
         there = qpos.copy()
         mujoco.mj_integratePos(model, there, qvel, sign * dt)
         ends.append(mujocos_momentum(judge, there, qvel + sign * dt * qacc))
-    # qacc = T q̈ + Ṫ v, where the base's velocity is constant in the base frame and turns in the
+    # qacc = T q̈ + Ṫ v, where the base velocity is constant in the base frame and turns in the
     # world: Ṫ v = R (ω × v)
     qacc[:3] -= judges.quaternion_rotation(state.q[3:7]) @ np.cross(state.v[3:6], state.v[:3])
     return (ends[0] - ends[1]) / (2.0 * dt), np.linalg.solve(judge.T, qacc)
 
 
 def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
-    """In motion, under random forces and torques; the rate against differences of MuJoCo's momentum
-    along MuJoCo's motion.
+    """In motion, under random forces and torques. The rate is compared with differences of MuJoCo's
+    momentum along MuJoCo's motion.
     """
     rng = np.random.default_rng(2)
     for state in judges.states(name, 3):
@@ -98,13 +94,13 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
         )
         still = objectives.centroidal_momentum_rate(
             state, np.zeros(state.robot.nv)
-        )  # q̇ carries the momentum along, too
+        )  # the motion q̇ changes the momentum, too
         assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
 
 
 def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> None:
-    """(20)(21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i; no points give a matrix
-    without columns.
+    """Eqs. (20), (21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i. Without points, the
+    matrix has no columns.
     """
     rng = np.random.default_rng(0)
     points, about, forces = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
@@ -120,8 +116,8 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
 def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravity(
     name: str,
 ) -> None:
-    """Σ f = ṗ - m g and Σ (x_i - x_c) × f_i = L̇, in motion, joint torques or not: they are
-    internal.
+    """Σ f = ṗ - m g and Σ (x_i - x_c) × f_i = L̇ in motion, with and without joint torques, since
+    these are internal.
     """
     rng = np.random.default_rng(0)
     for seed, state in enumerate(judges.states(name, 2)):
@@ -139,8 +135,8 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
 def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would_roll_it_left() -> (
     None
 ):
-    """(x_i - x_c) × f_i: up at y > 0 turns about +x. Footnote 10 of the course text prints x_c -
-    x_i, the other way.
+    """By (x_i - x_c) × f_i, an upward force at y > 0 turns about +x. Footnote 10 of the course text
+    prints x_c - x_i, which has the opposite sign.
     """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
@@ -158,7 +154,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would
 
 
 def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name: str) -> None:
-    """(20) prints three blocks for four feet."""
+    """Eq. (20) is printed with three blocks for four feet."""
     contacts = judges.stance(judges.load(name))
     G_f = objectives.net_force_matrix(contacts)
     assert G_f.shape == (3, 3 * contacts.n_points)
@@ -182,8 +178,8 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
 
 
 def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name: str) -> None:
-    """(22) is zero at its minimum on a full stance, and forces that attain it move CoM and momentum
-    as desired.
+    """On a full stance, the minimum of eq. (22) is zero, and the minimizing forces produce the
+    desired motion of centre of mass and momentum.
     """
     rng = np.random.default_rng(0)
     for state in judges.states(name, 3):
@@ -200,8 +196,8 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name:
 
 
 def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
-    """(22) adds N² and (N·m)²: counted in N·mm, a moment weighs a million times as much. solo8
-    cannot push sideways alone.
+    """Eq. (22) adds N² and (N·m)². In N·mm, a moment has a million times the weight. solo8 cannot
+    push sideways without a moment.
     """
     state = judges.load("solo8").standing()
     contacts = fb.Contacts.points(state.robot)
@@ -222,7 +218,7 @@ def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
 
 
 def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
-    """On one foot and on two, six numbers cannot all be had: the minimum is above zero."""
+    """One or two feet cannot produce all six numbers, so the minimum is above zero."""
     rng = np.random.default_rng(0)
     state = judges.load("go2").standing()
     for feet in (1, 2, 4):
@@ -243,7 +239,7 @@ def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
 
 
 def split(f: Array, n: Array) -> tuple[float, float]:
-    """Tangential and signed normal size of a force, by trigonometry instead of projectors."""
+    """Return tangential and signed normal size of a force, by trigonometry, not projectors."""
     normal = float(f @ n)
     return float(np.sqrt(max(0.0, f @ f - normal**2))), normal
 
@@ -264,7 +260,9 @@ def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_fr
 
 
 def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() -> None:
-    """(22) + w (23): what §3.1.1 is for. Without the bias six directions cost nothing."""
+    """Eq. (22) plus w times eq. (23), the purpose of section 3.1.1: without the bias, six
+    directions have no cost.
+    """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
     wrench = objectives.wrench_objective(
@@ -310,8 +308,8 @@ def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(
 @pytest.mark.parametrize("seed", [None, 0, 1])
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: int | None) -> None:
-    """min ½‖τ‖² over (q̈, τ) with (7) and λ given; a force that solo8 can give is drawn from what
-    random torques give.
+    """Minimize ½‖τ‖² over (q̈, τ) with eq. (7) and given λ. Random torques produce the forces that
+    solo8 can reach.
     """
     rng = np.random.default_rng(0)
     eom = judges.at_rest(name, seed)
@@ -323,7 +321,7 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
     qdd = judges.aba(eom, tau, expected)
     assert np.max(np.abs(eom.A @ qdd - eom.b)) < 1e-6 * max(1.0, np.abs(qdd).max())
     assert np.linalg.norm(tau) <= np.linalg.norm(tau0) * (1 + 1e-9)
-    # (25) about τ0, whose torques change by dtau with the forces held
+    # eq. (25) about τ0, whose torques change by dtau at constant forces
     Q = np.linalg.svd(eom.A, full_matrices=False)
     rows = Q[2][: linear_algebra.rank(eom.A)]
     x = cp.Variable(eom.d)
@@ -347,14 +345,14 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
     assert np.allclose(
         found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8
-    )  # the smallest has none of them
+    )  # the smallest torques have no part of them
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
 def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(
     exponent: int,
 ) -> None:
-    """solo8 almost symmetric with 0.1 rad/s of noise: (25) taken to the letter needs hundreds of
+    """solo8 is nearly symmetric with 0.1 rad/s of noise. Eq. (25) taken literally needs hundreds of
     N·m and more.
     """
     standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
@@ -403,7 +401,7 @@ def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
 
 
 def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
-    """What `TorquesFromForces` gives for d < k: min ‖J q̈ - b‖ with that λ, then the least τ."""
+    """For d < k, `TorquesFromForces` minimizes ‖J q̈ - b‖ with this λ, and then τ."""
     eom = judges.at_rest("solo8", 0)
     desired = 10.0 * np.random.default_rng(3).normal(size=12)
     x = cp.Variable(8)

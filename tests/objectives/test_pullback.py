@@ -1,4 +1,4 @@
-"""Costs moved between spaces (15)(18)(19), against direct minimisation over all of (q̈, τ, λ)."""
+"""Pullbacks of costs, eqs. (15), (18), (19), against direct minimization over all of (q̈, τ, λ)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def sizes(eom: EquationsOfMotion) -> dict[str, int]:
 
 
 def costs(eom: EquationsOfMotion, seed: int = 0) -> dict[str, tuple[Array, Array]]:
-    """A residual (A, r) on each block, random, square and well conditioned."""
+    """Draw a residual (A, r) on each block, random, square and well conditioned."""
     rng = np.random.default_rng(seed)
     weight = {"qdd": 1.0, "tau": 0.3, "forces": 0.1}
     found = {}
@@ -41,11 +41,10 @@ def least(
     residuals: dict[str, tuple[Array, Array]],
     fixed: dict[str, Array] | None = None,
 ) -> float:
-    """The smallest sum of ½‖A x - r‖² over all (q̈, τ, λ) with (7), some blocks held, by its
-    optimality conditions.
+    """Minimize the sum of ½‖A x - r‖² over all (q̈, τ, λ) with eq. (7) and some fixed blocks.
 
-    Stationarity and feasibility are solved as one linear system and checked: where they hold, a
-    convex cost has its minimum.
+    Stationarity and feasibility are solved as one linear system and checked. A convex cost has its
+    minimum where they hold.
     """
     n, ends = sizes(eom), np.cumsum([0, *sizes(eom).values()])
     at = {block: slice(*ends[i : i + 2]) for i, block in enumerate(n)}
@@ -78,7 +77,7 @@ def least(
 def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(
     name: str,
 ) -> None:
-    """(15) at random torques, the acceleration by one solve of the whole system."""
+    """Eq. (15) at random torques, with the acceleration from one solution of the whole system."""
     rng = np.random.default_rng(0)
     for seed in (None, 0):
         eom = judges.at_rest(name, seed)
@@ -106,7 +105,7 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
 def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(
     name: str, feet: int
 ) -> None:
-    """(18): q̈, τ and λ weighed at once."""
+    """Eq. (18) with costs on q̈, τ and λ together."""
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
@@ -132,7 +131,7 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
 
 
 def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
-    """(18) for Q(q̈, τ, λ) that is no sum: joint power τᵀ q̇ has none, but (τ - K q̈)² does."""
+    """Eq. (18) for a Q(q̈, τ, λ) that is not a sum of three costs, such as (τ - K q̈)²."""
     eom = judges.at_rest("go2", feet=2)
     space = dynamics.feasible_space(eom)
     rng = np.random.default_rng(0)
@@ -153,8 +152,8 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
 def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
     name: str, block: str, feet: int
 ) -> None:
-    """Every block, against the minimum with that block held and everything else free; the literal
-    reading is never below it.
+    """Every block, against the minimum with this block fixed and everything else free. The literal
+    reading is never lower.
     """
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
@@ -178,8 +177,8 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
 def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(
     name: str,
 ) -> None:
-    """V_q̈ on one foot has full column rank, on four it has not: there the literal reading costs
-    visibly more.
+    """V_q̈ has full column rank on one foot, but not on four. On four feet, the literal reading has
+    a clearly higher cost.
     """
     for feet, agree in ((1, True), (4, False)):
         eom = judges.at_rest(name, 0, feet)
@@ -197,8 +196,8 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
 
 
 def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
-    """go2, cost = friction squared and a little torque: the smallest β leaves friction in that the
-    best β squeezes out.
+    """go2 with a cost on squared friction and a little torque: the smallest β leaves friction that
+    the best β removes by internal forces.
     """
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
@@ -223,8 +222,8 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
 
 
 def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
-    """go2 bolted with its feet on the ground: V_q̈ = 0 but for rounding, so q̈ must not be turned
-    into β by 1 / rounding.
+    """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
+    β must not contain 1 / rounding.
     """
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
@@ -240,7 +239,7 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
-    """A reward for internal force has no least cost: said, not returned."""
+    """A reward for internal forces has no minimum, and the error says so."""
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     squeeze = dynamics.internal_forces(eom)[:, 0]
@@ -252,8 +251,8 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
 
 
 def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
-    """Negative curvature has no minimum either: the stationary point there is the worst, not the
-    best.
+    """A cost with negative curvature has no minimum either: its stationary point is the worst, not
+    the best.
     """
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
@@ -273,10 +272,9 @@ def test_directions_that_cost_nothing_are_left_alone() -> None:
 
 def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
     """A force cost of 1e-10 beside a torque cost of 1 still decides where the torque cost is
-    silent.
+    constant.
 
-    solo8 on four feet: null(Jᵀ) changes forces alone, so the torque cost leaves it to the small
-    weight.
+    solo8 on four feet: null(Jᵀ) changes only forces, so the small weight decides there.
     """
     eom = judges.at_rest("solo8")
     space = dynamics.feasible_space(eom)

@@ -13,8 +13,8 @@ import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
 
 N = 5
-STILL = 1e-3  # rad/s or m/s: two seconds and a half after a target 30 mm away was set; it is 2e-5
-# rad: gravity against a posture of small weight leaves half of it, on the arm of anymal_kinova
+STILL = 1e-3  # rad/s or m/s, 2.5 s after setting a target 30 mm away; the actual value is 2e-5
+# rad: on the arm of anymal_kinova, gravity leaves half of it with a posture of small weight
 DRIFT = 0.01
 
 
@@ -22,7 +22,7 @@ name = judges.every_robot
 
 
 def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Generator]]:
-    """Equations at random states with a random acceleration each."""
+    """Make equations at random states, each with a random acceleration."""
     found = []
     for seed, state in enumerate(judges.states(name, N)):
         rng = np.random.default_rng(seed)
@@ -142,8 +142,8 @@ def test_targets_may_be_functions_of_time() -> None:
 
 
 def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> None:
-    """A critically damped task lags behind a slow target by (kd / kp) times its velocity, unless it
-    is given that too.
+    """A critically damped task lags behind a slow target by (kd / kp) times the target's velocity,
+    unless it knows this velocity.
     """
     robot, amplitude, rate = judges.load("go2"), 0.01, 2.0  # m, rad/s
     state, asked = robot.standing(), []
@@ -173,7 +173,7 @@ def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> 
 
 
 def test_damping_is_critical_unless_it_is_given() -> None:
-    """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp: the fastest return without
+    """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp, the fastest return without
     overshoot.
     """
     state = judges.load("go2").random_state(0)
@@ -203,7 +203,9 @@ def test_a_target_is_copied_when_a_task_is_made() -> None:
 
 
 def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_still() -> None:
-    """30 mm to the left; solo8, whose legs cannot lean sideways, 20 mm back."""
+    """The target is 30 mm to the left. For solo8, whose legs cannot lean sideways, it is 20 mm
+    back.
+    """
     wrong = []
     for name in judges.FLOATING:
         robot = judges.load(name)
@@ -225,9 +227,7 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
 
 
 def test_standing_tasks_keep_the_arms_where_they_were() -> None:
-    """Without contacts that need them, nothing but posture holds these joints; gravity and a push
-    want them elsewhere.
-    """
+    """Only the posture task holds joints that no contact needs, against gravity and a push."""
     for name, part in (("anymal_kinova", "j2s6s200"), ("talos", "arm"), ("ur5", "")):
         robot = judges.load(name)
         standing = robot.standing()

@@ -63,7 +63,9 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
     # where `make setup` did not
-    compiled = "floatbase compiles its controller, once: about a minute.\n"
+    compiled = (
+        "floatbase is compiling its controller. This happens once and takes about a minute.\n"
+    )
     assert (process.returncode, errors.replace(compiled, "")) == (0, "")
 
 
@@ -116,7 +118,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
         lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work
     )
     control("facets", "setValue(6)")
-    control("friction believed", "setValue(0.3)")
+    control("friction model", "setValue(0.3)")
     until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
     until(
         lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work
@@ -126,7 +128,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     until(lambda: playground.run.status == "paused", work)
     playground.run.close()  # waits for the last slice
     stopped = playground.session.sim.time
-    control("on FL_foot", "setValue(false)")
+    control("stand on FL_foot", "setValue(false)")
     control("run", "fire()")
     until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
     assert "measured/FR_foot" in drawn()
@@ -148,7 +150,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
     control("forwards [m/s]", "setValue(0.5)")
-    control("turn [rad/s]", "setValue(0.5)")
+    control("turn left [rad/s]", "setValue(0.5)")
     control("gait", "setValue(2)")
     until(lambda: place()[0] > 0.3, work)
     picture(page, "bare_page_walking")

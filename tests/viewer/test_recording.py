@@ -351,8 +351,8 @@ def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     assert np.isnan(used[3, -1])
     figure = plots.plot_run(rollout)
     assert [axis.get_ylabel() for axis in figure.axes] == [
-        "centre of mass moved [mm]", "normal forces [N]", "friction used, of μ · normal force",
-        "torques, of their limits"
+        "displacement of the CoM [mm]", "normal forces [N]", "friction / (μ · normal force)",
+        "torque / limit"
     ]  # fmt: skip
     assert all(MEASURED in [line.get_color() for line in axis.lines] for axis in figure.axes[1:3])
     forces = plots.plot_forces(rollout)

@@ -1,4 +1,4 @@
-"""The compiled tick: the quadratic program of (26)(27) solved by numba over plain arrays."""
+"""The compiled controller: the QP (26)(27) solved by numba over plain arrays."""
 
 from floatbase.control.tick.compiled import (
     CompiledTick,

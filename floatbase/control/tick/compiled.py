@@ -1,8 +1,6 @@
-"""The compiled tick as the controller calls it: whether it can run a problem, and the class that
-runs it.
+"""`CompiledTick`: runs the compiled controller, and says which problems it supports.
 
-numba takes a while to load, so the files that need it are imported when the first problem is
-compiled.
+numba is slow to load, so the modules that need it are imported when the first problem is compiled.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
-# joints whose axes stand still in their own frame
+# joints whose axes are fixed in their own frame
 _JOINTS = (
     "JointModelR",
     "JointModelPX",
@@ -38,7 +36,15 @@ _JOINTS = (
 
 @contextmanager
 def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
-    """Print a text on the error stream when the work inside takes more than `after` s."""
+    """Print a text on the error stream if the enclosed work takes more than `after` seconds.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    after : float, optional
+        Delay [s].
+    """
     timer = Timer(after, lambda: print(text, file=sys.stderr, flush=True))
     timer.daemon = True
     timer.start()
@@ -49,10 +55,10 @@ def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
 
 
 def cache_warning() -> str:
-    """What to add to a message where compiled code cannot be kept on disk, or ""."""
+    """Return a remark for messages if compiled code cannot be kept on disk, otherwise ""."""
     from floatbase.control.tick import jit
 
-    remedy = "set NUMBA_CACHE_DIR to an empty folder that has room and can be written to"
+    remedy = "set NUMBA_CACHE_DIR to an empty, writable folder with free space"
     return (
         f"; compiled code cannot be kept on disk ({jit.cache_error}): {remedy}"
         if jit.cache_error
@@ -61,60 +67,83 @@ def cache_warning() -> str:
 
 
 def unsupported_reason(problem: Problem, solver: str) -> str:
-    """Why a problem cannot run compiled, or "" where it can. solver: name of the requested QP
-    solver.
+    """Return why a problem cannot run compiled, or "" if it can.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    solver : str
+        Name of the requested QP solver.
+
+    Returns
+    -------
+    str
+        The reason, or "".
     """
     if solver != "daqp":
-        return f"solver {solver!r} was requested, and the compiled tick has its own"
+        return f"solver {solver!r} was requested, but the compiled controller has its own solver"
     try:
         from floatbase.control.tick import jit, tick  # noqa: F401
     except (ImportError, OSError, AttributeError) as error:
-        return f"numba cannot be loaded ({error}); pip install numba may mend it"
+        return f"numba cannot be loaded ({error}); reinstall it with pip install numba"
     if not jit.jit_enabled:
-        return "NUMBA_DISABLE_JIT is set, and numba compiles nothing"
+        return "NUMBA_DISABLE_JIT is set, so numba does not compile"
     return _unsupported_robot_reason(problem.robot)
 
 
 @lru_cache(maxsize=16)
 def _unsupported_robot_reason(robot: Robot) -> str:
+    """Return why a robot cannot run compiled, or ""."""
     if robot.d == 0:
-        return f"{robot.name} has no joints to drive"
+        return f"{robot.name} has no driven joints"
     if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
         return (
-            f"{robot.name} has a single joint and no base: the compiled tick takes two "
-            f"velocities or more"
+            f"{robot.name} has a single joint and no floating base, but the compiled controller "
+            f"needs at least two velocities"
         )
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
             return (
-                f"joint {robot.model.names[i]!r} is a {kind}; the compiled tick takes revolute "
-                f"and prismatic joints"
+                f"joint {robot.model.names[i]!r} is a {kind}, but the compiled controller supports "
+                f"only revolute and prismatic joints"
             )
     return (
         ""
         if dynamics_of(robot).layout_supported
-        else "this Pinocchio lays its results out in another way in memory"
+        else "this version of Pinocchio has an unsupported memory layout"
     )
 
 
 class CompiledTick:
-    """The compiled tick of one problem, for which `unsupported_reason` is "".
+    """The compiled controller of one problem, for which `unsupported_reason` returns "".
 
-    A call with q (nq,) and v (nv,), writable float64 arrays, and t in s returns None where the
-    reference backend must decide, else the array of numbers that `tick.tick` fills, how many rows
-    are active, and what else the tick was given.
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
 
-    qdd, tau, forces: where these are among the numbers.
-    unchecked_tasks: tasks of which the tables cannot tell whether they fit: user-defined ones, and
-        moving ones.
-    arguments: what `tick.tick` takes after q, v and `TickInputs.packed`, but for the answer and the
-        stages to run.
-    default_inputs: as they are without a state, zeros for what moves and nothing user-defined.
-    workspace: real and whole numbers, memory of the tick.
+    Attributes
+    ----------
+    qdd, tau, forces : slice
+        Where these are among the numbers of a result.
+    unchecked_tasks : list of Task
+        Tasks that the problem arrays do not check: user-defined and time-varying ones.
+    arguments : tuple
+        Arguments of `tick.tick` after q, v and `TickInputs.packed`, without the result and the
+        number of stages.
+    default_inputs : TickInputs
+        Inputs without a state: zeros for time-varying targets, nothing user-defined.
+    workspace : tuple of ndarray
+        Memory of the tick, for real and for whole numbers.
 
-    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of
-    the wrong shape.
+    Raises
+    ------
+    UnknownNameError
+        If a frame does not exist.
+    InputError
+        If a constant target has the wrong shape.
     """
 
     def __init__(self, problem: Problem):
@@ -140,8 +169,9 @@ class CompiledTick:
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
-        """Memory for one tick at a time, the dynamics' lock sees to it, whose user-defined tasks
-        have so many rows.
+        """Provide memory for one tick at a time, with this many rows of user-defined tasks.
+
+        The lock of the dynamics ensures that only one tick runs at a time.
         """
         if n_user_rows > self._n_user_rows:
             n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
@@ -150,6 +180,24 @@ class CompiledTick:
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
+        """Run one tick, or return None if the reference backend must decide.
+
+        Parameters
+        ----------
+        q : ndarray, shape (nq,)
+            Configuration, a writable float64 array.
+        v : ndarray, shape (nv,)
+            Generalized velocity, base part in the base frame [m/s, rad/s], a writable float64
+            array.
+        t : float
+            Time [s].
+
+        Returns
+        -------
+        tuple or None
+            The array of numbers that `tick.tick` fills, the number of active inequalities, and the
+            inputs of the tick.
+        """
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
         inputs = self.inputs_at(q, v, t) if self._varies else self.default_inputs
@@ -162,16 +210,17 @@ class CompiledTick:
         return (result, n_active, inputs) if n_active >= 0 else None
 
     def warm_up(self) -> str:
-        """Run a tick, which compiles what it needs or loads it from disk, so that the loop need not
-        wait for it.
+        """Run one tick outside the loop, which compiles the code or loads it from disk.
 
-        Returns why that is not possible, or "".
+        Returns
+        -------
+        str
+            Why the tick cannot be compiled, or "".
         """
         from floatbase.control.tick import jit, tick
 
-        with announce_if_slow(
-            f"floatbase compiles its controller{cache_warning() or ', once: about a minute'}."
-        ):
+        duration = cache_warning() or ". This happens once and takes about a minute"
+        with announce_if_slow(f"floatbase is compiling its controller{duration}."):
             try:
                 self._tick_standing()
             except Exception as cache_failure:  # damaged files may raise anything
@@ -179,13 +228,14 @@ class CompiledTick:
                     self._tick = tick.tick = jit.without_cache(self._tick)
                     self._tick_standing()
                 except Exception as error:
-                    # whatever numba raises, the reference backend does without; no code of the
-                    # user's runs
+                    # whatever numba raises, the reference backend takes over; no user code runs
+                    # here
                     return f"numba could not compile the tick ({type(error).__name__}: {error})"
                 jit.cache_error = f"{type(cache_failure).__name__}: {cache_failure}"
         return ""
 
     def _tick_standing(self) -> None:
+        """Run one tick at the robot's standing state."""
         standing = self._problem.robot.standing()
         q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs.packed
         with self.dynamics.lock:
@@ -193,12 +243,29 @@ class CompiledTick:
             self._tick(q, v, inputs, *self.arguments, self.empty_result(), self._n_stages)
 
     def empty_result(self) -> Array:
-        """An array for the numbers of one tick."""
+        """Return an uninitialized array for the numbers of one tick."""
         return np.empty(self.forces.stop + 2 * self._n_multipliers)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:
-        """The reference QP of a tick, with what its functions returned then: called again, they may
-        return something else.
+        """Return the reference QP of a tick, with the values that user functions returned in it.
+
+        The functions are not called again, since they might return other values.
+
+        Parameters
+        ----------
+        q : ndarray, shape (nq,)
+            Configuration.
+        v : ndarray, shape (nv,)
+            Generalized velocity, base part in the base frame [m/s, rad/s].
+        t : float
+            Time [s].
+        inputs : TickInputs
+            Inputs of the tick.
+
+        Returns
+        -------
+        QP
+            The QP.
         """
         values: dict[int, dict[str, Any]] = {}
         for index, moving, first in self._time_varying_tasks:
@@ -225,7 +292,22 @@ class CompiledTick:
         )
 
     def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
-        """Multipliers of all inequality rows of the reference QP, from what a call returned."""
+        """Return the multipliers of all inequalities of the reference QP.
+
+        Parameters
+        ----------
+        result : ndarray
+            Numbers that a call returned.
+        n_active : int
+            Number of active inequalities.
+        inputs : TickInputs
+            Inputs of the tick.
+
+        Returns
+        -------
+        ndarray
+            One multiplier for each inequality, zero if it is inactive.
+        """
         limits, contacts = self._problem.limits, self._problem.contacts
         limited = np.isfinite(
             limits.torque_limits
@@ -242,10 +324,22 @@ class CompiledTick:
         return multipliers
 
     def inputs_at(self, q: Array, v: Array, t: float) -> TickInputs | None:
-        """What the tick is given at time t, in arrays of its own, as other threads may run ticks
-        too.
+        """Return the inputs of a tick, in new arrays since other threads may run ticks too.
 
-        None where something is wrong with it: the reference backend finds the same, and says so.
+        Parameters
+        ----------
+        q : ndarray, shape (nq,)
+            Configuration.
+        v : ndarray, shape (nv,)
+            Generalized velocity, base part in the base frame [m/s, rad/s].
+        t : float
+            Time [s].
+
+        Returns
+        -------
+        TickInputs or None
+            None if something is wrong with the inputs. The reference backend then finds and reports
+            it.
         """
         try:
             targets = (
@@ -254,7 +348,7 @@ class CompiledTick:
                 else self.default_inputs.packed[: self.n_targets]
             )
             inputs = self.user_terms.inputs(targets, q, v, t)
-        except Exception:  # code of the user's, which may raise anything
+        except Exception:  # user code may raise anything
             return None
         if inputs.n_user_rows > self._n_user_rows:
             with self.dynamics.lock:
@@ -262,7 +356,7 @@ class CompiledTick:
         return inputs
 
     def _targets_at(self, t: float) -> Array:
-        """All targets at time t. Raises `InputError` for a bad one."""
+        """Return all targets at time t; raise `InputError` for an invalid one."""
         targets, robot = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot
         k = self._problem.contacts.k
         for _, task, first in self._time_varying_tasks:

@@ -1,4 +1,4 @@
-"""The tasks as one quadratic cost in β: (18)(26)."""
+"""The tasks as one quadratic cost in β: eqs. (18), (26)."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class TaskTable(NamedTuple):
     table: Any  # (N, 3), kind, joint, first number in targets
     gains: Any  # (N, 3), weight, kp, kd
     frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
-    # of all tasks, one after the other: position, rotation row by row or q, then velocity and
+    # of all tasks, one after another: position, rotation row by row or q, then velocity and
     # acceleration
     targets: Any
-    # where user-defined tasks start among them, one after the other: block, m, weight, A (m, n), b
+    # where user-defined tasks start among them, one after another: block, m, weight, A (m, n), b
     # (m,)
     user_start: Any
-    n_user: Any  # how many these are
+    n_user: Any  # number of user-defined tasks
     n_user_rows: Any  # the sum of their m
 
 
@@ -56,22 +56,21 @@ class Cost(NamedTuple):
 
 @jit
 def rotation_error(R, target):
-    """e = log(R targetᵀ), world, for two rotations; and False where the angle is too large."""
+    """Return e = log(R targetᵀ) of two rotations, world, and False if the angle is too large."""
     e = times(
         0.5, plus(plus(cross(target[0], R[0]), cross(target[1], R[1])), cross(target[2], R[2]))
     )
     sine = np.sqrt(dot(e, e))
     cosine = 0.5 * (dot(target[0], R[0]) + dot(target[1], R[1]) + dot(target[2], R[2]) - 1.0)
     scale = 1.0 + sine * sine / 6.0 if sine < 1e-4 else np.arctan2(sine, cosine) / sine
-    return times(scale, e), cosine > -0.9  # beyond, the sine no longer tells the axis
+    return times(scale, e), cosine > -0.9  # beyond, the sine does not determine the axis
 
 
 @jit
 def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
-    """Task i on the CoM, an orientation or a frame. Returns e, ė, J̇ v - desired acceleration, and
-    False for an angle too large.
+    """Return e, ė and J̇ v - desired acceleration of task i, and False if an angle is too large.
 
-    rows: (3, nv) receives the Jacobian.
+    The task is on the CoM, an orientation or a frame. rows: (3, nv), receives the Jacobian.
     """
     clear(rows)
     kind, joint, first = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2]
@@ -106,9 +105,9 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
 
 @jit
 def posture_error(tree, q, v, target, base, e, e_dot):
-    """e and ė (d,) of all joints, the first at `base` in v; unlimited ones are (cos, sin) in q.
+    """Write e and ė, (d,), of all joints; joints without limits are (cos, sin) in q.
 
-    target: q (nq,), then velocities (d,).
+    target: q (nq,), then velocities (d,). base: index of the first joint in v.
     """
     for i in range(1, tree.shape[0]):
         row, at = tree[i, 1] - base, tree[i, 3]
@@ -126,11 +125,10 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 def task_costs(
     q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, base, workspace, cost: Cost
 ):
-    """(18)(26) Σ (weight / 2) ‖residual‖² of all tasks as a `Cost`. Returns its number of rows, -1
-    for an angle too large.
+    """Write Σ (weight / 2) ‖residual‖² of all tasks, eqs. (18), (26), into `cost`.
 
-    q, v: (nq,), (nv,), the state.
-    base: number of rows of (7) without a motor, 6 or 0.
+    Returns the number of rows of R, or -1 if an angle is too large. q: (nq,). v: (nv,). base:
+    number of rows of (7) without a motor, 6 or 0.
     """
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
@@ -175,8 +173,9 @@ def task_costs(
 
 @jit
 def count_user_rows(inputs, at, n_user, nv, k, d):
-    """How many rows the `n_user` user-defined tasks have that start at `at` in `inputs`, and where
-    they end.
+    """Return the number of rows of all user-defined tasks, and the index in `inputs` after them.
+
+    at: index in `inputs` of the first of the `n_user` tasks.
     """
     rows = 0
     for _ in range(n_user):
@@ -188,9 +187,7 @@ def count_user_rows(inputs, at, n_user, nv, k, d):
 
 @jit
 def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
-    """Add (weight / 2) ‖A x + b‖² of all user-defined tasks to R. Returns how many rows are in use
-    then.
-    """
+    """Add (weight / 2) ‖A x + b‖² of user-defined tasks to R; return the number of rows in use."""
     inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
     for _ in range(tasks.n_user):
@@ -212,11 +209,10 @@ def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
 
 @jit
 def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Cost):
-    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost. Returns how
-    many rows of R are in use then.
+    """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost.
 
-    weights, weighted: (n + d,), weight and weight × desired of each entry; those that are a β take
-        no row of R.
+    Returns the number of rows of R in use. weights, weighted: (n + d,), weight and weight × desired
+    of each entry. Entries that are a β need no row of R.
     """
     V, beta_index, T = space
     R, diagonal, linear = cost
@@ -238,8 +234,9 @@ def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Co
 
 @jit
 def hessian(cost: Cost, H, grad):
-    """Lower triangle of the Hessian in the first nb rows of H (nb + 1, nb + 1), and the slope (nb,)
-    at β = 0.
+    """Write the lower triangle of the Hessian and the gradient at β = 0.
+
+    H: (nb + 1, nb + 1), receives the triangle in its first nb rows. grad: (nb,).
     """
     R, diagonal, linear = cost
     nb = diagonal.size
@@ -257,7 +254,10 @@ def hessian(cost: Cost, H, grad):
 
 @jit
 def gradient(cost: Cost, beta, grad):
-    """The slope (nb,) at β, residual by residual, with the digits that the Hessian has lost."""
+    """Write the gradient (nb,) at β, residual by residual.
+
+    The sum of residuals has digits that the Hessian has lost.
+    """
     R, diagonal, linear = cost
     nb = beta.size
     for c in range(nb):

@@ -1,9 +1,9 @@
-"""The optimum of (27) by the dual active-set method of Goldfarb and Idnani (Math. Programming 27,
-1983), and its last digits.
+"""The optimum of the QP (27) by the dual active-set method of Goldfarb and Idnani.
 
-It starts at the optimum without inequalities and brings one violated row after the other to its
-bound; a row that is never violated is only looked at. Symbols: nb entries of β, H the Hessian, q
-the number of active rows, mu their multipliers.
+Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities. It brings one
+violated inequality after another to its bound. An inequality that is never violated is only
+evaluated. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
+the number of active inequalities, mu their multipliers.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from floatbase.control.tick.jit import jit
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
-# why there is no answer: it lacks digits, or there seems to be none
+# why there is no answer: it is inaccurate, or there seems to be none
 INACCURATE, INFEASIBLE = -2, -3
 # least pivot of the Cholesky factor, squared, relative to the Hessian's diagonal: less is rounding
 PIVOT_TOLERANCE = 1e-13
-# part of a row, squared, outside the active rows: with less it depends on them
+# fraction of a row, squared, outside the active rows: with less, it depends on them
 DEPENDENCE_TOLERANCE = 1e-12
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
-STEP_TOLERANCE = 1e-6  # part of β: what a step this small leaves is rounding
-MAX_FINAL_STEP = 1e-4  # part of β that the last step may still move
-# part of the largest multiplier by which one may be negative through rounding
+STEP_TOLERANCE = 1e-6  # fraction of β: after a step this small, only rounding remains
+MAX_FINAL_STEP = 1e-4  # fraction of β that the last step may still change
+# fraction of the largest multiplier by which one may be negative due to rounding
 SIGN_TOLERANCE = 1e-9
 
 
 class ActiveSet(NamedTuple):
-    """The active rows, of which q come first in each array, and their factors."""
+    """The active inequalities and their factors; the first q entries of each array are in use."""
 
     indices: Any  # (nb,), number of each row
     mu: Any  # (nb,), its multiplier
@@ -45,8 +45,9 @@ class ActiveSet(NamedTuple):
 
 @jit
 def cholesky(H, L):
-    """L (nb, nb) with L Lᵀ = H, whose lower triangle is read. Returns False where a direction costs
-    nothing.
+    """Write L (nb, nb) with L Lᵀ = H; return False if the cost is flat along a direction.
+
+    Only the lower triangle of H is read.
     """
     n = L.shape[0]
     clear(L)
@@ -66,7 +67,7 @@ def cholesky(H, L):
 
 @jit
 def solve_cholesky(L, grad, x):
-    """x (nb,) = -(L Lᵀ)⁻¹ grad."""
+    """Write x (nb,) = -(L Lᵀ)⁻¹ grad."""
     n = grad.size
     for i in range(n):
         total = -grad[i]
@@ -81,7 +82,7 @@ def solve_cholesky(L, grad, x):
 
 @jit
 def invert_lower(L, W):
-    """W (nb, nb) = L⁻¹, lower triangular."""
+    """Write W (nb, nb) = L⁻¹, lower triangular."""
     n = L.shape[0]
     clear(W)
     for i in range(n):
@@ -95,8 +96,9 @@ def invert_lower(L, W):
 
 @jit
 def add_row(W, U, d, z, q):
-    """Mirror rows q: of W so that d = W row is zero after q, and make d column q of U; d, z: as
-    from `step_directions`.
+    """Reflect rows q: of W so that d = W row is zero after entry q, and make d column q of U.
+
+    d, z: as from `step_directions`.
     """
     n, length = d.size, 0.0
     for j in range(q, n):
@@ -116,9 +118,7 @@ def add_row(W, U, d, z, q):
 
 @jit
 def drop_row(active: ActiveSet, at, q):
-    """Take row `at` of the q active ones out of an `ActiveSet`, and turn W so that U stays upper
-    triangular.
-    """
+    """Remove row `at` from the q active ones, and rotate W so that U stays upper triangular."""
     indices, mu, bounds, rows, W, U = active
     for j in range(at, q - 1):
         indices[j], mu[j], bounds[j] = indices[j + 1], mu[j + 1], bounds[j + 1]
@@ -141,8 +141,9 @@ def drop_row(active: ActiveSet, at, q):
 
 @jit
 def multiply_by_row(W, row, d):
-    """d (nb,) = W row; most rows have three entries or fewer, those of one force whose components
-    are β.
+    """Write d (nb,) = W row.
+
+    Most rows have at most three entries: those of one force whose components are β.
     """
     n, count, i, j, k = row.size, 0, 0, 0, 0
     for c in range(n):
@@ -162,10 +163,10 @@ def multiply_by_row(W, row, d):
 
 @jit
 def step_directions(W, U, d, q, z, r):
-    """How β and the multipliers move as the multiplier of a new row grows by 1, from d (nb,) = W
-    times that row.
+    """Write how β and the multipliers change as the multiplier of a new row grows by 1.
 
-    z, r: (nb,) receive the step of β and the decrease of the q multipliers.
+    d: (nb,), W times that row. z, r: (nb,), receive the step of β and the decrease of the q
+    multipliers.
     """
     n, j = d.size, q
     clear(z)
@@ -186,13 +187,10 @@ def step_directions(W, U, d, q, z, r):
 
 @jit
 def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
-    """Bring one violated row to its bound, dropping active rows whose multiplier would turn
-    negative.
+    """Bring one violated inequality to its bound; drop those whose multiplier would turn negative.
 
-    number, row, bound: of that row, as in `ActiveSet`.
-    d, z, r: (nb,), memory for `step_directions`.
-
-    Updates `active` and `beta`. Returns the new q, or why there is none.
+    Updates `active` and `beta`. Returns the new q, or an error code. number, row, bound: of that
+    inequality, as in `ActiveSet`. d, z, r: (nb,), memory for `step_directions`.
     """
     n, multiplier, mu, W, U = beta.size, 0.0, active.mu, active.W, active.U
     for _ in range(2 * n + 2):
@@ -233,14 +231,11 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
 
 @jit
 def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
-    """One step of Newton's method on the optimality conditions from (β, mu) that are right but for
-    rounding.
+    """Take one Newton step on the optimality conditions; (β, mu) are correct up to rounding.
 
-    grad: (nb,), the cost's slope at β; overwritten.
-    L: Cholesky factor of the Hessian.
-    step, delta_beta, y: (nb,), memory.
-
-    Updates β and the multipliers. Returns the largest change of an entry of β.
+    Updates β and the multipliers. Returns the largest change of an entry of β. grad: (nb,),
+    gradient of the cost at β; overwritten. L: Cholesky factor of the Hessian. step, delta_beta, y:
+    (nb,), memory.
     """
     nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
     if q == 0:
@@ -269,7 +264,7 @@ def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
             delta_beta[i] += along * W[j, i]
     for i in range(nb):
         beta[i] += delta_beta[i]
-    # the multipliers balance the slope that is left after the way to the bounds
+    # the multipliers balance the gradient that remains after the step to the bounds
     for a in range(q - 1, -1, -1):
         step[a] -= y[a]
         for j in range(a + 1, q):
@@ -281,8 +276,9 @@ def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
 
 @jit
 def wrong_signed_row(mu, q):
-    """The place, among q active rows, of the most negative multiplier in mu; -1 where none is
-    negative beyond rounding.
+    """Return the index of the most negative of q multipliers, or -1 if none is.
+
+    Values that are negative by rounding only do not count.
     """
     least, size, found = 0.0, 0.0, -1
     for a in range(q):
@@ -296,14 +292,13 @@ def wrong_signed_row(mu, q):
 def dual_search(
     cost: Cost, limits: Inequalities, space: Parametrisation, nv, workspace, indices, mu, beta
 ):
-    """(27) The β of least cost that satisfies all inequalities. Returns how many are active, or why
-    there is no answer.
+    """Find the β of minimum cost that satisfies all inequalities of (27).
 
-    indices, mu, beta: (nb,) receive the numbers and multipliers of the active rows, and the
-        optimum.
+    Returns the number of active inequalities, or an error code. indices, mu, beta: (nb,), receive
+    the numbers and multipliers of the active inequalities, and the optimum.
 
-    Newton's method refines the end of the search. Where that shows that it was not the optimum, as
-    a multiplier has the wrong sign or a row is violated, the search goes on.
+    Newton's method refines the end of the search. The search continues if the refined point is not
+    the optimum: a multiplier has the wrong sign, or an inequality is violated.
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
     H, grad = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb)

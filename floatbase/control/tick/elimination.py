@@ -1,7 +1,6 @@
-"""The equalities of (27) eliminated: q̈, λ and τ as functions of the free entries β, by
-Gauss-Jordan elimination (13)(16)(17).
+"""Gauss-Jordan elimination: q̈, λ and τ as functions of the free entries β, eqs. (13), (16), (17).
 
-The reference backend takes an SVD for the space of motions (13). Here variables are eliminated one
+The reference backend uses an SVD for the space of motions (13). Here variables are eliminated one
 by one, and each β is an entry of (q̈, λ) that the elimination left free. Shapes: m motion rows, nv,
 d, k as everywhere, n = nv + k entries of (q̈, λ), nb of β.
 """
@@ -17,31 +16,29 @@ from floatbase.control.tick.jit import jit, jit_allocating, jit_forceinline
 from floatbase.control.tick.workspace import clear, take_vector
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 
-# a motion row of which elimination leaves less may nearly depend on the others: an SVD must decide
+# a motion row with a smaller fraction left may nearly depend on the others: an SVD must decide
 DEPENDENT_ROW = 2e-2
-ZERO_ROW = 1e-11  # less than this part of a row is rounding
-ZERO_PIVOT = 1e-14  # relative to the row: no variable is left to solve it for
+ZERO_ROW = 1e-11  # less than this fraction of a row is rounding
+ZERO_PIVOT = 1e-14  # relative to the row: below this, no variable is left to solve for
 
 
 class Parametrisation(NamedTuple):
     """All (q̈, λ, τ) that satisfy the equalities, as functions of β."""
 
     V: Any  # (n, nb + 1), (q̈, λ) = V (β, 1)
-    beta_index: Any  # (n,), the number of the β that an entry of (q̈, λ) is, -1 where it is none
+    beta_index: Any  # (n,), which β an entry of (q̈, λ) is, -1 if it is none
     T: Any  # (d, nb + 1), τ = T (β, 1)
 
 
 @jit
 def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivots):
-    """Reduce rows first:last of B in place, each to one pivot that is 1. Returns the least part of
-    a row left at its turn.
+    """Reduce rows first:last of B in place, each to one pivot equal to 1.
 
-    B: (·, n + 1), the right-hand side in the last column; rows first:last have other entries in the
-        first `columns` only.
-    first_cleared: rows from there on are cleared of the pivots.
-    weights: (n,), each row takes the pivot of the largest weight × |entry|.
-    lengths: of each row of B, before the elimination.
-    pivots: receives the column of each row's pivot.
+    Returns the smallest fraction of a row that was left at its turn. B: (·, n + 1), right-hand side
+    in the last column; rows first:last have other entries in the first `columns` only.
+    first_cleared: the pivots are cleared from all rows from there on. weights: (n,), each row takes
+    the pivot of the largest weight × |entry|. lengths: norms of the rows of B before the
+    elimination. pivots: receives the column of each row's pivot.
     """
     right, smallest_pivot = B.shape[1] - 1, 1.0
     for row in range(first, last):
@@ -70,8 +67,9 @@ def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivot
 
 @jit
 def equalities(A, b, M, h, J, base, lengths, B):
-    """(7) without its joint rows: B = [A 0 | b] above [M_b -J_bᵀ | -h_b], and the `lengths` of its
-    rows left of the bar.
+    """Write B = [A 0 | b] above [M_b -J_bᵀ | -h_b], which is (7) without its joint rows.
+
+    lengths: receives the norms of the rows of B, without the right-hand side.
     """
     m, nv, k = A.shape[0], A.shape[1], J.shape[0]
     for i in range(m):
@@ -94,20 +92,19 @@ def equalities(A, b, M, h, J, base, lengths, B):
 
 
 @jit_allocating
-def independent_rows(A, b, v, rows, right):
-    """(5) Orthonormal rows (r, nv) that say what A q̈ = b says along the directions that A
-    resolves, as in `build_qp`.
+def independent_rows(A, b, v, rows, rhs):
+    """Write orthonormal rows (r, nv) equivalent to A q̈ = b along the directions that A resolves.
 
-    rows, right: (m, nv), (m,) receive them and their right-hand sides first. Returns r, or -1 where
-        rows of A q̈ = b disagree
-    by more than the contacts' motion A v explains.
+    The rule is that of `build_qp`. Returns r, or -1 if rows of A q̈ = b disagree by more than the
+    contacts' motion A v explains. rows, rhs: (m, nv), (m,), whose first r entries receive the rows
+    and their right-hand sides.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
     while r < s.size and s[r] > CONSTRAINT_RANK_TOLERANCE * s[0]:
         r += 1
     U = np.ascontiguousarray(U[:, :r])
-    rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
+    rows[:r], rhs[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
     tolerance = INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion))
     return -1 if np.max(np.abs(gap)) > tolerance else r
@@ -115,17 +112,15 @@ def independent_rows(A, b, v, rows, right):
 
 @jit
 def eliminate(A, b, M, h, J, base, workspace, B, pivots):
-    """(13)(17) Solve the equalities for as many entries of (q̈, λ). Returns the least part left of
-    a motion row, of any row.
+    """Solve the equalities for as many entries of (q̈, λ) as possible: eqs. (13), (17).
 
-    A, b: (m, nv), (m,), the motion rows (5).
-    M, h, J: (nv, nv), (nv,), (k, nv), of (7).
-    base: number of rows of (7) without a motor, 6 or 0.
-    B: (m + base, n + 1) receives the reduced rows.
-    pivots: (m + base,) receives the entry of (q̈, λ) that each is solved for.
+    Returns the smallest fraction of a motion row, and of any row, that was left at its turn. A, b:
+    (m, nv), (m,), motion rows (5). M, h, J: (nv, nv), (nv,), (k, nv), of (7). base: number of rows
+    of (7) without a motor, 6 or 0. B: (m + base, n + 1), receives the reduced rows. pivots: (m +
+    base,), receives the entry of (q̈, λ) that each row is solved for.
 
-    Motion rows are solved for joints where that is possible, and for the base where knees are
-    straight; base rows for the base, and for λ where the contacts already hold it.
+    Motion rows are solved for joints if possible, and for the base if knees are straight. Base rows
+    are solved for the base, and for λ if the contacts already constrain the base.
     """
     m, nv, n = A.shape[0], A.shape[1], B.shape[1] - 1
     lengths, motion_weights = take_vector(workspace, m + base), take_vector(workspace, n)
@@ -145,11 +140,10 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
 
 @jit
 def parametrise(B, pivots, m, free_columns, V, beta_index):
-    """(13)(17) V and beta_index of `Parametrisation` from the reduced rows of `eliminate`, the
-    first m of them for motions.
+    """Write V and beta_index of `Parametrisation` from the reduced rows of `eliminate`.
 
-    The pivots of the later rows still stand in those of motions, and are substituted here.
-    free_columns: (nb,), memory.
+    The first m reduced rows are motion rows. They still contain the pivots of the later rows, which
+    are substituted here. free_columns: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):
@@ -179,9 +173,7 @@ def parametrise(B, pivots, m, free_columns, V, beta_index):
 
 @jit_forceinline
 def add_entry(factor, V, beta_index, entry, out, row):
-    """Add factor × row `entry` of V to a row of out (·, nb + 1); where the entry is a β, that is
-    one number.
-    """
+    """Add factor × row `entry` of V to a row of out (·, nb + 1); one number if the entry is a β."""
     if beta_index[entry] >= 0:
         out[row, beta_index[entry]] += factor
     else:
@@ -191,8 +183,9 @@ def add_entry(factor, V, beta_index, entry, out, row):
 
 @jit
 def add_product(rows, V, beta_index, out, first):
-    """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1); most entries
-    of `rows` are zero.
+    """Add rows (m, nv) times the q̈ of V to rows first:first + m of out (·, nb + 1).
+
+    Most entries of `rows` are zero.
     """
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
@@ -202,8 +195,9 @@ def add_product(rows, V, beta_index, out, first):
 
 @jit
 def torques(V, beta_index, M, h, J, base, T):
-    """(16) T of `Parametrisation` from τ = M_j q̈ + h_j - J_jᵀ λ, the rows of (7) after the first
-    `base`; V, beta_index: of `Parametrisation`.
+    """Write T of `Parametrisation` from τ = M_j q̈ + h_j - J_jᵀ λ, eq. (16).
+
+    These are the rows of (7) after the first `base`. V, beta_index: of `Parametrisation`.
     """
     nv, k, nb = M.shape[0], J.shape[0], V.shape[1] - 1
     clear(T)

@@ -1,9 +1,9 @@
-"""The inequalities of (27)(28), G β ≤ h, which are written out only for the rows that β violates.
+"""The inequalities G β ≤ h of eqs. (27), (28), assembled only for the rows that β violates.
 
-Rows are numbered: F facets and the least normal force of each of P points, then their P largest
+Rows are numbered: F facets and the minimum normal force of each of P points, then their P maximum
 normal forces, d upper torque limits, d lower ones, and the user-defined rows. What every problem
-needs is compiled into the search (`jit_forceinline`), what few need is not: left to itself, the
-compiler takes in neither, and a tick with many active rows takes 6 % longer.
+needs is inlined into the search (`jit_forceinline`); what few problems need is not. Without this
+choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ class Inequalities(NamedTuple):
     facets: Any  # F
     points: Any  # P
     torque_limits: Any  # (d,), N·m
-    inputs: Any  # what `user_terms.UserTerms` packed
-    bounds: Any  # where in it P least and P largest normal forces start, N
-    # where user-defined rows start, one group after the other: block, number m of rows, G (m, n), h
+    inputs: Any  # packed by `user_terms.UserTerms`
+    bounds: Any  # where the P minimum and P maximum normal forces start in it, N
+    # where user-defined rows start, one group after another: block, number m of rows, G (m, n), h
     # (m,)
     user_start: Any
-    n_user_groups: Any  # how many groups there are
-    has_optional: Any  # whether there are any of these, or a largest normal force
+    n_user_groups: Any  # number of groups
+    has_optional: Any  # whether there are any of these, or a maximum normal force
 
 
 @jit
 def affine_value(V, beta, first, last, out):
-    """out (last - first,) = rows first:last of V (·, nb + 1) times (β, 1)."""
+    """Write rows first:last of V (·, nb + 1) times (β, 1) into out (last - first,)."""
     nb = beta.size
     for i in range(first, last):
         total = V[i, nb]
@@ -51,7 +51,7 @@ def affine_value(V, beta, first, last, out):
 
 @jit_forceinline
 def forces_of(space: Parametrisation, beta, forces):
-    """forces (k,) at β; most of them are a β themselves."""
+    """Write forces (k,) at β; most of them are a β themselves."""
     first = space.V.shape[0] - forces.size
     for i in range(forces.size):
         if space.beta_index[first + i] >= 0:
@@ -62,10 +62,10 @@ def forces_of(space: Parametrisation, beta, forces):
 
 @jit_forceinline
 def worst_facet(limits: Inequalities, first, f):
-    """(28) The row of a point's facets, of which `first` is the first, that the force f violates
-    most, and by how much; or -1.
+    """Return the facet of a point that the force f violates most and by how much, or -1; eq. (28).
 
-    Forces in the circle that the facets touch violate none.
+    first: row of the point's first facet. Forces inside the circle that the facets touch violate
+    none.
     """
     normal = times(-1.0, row_part(limits.cones, first + limits.facets, 0))
     mu, normal_force = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)
@@ -85,8 +85,9 @@ def worst_facet(limits: Inequalities, first, f):
 
 @jit_forceinline
 def violated_force_row(limits: Inequalities, forces):
-    """The row on forces (k,) that they violate most, measured on rows of unit length; -1 where they
-    violate none.
+    """Return the row on forces that forces (k,) violate most, or -1 if they violate none.
+
+    Violations are measured on rows of unit length.
     """
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
     n_rows = limits.facets + 1
@@ -105,16 +106,16 @@ def violated_force_row(limits: Inequalities, forces):
 
 @jit_forceinline
 def force_rows_of(limits: Inequalities):
-    """How many rows there are on forces."""
+    """Return the number of rows on forces."""
     return limits.cones.shape[0] + limits.points
 
 
 @jit
 def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """`violated_row` for largest normal forces and user-defined rows, measured on rows of unit
-    length.
+    """Do as `violated_row` for maximum normal forces and user-defined rows.
 
-    forces, tau: (k,), (d,), those at β. qdd: (nv,), memory.
+    Violations are measured on rows of unit length. forces, tau: (k,), (d,), those at β. qdd: (nv,),
+    memory.
     """
     worst, found, has_qdd, cones = FEASIBILITY_TOLERANCE, -1, False, limits.cones
     for i in range(limits.points):
@@ -148,11 +149,10 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
 
 @jit_forceinline
 def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """The number of a row of (27)(28) that β (nb,) violates, -1 for none; forces (k,), tau (d,),
-    qdd (nv,): memory.
+    """Return the number of a row of (27)(28) that β (nb,) violates, or -1.
 
-    Torques are computed only where all forces are feasible, since they cost more; what few problems
-    have comes last.
+    forces (k,), tau (d,), qdd (nv,): memory. Torques cost more and are computed only if all forces
+    are feasible. Rows that few problems have come last.
     """
     forces_of(space, beta, forces)
     found = violated_force_row(limits, forces)
@@ -171,7 +171,7 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
 
 @jit
 def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
-    """`row_in_beta` for the user-defined rows, by their own number."""
+    """Do as `row_in_beta` for a user-defined row, numbered from the first of them."""
     V, T, inputs, at = space.V, space.T, limits.inputs, limits.user_start
     k, nb = V.shape[0] - nv, V.shape[1] - 1
     clear(out)
@@ -194,7 +194,7 @@ def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, o
 
 @jit_forceinline
 def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
-    """A row of (27)(28) by its number: out (nb,) = its row of G. Returns its bound in h."""
+    """Write a row of G of (27)(28) by its number into out (nb,); return its bound in h."""
     V, T, cones = space.V, space.T, limits.cones
     nb, d, n_cone_rows = V.shape[1] - 1, T.shape[0], cones.shape[0]
     force_rows = force_rows_of(limits)
@@ -203,7 +203,7 @@ def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     clear(out)
     if number < force_rows:
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0
-        if number >= n_cone_rows:  # largest normal force: the least one's row, turned round
+        if number >= n_cone_rows:  # maximum normal force: the minimum's row with the opposite sign
             row, sign = (number - n_cone_rows) * n_rows + limits.facets, -1.0
             bound = limits.inputs[limits.bounds + limits.points + number - n_cone_rows]
         elif number % n_rows == limits.facets:

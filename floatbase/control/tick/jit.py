@@ -1,10 +1,9 @@
-"""How the tick is compiled: numba's options, and one cached entry point for all files of this
-folder.
+"""How the tick is compiled: numba's options, and one cached entry point for this folder.
 
-numba caches a compiled function on disk and compiles it anew when its own file changes, but not
-when the file of a function that it calls does. So one function alone is cached, the entry point
-`tick`. It carries a digest of this folder in its closure, which is part of numba's cache key: an
-edit in any file compiles anew.
+numba caches a compiled function on disk and recompiles it when its own file changes, but not when
+the file of a function that it calls changes. So only one function is cached, the entry point
+`tick`. Its closure contains a digest of this folder, which is part of numba's cache key. An edit in
+any file therefore triggers recompilation.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
 from floatbase.qp import FEASIBILITY_TOLERANCE
 from floatbase.robots import UNIT_NORM_TOLERANCE
 
-# Without numba's run time, which counts references to every array that is made, sliced or passed
-# on: that took a quarter of the tick. What is compiled so can neither make an array nor return one.
+# Without numba's runtime, which counts references to every array that is made, sliced or passed
+# on. That took a quarter of the tick. Such functions can neither create nor return arrays.
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "nsz", "arcp"},
@@ -36,20 +35,18 @@ _OPTIONS: dict[str, Any] = {
 jit: Callable[..., Any] = partial(numba.njit, **_OPTIONS)
 jit_inline: Callable[..., Any] = partial(
     numba.njit, inline="always", **_OPTIONS
-)  # part of its caller, so it may return arrays
+)  # becomes part of its caller, so it may return arrays
 jit_forceinline: Callable[..., Any] = partial(
     numba.njit, forceinline=True, **_OPTIONS
 )  # small and called often
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
-jit_enabled = hasattr(jit(lambda: None), "py_func")  # False where NUMBA_DISABLE_JIT is set
+jit_enabled = hasattr(jit(lambda: None), "py_func")  # False if NUMBA_DISABLE_JIT is set
 cache_error = ""  # why compiled code cannot be kept on disk
 
 
 def source_digest(folder: Path = Path(__file__).parent) -> int:
-    """A number for the text of this folder and for the constants of other packages that numba
-    compiles in.
-    """
+    """Return a digest of this folder's text and of the imported constants that are compiled in."""
     text = repr(
         (
             INCONSISTENCY_TOLERANCE,
@@ -65,24 +62,25 @@ def source_digest(folder: Path = Path(__file__).parent) -> int:
 
 
 def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
-    """Compile make(source_digest()), cached on disk where that is possible. The function made must
-    use its digest.
+    """Compile make(source_digest()), cached on disk if possible.
+
+    The function that `make` returns must use its digest.
     """
     global cache_error
     function = make(source_digest())
     try:
         cached = jit(cache=True)(function)
-    except RuntimeError:  # of numba, when it finds no folder for its cache
-        cache_error = "no folder can be written to"
+    except RuntimeError:  # numba finds no folder for its cache
+        cache_error = "no folder is writable"
         return jit(function)
     if jit_enabled:
-        with suppress(OSError):  # a full disk: numba compiles
+        with suppress(OSError):  # a full disk: numba compiles again
             _copy_installed_code(Path(function.__code__.co_filename), Path(cached.stats.cache_path))
     return cached
 
 
 def _copy_installed_code(source: Path, cache: Path) -> None:
-    """Copy what was compiled beside the source into the cache of a user who cannot write there."""
+    """Copy code compiled beside the source into the cache of a user who cannot write there."""
     cache.mkdir(parents=True, exist_ok=True)
     # data files sort before the index that lists them
     for file in sorted((source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ci]")):
@@ -93,5 +91,5 @@ def _copy_installed_code(source: Path, cache: Path) -> None:
 
 
 def without_cache(function: Any) -> Any:
-    """A function whose compiled code could not be loaded or kept, compiled in memory."""
+    """Compile in memory a function whose compiled code could not be loaded or kept."""
     return function if function.signatures else jit(function.py_func)

@@ -1,8 +1,7 @@
-"""Velocities, drifts and Jacobians of all bodies and contacts from Pinocchio's world Jacobian:
-(1)(4)(5).
+"""Velocities, drifts and Jacobians of bodies and contacts: eqs. (1), (4), (5).
 
-All quantities are in the world frame. A drift is the acceleration at q̈ = 0, that is J̇ v. Joint 0
-is the world itself.
+They follow from Pinocchio's world Jacobian. All quantities are in the world frame. A drift is the
+acceleration at q̈ = 0, that is J̇ v. Joint 0 is the world itself.
 """
 
 from __future__ import annotations
@@ -45,8 +44,8 @@ class ContactTable(NamedTuple):
     table: Any
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
-    inputs: Any  # what `user_terms.UserTerms` packed
-    # where the user-defined contacts' A, b and J start in it, one contact after the other
+    inputs: Any  # packed by `user_terms.UserTerms`
+    # where the user-defined contacts' A, b and J start in it, one contact after another
     user_start: Any
     points_only: Any  # whether all are point contacts, whose A and J are the same
 
@@ -81,7 +80,7 @@ def forward_velocities(bodies: Bodies, v):
 
 @jit
 def point_velocity(bodies: Bodies, joint, p):
-    """Velocity and drift of the point p, world, of a joint's body."""
+    """Return velocity and drift of the point p, world, of a joint's body."""
     angular = row_part(bodies.velocity, joint, 3)
     linear = plus(row_part(bodies.velocity, joint, 0), cross(angular, p))
     a = plus(row_part(bodies.drift, joint, 0), cross(row_part(bodies.drift, joint, 3), p))
@@ -90,7 +89,7 @@ def point_velocity(bodies: Bodies, joint, p):
 
 @jit
 def frame_pose(bodies: Bodies, joint, frames, i):
-    """Rotation and position, world, of the frame whose pose in the joint is row i of `frames`."""
+    """Return rotation and position, world, of a frame; its pose in the joint is `frames[i]`."""
     R = rotation_in(bodies.poses, joint)
     x, y, z = rotation_in(frames, i)
     return (rotate(R, x), rotate(R, y), rotate(R, z)), plus(
@@ -116,7 +115,7 @@ def body_jacobian(bodies: Bodies, joint, linear, p, out, row):
 
 @jit
 def centre_of_mass(bodies: Bodies):
-    """Position, velocity and drift of the centre of mass, and the mass."""
+    """Return position, velocity and drift of the centre of mass, and the mass."""
     com, com_velocity, com_drift, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for i in range(1, bodies.links.shape[0]):
         link_mass = bodies.links[i, 0]
@@ -133,20 +132,22 @@ def centre_of_mass(bodies: Bodies):
 
 
 @jit
-def copy_rows(numbers, first, rows, columns, out, row):
-    """Copy a table (rows, columns) that starts at `first` in `numbers` into rows of out (·,
-    columns). Returns where it ends.
+def copy_rows(numbers, first, n_rows, n_columns, out, row):
+    """Copy a table (n_rows, n_columns) from `numbers` into `out`, and return where it ends.
+
+    first: index in `numbers` where the table starts. row: first row of `out` to fill.
     """
-    for i in range(rows):
-        for c in range(columns):
-            out[row + i, c] = numbers[first + i * columns + c]
-    return first + rows * columns
+    for i in range(n_rows):
+        for c in range(n_columns):
+            out[row + i, c] = numbers[first + i * n_columns + c]
+    return first + n_rows * n_columns
 
 
 @jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
-    """(4)(5) A (m, nv) and b (m,) of all contacts, and J (k, nv) of (4), the same array where
-    `points_only`.
+    """Write A (m, nv), b (m,) of (5) and J (k, nv) of (4) for all contacts.
+
+    A and J are the same array if `points_only`.
     """
     row, force, nv, inputs, start = 0, 0, A.shape[1], contacts.inputs, contacts.user_start
     clear(A)

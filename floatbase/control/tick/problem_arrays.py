@@ -1,8 +1,7 @@
-"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays that it
-overwrites in place.
+"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays.
 
-What belongs to one robot or one contact is made once, so that a controller with other contacts is
-cheap.
+Pinocchio overwrites its arrays in place. What belongs to one robot or one contact is made once, so
+that a controller with other contacts is cheap.
 """
 
 from __future__ import annotations
@@ -44,10 +43,20 @@ PolyhedronOptions: TypeAlias = tuple[
 class Dynamics:
     """Pinocchio's results for one robot.
 
-    views: M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12); overwritten by
-        every `update`.
-    tree, links: as in `kinematics.Bodies`.
-    lock: held from `update` until the views have been read.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Attributes
+    ----------
+    views : tuple of ndarray
+        M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12). Every `update`
+        overwrites them.
+    tree, links : ndarray
+        As in `kinematics.Bodies`.
+    lock : Lock
+        Held from `update` until the views have been read.
     """
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
@@ -68,13 +77,13 @@ class Dynamics:
         self.links = np.array([(link.mass, *link.lever) for link in model.inertias])
 
     def update(self, q: Array, v: Array) -> None:
-        """Fill the views for a configuration q (nq,) and a velocity v (nv,)."""
+        """Compute the views for a configuration q (nq,) and a velocity v (nv,)."""
         pin.nonLinearEffects(self.robot.model, self.data, q, v)
         pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
 
     @property
     def layout_supported(self) -> bool:
-        """Whether this Pinocchio has the memory layout that the views assume."""
+        """Whether this Pinocchio version has the memory layout that the views assume."""
         with self.lock:
             self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
             poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
@@ -82,8 +91,9 @@ class Dynamics:
 
     @classmethod
     def unlock_all(cls) -> None:
-        """Give all of them new locks: in a forked process nobody is left to release one that
-        another thread held.
+        """Give every instance a new lock after a fork.
+
+        In a forked process no thread is left to release a lock that another thread held.
         """
         for dynamics in cls._all:
             dynamics.lock = Lock()
@@ -92,12 +102,13 @@ class Dynamics:
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=Dynamics.unlock_all)
 
-dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one for each robot, shared by its controllers
+dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one per robot, shared by its controllers
 
 
 def task_kind(task: Task) -> int | None:
-    """The compiled form of a task, which its own class declares; None where it has none, and its
-    residual is called.
+    """Return the compiled form of a task, which its own class declares, or None.
+
+    The residual of a task without a compiled form is called.
     """
     return _TASK_KINDS.get(vars(type(task)).get("compiled_as", ""))
 
@@ -105,17 +116,16 @@ def task_kind(task: Task) -> int | None:
 class TimeVaryingTask(NamedTuple):
     """A task whose targets are a function of time."""
 
-    task_index: int  # of the task
+    task_index: int  # in the problem's tasks
     task: TargetTask
-    first: int  # where its targets start among all
+    first: int  # where its targets start among all targets
 
 
 def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[TimeVaryingTask]]:
-    """A problem as what `tick.unpack` takes, with its targets, zeros for those that move, and the
-    moving ones.
+    """Return a problem as the arrays of `tick.unpack`, its targets and its time-varying tasks.
 
-    Raises `UnknownNameError` for a frame that does not exist and `InputError` for a still target of
-    the wrong shape.
+    Time-varying targets are zero in these arrays. Raises `UnknownNameError` if a frame does not
+    exist, and `InputError` if a constant target has the wrong shape.
     """
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
@@ -146,7 +156,7 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         points_only,
         has_optional,
     )
-    # a workspace counts in its first entry
+    # the first entry is the counter of a workspace
     float_tables = (0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits)
     int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
     return (
@@ -159,8 +169,9 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
 
 
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
-    """Contacts (C, 6), frames (C, 16), points (P, 3), as in `kinematics.ContactTable`, and cones (P
-    (F + 1), 5).
+    """Return contacts (C, 6), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
+
+    The first three are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
     limits = problem.limits
     found = [
@@ -179,7 +190,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
 def _pack_contact(
     robot: Robot, contact: MotionConstraint, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """One contact: row of the table, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
+    """Return one contact: table row, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
     if type(contact) in CONTACT_KINDS:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = 0
@@ -194,6 +205,7 @@ def _pack_contact(
 def _pack_builtin_contact(
     robot: Robot, contact: PointContact | FlatFootContact, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
+    """Return one contact of a built-in class, as `_pack_contact` does."""
     joint, pose = _frame_placement(robot, contact.frame)
     radius, points = (
         (contact.radius, contact.centre)
@@ -211,7 +223,7 @@ def _pack_builtin_contact(
 
 
 def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
-    """Facets and -normal of each point with their lengths, and a zero, (p (F + 1), 5)."""
+    """Return facets and -normal of each point with their lengths, and a zero, (p (F + 1), 5)."""
     polyhedron = FrictionPolyhedron(contact.normal, contact.mu, *options)
     rows = np.vstack([polyhedron.face_matrix, -polyhedron.normal])
     cones = np.column_stack([rows, np.linalg.norm(rows, axis=1), np.zeros(len(rows))])
@@ -219,10 +231,10 @@ def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
 
 
 def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
-    """Tasks (N, 3), gains (N, 3) and frames (N, 12) as in `costs.TaskTable`; targets, and those
-    that move.
+    """Return tasks (N, 3), gains (N, 3) and frames (N, 12), targets, and the time-varying tasks.
 
-    Those of the package: where one of another kind stands among them does not matter.
+    The tables are those of `costs.TaskTable`. They contain the built-in tasks only, so the
+    positions of user-defined tasks in the list do not matter.
     """
     known = [
         (i, kind, cast(TargetTask, task))
@@ -250,11 +262,11 @@ def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
 
 
 def _frame_placement(robot: Robot, name: str) -> tuple[int, Array]:
-    """The joint that carries a frame, and the frame's pose in it, shape (12,)."""
+    """Return the joint that carries a frame, and the frame's pose in it, shape (12,)."""
     frame = robot.model.frames[robot.frame_id(name)]
     return int(frame.parentJoint), _flat_pose(frame.placement)
 
 
 def _flat_pose(pose: pin.SE3) -> Array:
-    """A pose as 12 numbers."""
+    """Return a pose as 12 numbers."""
     return np.concatenate([pose.rotation.T.ravel(), pose.translation])

@@ -1,8 +1,9 @@
-"""The tick, compiled: (26)(27) over plain arrays, which `compiled.py` fills and passes on.
+"""The compiled entry point `tick`: eqs. (26), (27) over plain arrays.
 
-README.md explains its stages. A tick without an answer says why: INVALID (a value is not finite, a
-quaternion is none, an orientation is too far off), INACCURATE (its last digits are lost),
-INFEASIBLE. Then the reference backend decides.
+`compiled.py` fills the arrays and calls `tick`; README.md explains its stages. A tick without an
+answer returns a code: INVALID (a value is not finite, a quaternion has the wrong length, or an
+orientation error is too large), INACCURATE (the last digits are lost), INFEASIBLE. The reference
+backend then decides.
 """
 
 from __future__ import annotations
@@ -31,21 +32,20 @@ from floatbase.robots import UNIT_NORM_TOLERANCE
 
 INVALID, STOPPED = -1, -4
 N_STAGES = 4  # of a tick: contact rows, elimination, costs, optimum
-# m/s², N·m or N: an entry of the answer beyond this is hardly determined, and has lost its digits
+# m/s², N·m or N: a larger entry of the answer is nearly undetermined and has lost its digits
 MAX_ENTRY = 1e8
 
 
 @jit_inline
 def unpack(nv, sizes, int_tables, float_tables, inputs):
-    """Tree, links, contacts, tasks and limits as `problem_arrays.pack_problem` and
-    `user_terms.UserTerms` laid them out.
+    """Return tree, links, contacts, tasks and limits from their flat arrays.
 
-    sizes: number of joints, contacts, points, motion rows, facets + 1, tasks, driven joints,
-        entries of λ, targets, numbers of user-defined contacts, user-defined tasks, groups of
-        user-defined rows; 1 or 0: whether all contacts are points, and `Inequalities.has_optional`.
-    int_tables, float_tables: whole and real numbers of all tables, one table after the other, as in
-        a workspace.
-    inputs: as for `tick`.
+    `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: number of
+    joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets,
+    numbers of user-defined contacts, user-defined tasks, groups of user-defined rows; then 1 or 0:
+    whether all contacts are points, and `Inequalities.has_optional`. int_tables, float_tables:
+    whole and real numbers of all tables, one table after another, as in a workspace. inputs: as for
+    `tick`.
     """
     n, n_contacts, n_points, n_rows, n_tasks = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5]
     d, k = sizes[6], sizes[7]
@@ -71,7 +71,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
 
 
 def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
-    """How many real and how many whole numbers a tick needs.
+    """Return how many real and how many whole numbers a tick needs as memory.
 
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """
@@ -89,8 +89,9 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
 
 @jit
 def inputs_valid(q, v, inputs, tree):
-    """Whether all numbers are finite, and quaternions and (cos, sin) in q have length 1; tree: as
-    in `Bodies`.
+    """Return whether all numbers are finite, and quaternions and (cos, sin) in q have length 1.
+
+    tree: as in `Bodies`.
     """
     if not (all_finite(q) and all_finite(v) and all_finite(inputs)):
         return False
@@ -106,8 +107,9 @@ def inputs_valid(q, v, inputs, tree):
 
 @jit
 def write_result(space: Parametrisation, beta, active, n_active, nv, result):
-    """Write (q̈, τ, λ) at β and the numbers of the active rows into `result`. Returns False where
-    one has no digits.
+    """Write (q̈, τ, λ) at β and the numbers of the active rows into `result`.
+
+    Returns False if an entry is NaN or too large to be accurate.
     """
     n, d = space.V.shape[0], space.T.shape[0]
     affine_value(space.V, beta, 0, nv, result[:nv])
@@ -122,24 +124,22 @@ def write_result(space: Parametrisation, beta, active, n_active, nv, result):
 
 
 def make_tick(digest):
-    """The function `tick`, to be compiled; digest: of this folder."""
+    """Return the function `tick`, to be compiled; digest: of this folder."""
 
     def tick(
         q, v, inputs, M, h, J, Ag, oMi, sizes, int_tables, float_tables, float_workspace,
         int_workspace, result, stages,
     ):  # fmt: skip
-        """(26)(27) Torques, accelerations and forces of one state. Returns how many rows are
-        active, or why there is no answer.
+        """Compute torques, accelerations and forces of one state: eqs. (26), (27).
 
-        q, v: (nq,), (nv,), the state.
-        inputs: what changes from tick to tick, as `user_terms.UserTerms` packs it: targets, least
-            and largest normal force of each point, then contacts, tasks and user-defined rows.
-        sizes, int_tables, float_tables: as for `unpack`; few arrays, since each costs.
-        M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
-        float_workspace, int_workspace: workspaces of `workspace_sizes` numbers.
-        result: receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv +
-            k,) each.
-        stages: how many of N_STAGES to run, for benchmarks.
+        Returns the number of active rows, or a code that says why there is no answer. q, v: (nq,),
+        (nv,), the state. inputs: what changes from tick to tick, as `user_terms.UserTerms` packs
+        it: targets, minimum and maximum normal force of each point, then user-defined contacts,
+        tasks and rows. sizes, int_tables, float_tables: as for `unpack`; few arrays, since each one
+        costs time. M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
+        float_workspace, int_workspace: workspaces of `workspace_sizes` numbers. result: receives
+        q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each. stages:
+        how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
         nv, m, d, k = v.size, sizes[3], sizes[6], sizes[7]
@@ -164,13 +164,13 @@ def make_tick(digest):
             A, b, M_rows, h, J_points, base, float_workspace, B, pivots
         )
         if motion_pivot <= DEPENDENT_ROW:
-            rows, right = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
-            m = independent_rows(A, b, v, rows, right)
+            rows, rhs = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
+            m = independent_rows(A, b, v, rows, rhs)
             if m < 0:
                 return INACCURATE
             B, pivots = B[: m + base], pivots[: m + base]
             _, smallest_pivot = eliminate(
-                rows[:m], right[:m], M_rows, h, J_points, base, float_workspace, B, pivots
+                rows[:m], rhs[:m], M_rows, h, J_points, base, float_workspace, B, pivots
             )
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE

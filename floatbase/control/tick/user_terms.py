@@ -1,6 +1,4 @@
-"""What a tick is given beside the state: moving targets, and the numbers of tasks, constraints and
-user-defined rows.
-"""
+"""Inputs of a tick other than the state: time-varying targets and user-defined terms."""
 
 from __future__ import annotations
 
@@ -24,27 +22,37 @@ UNBOUNDED = 1e300  # N, for inf among numbers that must be finite
 
 
 class TickInputs(NamedTuple):
-    """What one tick is given."""
+    """Inputs of one tick other than the state."""
 
-    # targets, least and largest normal force of each point, then own contacts, tasks and rows
+    # targets, minimum and maximum normal force of each point, then user-defined contacts, tasks
+    # and rows
     packed: Array
     n_user_rows: int = 0  # of all user-defined tasks
-    contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each own contact
+    contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each user-defined contact
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
         {}
-    )  # weight and residual of user-defined tasks, by their number
+    )  # weight and residual of user-defined tasks, by their index in the problem
     normal_forces: tuple[Array, Array] = (
         np.zeros(0),
         np.zeros(0),
-    )  # least and largest of each point, (P,)
+    )  # minimum and maximum of each point, (P,)
     inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of user-defined rows
 
 
 class UserTerms:
-    """What a problem has of its owner's making: objects that the tables of the tick do not know.
+    """User-defined objects of a problem, which the problem arrays do not contain.
 
-    any: whether there is something. varies: whether it, or a bound of a normal force, must be asked
-        for at every tick.
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Attributes
+    ----------
+    any : bool
+        Whether the problem has user-defined objects.
+    varies : bool
+        Whether they, or a bound of a normal force, must be evaluated at every tick.
     """
 
     def __init__(self, problem: Problem):
@@ -59,9 +67,7 @@ class UserTerms:
         ]
         self.any = bool(self._tasks or self._contacts or self._limits.inequalities)
         self.varies = self.any or self._limits.time_varying
-        bounds = np.zeros(
-            (2, problem.contacts.n_points)
-        )  # of those that move: they are asked at a time
+        bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
         self._constant_bounds = (
             (bounds[0], bounds[1])
             if self._limits.time_varying
@@ -70,8 +76,9 @@ class UserTerms:
         self._finite_bounds = _finite(self._constant_bounds)
 
     def zero_inputs(self, targets: Array) -> TickInputs:
-        """Targets, what still bounds of normal forces are, and otherwise as many zeros as a tick
-        without a state needs.
+        """Return targets, constant bounds of normal forces, and zeros for the user-defined terms.
+
+        There are as many zeros as a tick without a state needs.
         """
         nv = self._problem.robot.nv
         contact_size = sum(
@@ -84,8 +91,9 @@ class UserTerms:
         )
 
     def inputs(self, targets: Array, q: Array, v: Array, t: float) -> TickInputs:
-        """What a tick is given at a state. Raises `InputError`, or what functions of the owner's
-        raise.
+        """Return the inputs of a tick at a state.
+
+        Raises `InputError`, or what user functions raise.
         """
         problem, limits = self._problem, self._limits
         bounds = limits.normal_forces(problem.contacts, t)
@@ -105,14 +113,14 @@ class UserTerms:
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
-                raise InputError(f"weight of {task.name} is {weight:g}; it must be ≥ 0.")
+                raise InputError(f"weight of {task.name} is {weight:g}. It must be ≥ 0.")
             residuals[i], A, b = (weight, residual), residual.A, residual.b
             n_user_rows += len(b)
             packed += (block, len(b), weight), A.ravel(), b
         for each in limits.inequalities:
             G, h = each.at(eom, t)
             if each.row_names:
-                each.labels(len(h))  # raises where there is another number of them
+                each.labels(len(h))  # raises if their number does not match
             inequalities.append((G, h))
             packed += (BLOCKS.index(each.block), len(h)), G.ravel(), h
         return TickInputs(
@@ -120,7 +128,7 @@ class UserTerms:
         )
 
     def equations(self, state: State, t: float, inputs: TickInputs) -> EquationsOfMotion:
-        """(7) with what the own contacts said in a tick."""
+        """Return the equations (7) with the values of user-defined contacts in a tick."""
         contacts = self._problem.contacts
         if not self._contacts:
             return equations_of_motion(state, contacts, t)
@@ -136,4 +144,5 @@ class UserTerms:
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Replace infinite upper bounds of normal forces by `UNBOUNDED`."""
     return bounds[0], np.minimum(bounds[1], UNBOUNDED)

@@ -1,5 +1,6 @@
-"""Vectors in space as tuples of three numbers, which need no memory; a rotation is the tuple of its
-three columns.
+"""Vectors in space as tuples of three numbers, which need no memory.
+
+A rotation is the tuple of its three columns.
 """
 
 from __future__ import annotations
@@ -9,55 +10,56 @@ from floatbase.control.tick.jit import jit
 
 @jit
 def row_part(array, i, first):
-    """Three numbers of row i of an array (n, m), from column `first` on."""
+    """Return three numbers of row i of an array (n, m), from column `first` on."""
     return array[i, first], array[i, first + 1], array[i, first + 2]
 
 
 @jit
 def column_part(array, first, c):
-    """Three numbers of column c of an array (n, m), from row `first` on."""
+    """Return three numbers of column c of an array (n, m), from row `first` on."""
     return array[first, c], array[first + 1, c], array[first + 2, c]
 
 
 @jit
 def plus(a, b):
-    """a + b."""
+    """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @jit
 def minus(a, b):
-    """a - b."""
+    """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @jit
 def times(s, a):
-    """s a."""
+    """Return s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @jit
 def dot(a, b):
-    """aᵀ b."""
+    """Return aᵀ b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @jit
 def cross(a, b):
-    """a × b."""
+    """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @jit
 def rotate(R, a):
-    """R a."""
+    """Return R a."""
     return plus(plus(times(a[0], R[0]), times(a[1], R[1])), times(a[2], R[2]))
 
 
 @jit
 def rotation_in(poses, i):
-    """The rotation of pose i; poses: (n, 12 or more), the rotation column by column, then the
-    position.
+    """Return the rotation of pose i.
+
+    poses: (n, 12 or more), the rotation column by column, then the position.
     """
     return row_part(poses, i, 0), row_part(poses, i, 3), row_part(poses, i, 6)

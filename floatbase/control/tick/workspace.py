@@ -1,4 +1,4 @@
-"""Memory of the tick, which allocates nothing: it carves arrays out of a workspace.
+"""Memory of the tick, which allocates nothing: arrays are carved out of a workspace.
 
 workspace: one array of real or of whole numbers; its first entry counts how many are in use.
 """
@@ -12,20 +12,21 @@ from floatbase.control.tick.jit import jit, jit_inline
 
 @jit_inline
 def take_vector(workspace, n):
-    """The next n unused numbers of a workspace, not set to anything. Raises `MemoryError` where
-    there are fewer.
+    """Return the next n unused numbers of a workspace, uninitialized.
+
+    Raises `MemoryError` if there are fewer.
     """
     first = int(workspace[0])
     last = first + n
     if last > workspace.size:
-        raise MemoryError("the workspace of the controller's tick is too small")
+        raise MemoryError("the workspace of the compiled controller is too small")
     workspace[0] = last
     return workspace[first:last]
 
 
 @jit_inline
 def take_matrix(workspace, rows, columns):
-    """The next unused numbers of a workspace as an array (rows, columns), not set to anything."""
+    """Return the next unused numbers of a workspace as an uninitialized array (rows, columns)."""
     return take_vector(workspace, rows * columns).reshape(rows, columns)
 
 
@@ -39,7 +40,7 @@ def clear(array):
 
 @jit
 def all_finite(vector):
-    """Whether all entries of a vector (n,) are finite."""
+    """Return whether all entries of a vector (n,) are finite."""
     for i in range(vector.size):
         if not np.isfinite(vector[i]):
             return False
@@ -48,7 +49,7 @@ def all_finite(vector):
 
 @jit
 def largest(vector):
-    """The largest absolute value in a vector (n,)."""
+    """Return the largest absolute value in a vector (n,)."""
     size = 0.0
     for i in range(vector.size):
         size = max(size, abs(vector[i]))

@@ -7,10 +7,11 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Exercise, NumericJudge
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import NumericJudge
 from floatbase.robots import Robot
 
-UP = 2.0  # m/s², the acceleration asked for
+UP = 2.0  # m/s², the requested acceleration
 
 
 @cache
@@ -20,10 +21,11 @@ def _go2() -> Robot:
 
 @cache
 def _sum_of_forces() -> float:
-    """The vertical force row of M q̈ + h when all of the robot accelerates upwards: neither by its
-    mass nor by its weight.
+    """Compute the vertical contact force from M q̈ + h, with neither the mass nor the weight.
+
+    The whole robot accelerates upwards.
     """
-    state = _go2().standing()  # its base is level, so that the third row is vertical
+    state = _go2().standing()  # its base is level, so the third row is vertical
     qdd = np.zeros(_go2().nv)
     qdd[2] = UP
     return float((state.M @ qdd + state.h)[2])
@@ -36,9 +38,8 @@ def _weight() -> float:
 EXERCISES = (
     Exercise(
         name="00.1",
-        statement="The centre of mass of go2 accelerates upwards at 2 m/s². How large is the sum "
-        "of the vertical forces that "
-        "the ground exerts on its feet, in N?",
+        statement="The centre of mass of go2 accelerates upwards at 2 m/s². What is the sum of "
+        "the vertical forces that the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
         judge=NumericJudge(
@@ -57,26 +58,24 @@ EXERCISES = (
                 "reaction": lambda: -_sum_of_forces(),
             },
             hints={
-                "weight_alone": "That is the weight alone: with it the robot stays where it is, or "
-                "goes on as it goes.",
-                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's the "
-                "only one?",
-                "downwards": "That would let it accelerate downwards: draw both forces, and which "
-                "one is larger.",
-                "acceleration": "That is an acceleration, in m/s²; a force needs the mass.",
-                "mass_on_g_alone": "The weight is right; the 2 m/s² must be multiplied by the mass "
-                "before they are added.",
-                "g_without_mass": "m a is right, but g without the mass is no force.",
-                "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
-                "one_foot": "That is the share of one foot, on average; the question is about all "
-                "feet.",
-                "reaction": "That is what the robot does to the ground; the answer is what the "
-                "ground does to the robot.",
+                "weight_alone": "That is the weight alone. With this force the robot stays at "
+                "rest or keeps its velocity.",
+                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's "
+                "force the only one?",
+                "downwards": "With this force the robot would accelerate downwards. Draw both "
+                "forces. Which one is larger?",
+                "acceleration": "That is an acceleration, in m/s². A force needs the mass.",
+                "mass_on_g_alone": "The weight is right. Multiply the 2 m/s² by the mass before "
+                "you add it.",
+                "g_without_mass": "m a is right, but g without the mass is not a force.",
+                "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
+                "one_foot": "That is the mean force at one foot. The question is about all feet.",
+                "reaction": "That is the force of the robot on the ground. The answer is the "
+                "force of the ground on the robot.",
             },
         ),
         examples=lambda: [(_go2().mass * (9.8 + UP), "")],
-        explanation="Newton: the vertical forces of the ground minus the weight give mass times "
-        "acceleration, so together they "
-        "are m g + m a.",
+        explanation="By Newton's law, the vertical forces of the ground minus the weight equal "
+        "mass times acceleration. So their sum is m g + m a.",
     ),
 )

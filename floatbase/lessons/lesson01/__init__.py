@@ -1,4 +1,4 @@
-"""Lesson 01, What is a floating base?"""
+"""Lesson 01, "What is a floating base?"."""
 
 from floatbase.lessons.lesson01.exercises import EXERCISES
 from floatbase.lessons.lesson01.helpers import (

@@ -1,22 +1,21 @@
-"""Exercises of lesson 01, What is a floating base?"""
+"""Exercises of lesson 01, "What is a floating base?"."""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import fixed_frame
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
     format_vector,
 )
 from floatbase.lessons.lesson01.pictures import PRESSING_POSTURE
@@ -26,14 +25,15 @@ from floatbase.robots import PLATE_SIZE, with_floating_base
 
 @cache
 def _pressing_arm() -> tuple[fb.State, Array, Array]:
-    """The pressing arm without bolts, the tool's position seen from the base, and f_r."""
+    """Return the pressing arm without bolts, the tool's position from the base, and f_r."""
     state = with_floating_base(fb.load("ur5", posture=PRESSING_POSTURE)).standing()
     return state, state.point("tool0") - state.point("base_link"), np.array([-60.0, 0.0, 0.0])
 
 
 def _bolts_moment() -> Array:
-    """From the constraint forces of (7): what the welded base's wrench becomes with the wall, less
-    what it is without.
+    """Compute the moment of the bolts from the constraint forces of (7).
+
+    It is the wrench of the welded base with the wall's force, minus the wrench without it.
     """
     state, _, force = _pressing_arm()
     J = state.frame_jacobian("tool0")[:3]
@@ -54,27 +54,24 @@ def _with_the_weight() -> Array:
 
 
 def _actuation_of_solo8() -> Array:
-    """S, column by column: what (3) gives for one torque at a time."""
+    """Return S, column by column: what (3) gives for one torque at a time."""
     robot = fb.load("solo8")
     columns = [np.concatenate([np.zeros(6), one]) for one in np.eye(robot.d)]
     return np.column_stack(columns)
 
 
 def _carried_by_friction() -> float:
-    """Largest horizontal force on a standing go2 that cones of 0.7 allow, from the cone's own
-    number.
-    """
+    """Return the largest horizontal force on a standing go2 within cones of μ = 0.7."""
     robot = fb.load("go2")
     contacts = fb.Contacts.points(robot, mu=0.7)
     return float(contacts.mus.max()) * sum(inertia.mass for inertia in robot.model.inertias) * 9.81
 
 
 def _held_width() -> float:
-    """Width, m, of the plate of the pressing arm whose rear edge is where the floor's force then
-    acts.
+    """Return the width of the plate whose rear edge is where the force of the floor acts [m].
 
-    By the centre of pressure: the base's rows say which force and moment the plate must give at the
-    base for q̈ = 0.
+    The base rows for q̈ = 0 give the force and moment of the plate on the base. The centre of
+    pressure follows from them.
     """
     state = _on_the_plate()
     wrench = (state.h - state.frame_jacobian("tool0")[:3].T @ np.array([-120.0, 0.0, 0.0]))[:6]
@@ -94,12 +91,11 @@ def _by_levers(
     below: float = 0.0,
     ahead: float | None = None,
 ) -> float:
-    """The width, m, at which push and weight have the same moment about the rear edge; mistakes
-    change one of them.
+    """Return the width at which push and weight have equal moments about the rear edge [m].
 
-    press, weight: N.
-    below: what of the tool's height over the floor does not count, m.
-    ahead: how far ahead of the middle the weight acts, m.
+    The parameters change one quantity at a time, for known mistakes: press and weight [N], below:
+    part of the tool's height that does not count [m], ahead: distance of the weight from the middle
+    [m].
     """
     state = _on_the_plate()
     height, weight = (
@@ -110,22 +106,21 @@ def _by_levers(
 
 
 def _in_proportion() -> float:
-    """The width, m, if what a plate holds were proportional to its width."""
+    """Return the width if the largest push were proportional to the width [m]."""
     twice = 2 * _on_the_plate().com[0]
     return float(PLATE_SIZE[0] * (_by_levers() + twice) / (PLATE_SIZE[0] + twice))
 
 
-def _judge_thrust(answer: Any) -> Verdict:
-    """Thrusts at the four feet of a standing go2: 200 N straight up in all, and no moment about the
-    centre of mass.
+@array_judge((4, 3), (12,))
+def _judge_thrust(f: Array) -> Verdict:
+    """Judge thrusts at the four feet of a standing go2.
+
+    They must add up to 200 N straight up, without a moment about the centre of mass.
     """
-    f = array_or_verdict(answer, (4, 3), (12,))
-    if isinstance(f, Verdict):
-        return f
     f = f.reshape(4, 3)
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    # by the momentum that (4) brings about, not by sums of forces and levers
+    # by the momentum that follows from (4), not by sums of forces and moments
     rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [
         0.0,
         0.0,
@@ -137,32 +132,33 @@ def _judge_thrust(answer: Any) -> Verdict:
     if abs(rate[2] + 200.0) < 0.2:
         return Verdict(
             False,
-            "The size is right, the sign is not: these thrusters push the robot down.",
+            "The magnitude is right, but the sign is wrong: these thrusters push the robot down.",
             "sign",
         )
     if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
         return Verdict(
             False,
-            f"The forces add up to {format_vector(rate[:3])} N; they should be (0, 0, 200) N.",
+            f"The forces add up to {format_vector(rate[:3])} N, but they should add up to "
+            f"(0, 0, 200) N.",
             "force",
         )
     if abs(rate[3:]).max() > 0.02:
         where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
         return Verdict(
             False,
-            f"The force is right, but it turns the robot: moment ({where}) N·m about the centre of "
-            f"mass.",
+            f"The force is right, but there is a moment of ({where}) N·m about the centre of mass, "
+            f"which turns the robot.",
             "moment",
         )
     return Verdict(
         True,
-        "Straight up without turning. Six conditions on twelve numbers: there are many other "
-        "answers.",
+        "Straight up without turning. There are six conditions for twelve numbers, so there are "
+        "many other answers.",
     )
 
 
 def _thrusts() -> list[Example]:
-    """Front and rear share the force as the centre of mass has it."""
+    """Return examples: front and rear share the force according to the centre of mass."""
     state = fb.load("go2").standing()
     feet = fb.Contacts.points(state.robot).positions(state) - state.com
     front, rear = abs(feet[0, 0]), abs(feet[2, 0])
@@ -174,15 +170,14 @@ def _thrusts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="01.1",
-        statement="The moment, shape (3,), N·m, by which the bolts answer the wall. The wall "
-        "pushes with f_r at `tool`, both "
-        "seen from the base. The weight, which the bolts carry anyway, does not count.",
+        statement="The wall pushes on the arm with f_r at `tool`, both given in the frame of "
+        "the base. With which moment, shape (3,), N·m, do the bolts balance it? The weight, "
+        "which the bolts carry anyway, does not count.",
         stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
         solution="bolts_moment = -np.cross(tool, f_r)",
         judge=NumericJudge(
             right=_bolts_moment,
-            praise="The bolts undo what the wall does: force and moment, each with the opposite "
-            "sign.",
+            praise="The bolts balance the wall: force and moment, each with the opposite sign.",
             mistakes={
                 "walls_moment": lambda: -_bolts_moment(),
                 "about_com": _about_the_centre_of_mass,
@@ -194,28 +189,24 @@ EXERCISES = (
                 "force_itself": lambda: _pressing_arm()[2],
             },
             hints={
-                "walls_moment": "This is the wall's own moment about the base. The bolts answer "
-                "it: look at the sign, or at "
-                "the order of the "
-                "cross product.",
-                "about_com": "The moment is taken about the centre of mass; the bolts sit at the "
+                "walls_moment": "This is the moment of the wall about the base. The bolts "
+                "balance it. Check the sign, or the order of the cross product.",
+                "about_com": "This moment is about the centre of mass, but the bolts are at the "
                 "base.",
-                "weight_too": "This holds the weight's moment as well; the bolts should answer the "
-                "wall alone.",
-                "zero": "Zero would mean that nobody answers the wall. Which lever, and which "
-                "force?",
-                "height_alone": "This takes the height of the tool alone; it is also 11 cm to the "
-                "side, and that is a lever "
-                "too.",
-                "elementwise": "* multiplies number by number; a moment is the cross product of "
-                "lever and force.",
-                "minus_force": "This is a force; a moment needs a lever: how far from the base "
-                "does the force act?",
-                "force_itself": "This is f_r itself; a moment needs a lever, and the bolts answer "
-                "the other way round.",
+                "weight_too": "This includes the moment of the weight. Only the wall counts here.",
+                "zero": "Zero would mean that nothing balances the wall. Which lever arm and "
+                "which force are needed?",
+                "height_alone": "This uses only the height of the tool. The tool is also 11 cm "
+                "to the side, and that is a lever arm, too.",
+                "elementwise": "* multiplies element by element. A moment is the cross product "
+                "of lever arm and force.",
+                "minus_force": "This is a force. A moment needs a lever arm: how far from the "
+                "base does the force act?",
+                "force_itself": "This is f_r itself. A moment needs a lever arm, and the bolts "
+                "act in the opposite direction.",
             },
         ),
-        explanation="At rest the moments about the base add up to zero: tool × f_r + τ_b = 0.",
+        explanation="At rest, the moments about the base add up to zero: tool × f_r + τ_b = 0.",
     ),
     Exercise(
         name="01.2",
@@ -228,35 +219,35 @@ EXERCISES = (
                 (
                     8,
                     8,
-                ): "S maps 8 torques into all rows of the equations of motion. How many rows does "
+                ): "S maps 8 torques to all rows of the equations of motion. How many rows does "
                 "a base add, and where?",
-                (8, 14): "This is the transpose of the answer: S takes 8 torques to 14 rows.",
+                (8, 14): "This is the transpose of the answer. S maps 8 torques to 14 rows.",
                 (
                     9,
                     8,
-                ): "A base adds more than one row: three for its position, three for its "
+                ): "A base adds more than one row: three for its position and three for its "
                 "orientation.",
-                (18, 12): "That is the S of go2, with three joints in each leg; solo8 has two.",
+                (18, 12): "That is the S of go2, which has three joints in each leg. solo8 has "
+                "two.",
                 (
                     15,
                     8,
-                ): "15 counts the quaternion's four numbers. Rows of (4) go with velocities, and a "
-                "rotation has three.",
+                ): "15 counts the four numbers of the quaternion. The rows of (4) correspond to "
+                "velocities, and a rotation has three.",
             },
             judge=NumericJudge(
                 right=_actuation_of_solo8,
-                praise="Six rows that no motor reaches, then one row for each motor.",
+                praise="Six rows without a motor, then one row for each motor.",
                 mistakes={
                     "base_last": lambda: np.roll(_actuation_of_solo8(), -6, axis=0),
                     "zeros": lambda: np.zeros((14, 8)),
                     "sign": lambda: -_actuation_of_solo8(),
                 },
                 hints={
-                    "base_last": "The base comes first in q, as (2) has it; here its rows stand "
-                    "last.",
-                    "zeros": "Zeros everywhere: no motor drives anything. Where does each torque "
-                    "act?",
-                    "sign": "Is there a torque that pushes a joint backwards? One sign too many.",
+                    "base_last": "The base comes first in q, as in (2). Here its rows come last.",
+                    "zeros": "All entries are zero, so no motor drives anything. Where does "
+                    "each torque act?",
+                    "sign": "Does a positive torque push a joint backwards? One sign is wrong.",
                 },
             ),
         ),
@@ -265,16 +256,16 @@ EXERCISES = (
     ),
     Exercise(
         name="01.3",
-        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough not "
-        "to tip. What is the largest "
-        "horizontal force, in N, that the floor can answer while the robot stays at rest?",
+        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough "
+        "not to tip over. What is the largest horizontal force, in N, that the floor can "
+        "balance while the robot stays at rest?",
         stub="most = 1000.0  # N: replace this number by an expression",
         solution="most = 0.7 * go2.mass * 9.81",
         judge=NumericJudge(
             right=_carried_by_friction,
             tolerance=2e-3,  # g may be 9.8
-            praise="The bolts' answer had no bound. This one is friction times weight, as long as "
-            "no jump adds to it.",
+            praise="The force of the bolts had no bound. This force is at most friction times "
+            "weight, as long as the robot does not jump.",
             mistakes={
                 "g_is_10": lambda: 10 * _carried_by_friction() / 9.81,
                 "weight": lambda: _carried_by_friction() / 0.7,
@@ -286,56 +277,58 @@ EXERCISES = (
                 "mu_twice": lambda: 0.7 * _carried_by_friction(),
             },
             hints={
-                "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
+                "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
                 "weight": "That is the weight. A horizontal force has to come from friction.",
-                "one_foot": "That is the share of one foot; four feet share the work.",
-                "four_weights": "All four feet together carry one weight, not four.",
-                "mass": "That is friction times mass, in kg; a force needs one more factor.",
-                "divided": "μ multiplies the normal force; it does not divide it.",
-                "pyramid": "That is what the controller's four-sided pyramid allows. The floor can "
-                "do more: the round cone.",
-                "mu_twice": "Friction answers along the floor only as far as the normal force "
-                "goes: multiply by μ, once.",
+                "one_foot": "That is the limit of one foot. Four feet share the force.",
+                "four_weights": "All four feet together carry the weight once, not four times.",
+                "mass": "That is the friction coefficient times the mass, in kg. A force needs "
+                "one more factor.",
+                "divided": "Multiply the normal force by μ; do not divide by it.",
+                "pyramid": "That is the limit of the controller's four-sided pyramid. The "
+                "floor's limit is the round cone, which is larger.",
+                "mu_twice": "The friction force is at most μ times the normal force. Multiply "
+                "by μ only once.",
             },
         ),
         examples=lambda: [(0.7 * fb.load("go2").mass * 9.8, "")],
-        explanation="Each foot gives at most μ times its normal force, and the normal forces add "
-        "up to the weight.",
+        explanation="The friction force at each foot is at most μ times its normal force, and "
+        "the normal forces add up to the weight.",
     ),
     Exercise(
         name="01.4",
         statement="A design: go2 floats in its standing posture with a thruster at every foot. "
-        "Choose the forces, shape "
-        "(4, 3), N, world, in the order of `contacts.names`, so that they add up to 200 N straight "
-        "up and turn nothing. "
-        "Row i of `levers` is x_i - x_c.",
+        "Choose the forces, shape (4, 3), N, world, in the order of `contacts.names`. Together "
+        "they must push straight up with 200 N, without any moment. Row i of `levers` is x_i - "
+        "x_c.",
         stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first "
         "guess",
         solution="moments = [np.cross(np.eye(3), -lever).T for lever in levers]\n"
         "G = np.vstack([np.tile(np.eye(3), 4), np.hstack(moments)])\n"
         "thrust = np.linalg.lstsq(G, [0, 0, 200, 0, 0, 0], rcond=None)[0].reshape(4, 3)",
         judge=ShapeJudge(
-            _judge_thrust, {(3, 4): "This is the transpose: one row for each foot, three columns."}
+            _judge_thrust,
+            {
+                (3, 4): "This is the transpose. The answer needs one row for each "
+                "foot, with three columns."
+            },
         ),
         examples=_thrusts,
-        explanation="Forces and moments are linear in the thrusts, six rows on twelve numbers; "
-        "least squares gives the "
-        "smallest thrusts that do it. Lesson 05 calls the two halves of this matrix G_f and G_τ, "
-        "(20) and (21).",
+        explanation="Forces and moments are linear in the thrusts: six equations for twelve "
+        "numbers. Least squares gives the smallest thrusts that satisfy them. Lesson 05 calls "
+        "the two halves of this matrix G_f and G_τ, (20) and (21).",
     ),
     Exercise(
         name="01.5",
         statement="The arm on its plate is to press with 120 N. How wide, in m, must the square "
-        "plate be, at least? `at_rest` "
-        'has .com and .point("tool0"), `standing.weight` is the weight. The plate has no weight; '
-        "all else stays as it was.",
+        'plate be, at least? `at_rest` has .com and .point("tool0"), and `standing.weight` is '
+        "the weight. The plate has no weight. Everything else stays the same.",
         stub="width = 0.4  # m: replace this number by an expression",
         solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - '
         "at_rest.com[0])",
         judge=NumericJudge(
             right=_held_width,
-            praise="A harder push needs a wider plate. A robot that walks has no wider plate; it "
-            "puts a foot there in time.",
+            praise="A harder push needs a wider plate. A walking robot cannot widen its plate; "
+            "it puts a foot in the right place in time.",
             mistakes={
                 "half": lambda: _held_width() / 2,
                 "height_from_base": lambda: _by_levers(below=PLATE_SIZE[1]),
@@ -348,28 +341,24 @@ EXERCISES = (
                 "exchanged": lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0),
             },
             hints={
-                "half": "That is the distance from the middle to the rear edge. The plate goes as "
-                "far to the front.",
-                "height_from_base": "The plate tips about an edge on the floor; the tool's height "
-                "counts from there, not from "
-                "the base.",
-                "com_in_middle": "Where does the weight act? The centre of mass is not above the "
-                "middle of the plate.",
-                "com_sign": "The centre of mass is ahead of the middle, and the plate tips about "
-                "its rear edge: is that good "
-                "or bad?",
-                "plate_as_is": "That is the plate as it is, and with 120 N it tips.",
-                "in_proportion": "What a plate holds does not grow in proportion to its width: "
-                "part of the lever is there "
-                "without a plate.",
-                "half_press": "That holds 60 N. The arm is to press with 120 N.",
-                "mass": "That takes the mass for the weight: a force needs one more factor.",
-                "exchanged": "Height and distance from the edge are exchanged: which lever belongs "
-                "to the push, which to the "
-                "weight?",
+                "half": "That is the distance from the middle to the rear edge. The plate "
+                "extends as far to the front.",
+                "height_from_base": "The plate tips about an edge on the floor. Measure the "
+                "height of the tool from the floor, not from the base.",
+                "com_in_middle": "Where does the weight act? The centre of mass is not above "
+                "the middle of the plate.",
+                "com_sign": "The centre of mass is ahead of the middle, and the plate tips "
+                "about its rear edge. Does that help or not?",
+                "plate_as_is": "That is the present width, and with 120 N this plate tips over.",
+                "in_proportion": "The largest push is not proportional to the width of the "
+                "plate: part of the lever arm exists without a plate.",
+                "half_press": "That is enough for 60 N. The arm is to press with 120 N.",
+                "mass": "That uses the mass instead of the weight. A force needs one more factor.",
+                "exchanged": "Height and distance from the edge are interchanged. Which lever "
+                "arm belongs to the push, and which to the weight?",
             },
         ),
-        explanation="About the rear edge: 120 N × height = weight × (half the width + how far the "
-        "centre of mass is ahead).",
+        explanation="Moments about the rear edge: 120 N × height = weight × (half the width + "
+        "distance of the centre of mass ahead of the middle).",
     ),
 )

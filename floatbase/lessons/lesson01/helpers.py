@@ -1,6 +1,4 @@
-"""Lesson 01: the smallest robot; the arm without bolts: paths of its joints, no gravity, how far
-its base turned.
-"""
+"""Lesson 01: the smallest robot, joint paths, a simulation without gravity, and base rotation."""
 
 from __future__ import annotations
 
@@ -33,20 +31,43 @@ LIFT_URDF = """
 
 
 def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
-    """A path t -> joint offsets, (6,) rad, for `joint_servo`: one joint of six turns by `angle`,
-    rad, in `duration`, s.
+    """Return a path that turns one of six joints; it starts and ends at rest.
 
-    It starts and ends at rest.
+    Parameters
+    ----------
+    joint : int
+        Index of the joint, from 0.
+    angle : float
+        Angle of the turn [rad].
+    duration : float
+        Duration [s].
+
+    Returns
+    -------
+    callable
+        The path for `joint_servo`: a function of time [s] that returns joint offsets, shape (6,),
+        [rad].
     """
     return lambda t: angle * minimum_jerk(t / duration)[0] * np.eye(6)[joint]
 
 
 def joint_circle(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
-    """A path t -> joint offsets, (6,) rad, for `joint_servo`: two joints of six go once around a
-    circle, back to 0.
+    """Return a path on which two of six joints go once around a circle; it starts and ends at rest.
 
-    first, second: numbers of the joints, from 0. size: radius, rad. duration: s. It starts and ends
-        at rest.
+    Parameters
+    ----------
+    first, second : int
+        Indices of the joints, from 0.
+    size : float
+        Radius of the circle [rad].
+    duration : float
+        Duration [s].
+
+    Returns
+    -------
+    callable
+        The path for `joint_servo`: a function of time [s] that returns joint offsets, shape (6,),
+        [rad].
     """
 
     def path(t: float) -> Array:
@@ -57,15 +78,35 @@ def joint_circle(first: int, second: int, size: float, duration: float) -> Calla
 
 
 def weightless_simulation(robot: Robot) -> fb.Simulation:
-    """A `Simulation` of the robot without gravity."""
+    """Return a simulation of a robot without gravity.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    Simulation
+        The simulation.
+    """
     sim = fb.Simulation(robot)
     sim.model.opt.gravity[:] = 0.0
     return sim
 
 
 def base_rotation(record: Rollout) -> Array:
-    """How the base turned from the first row of a record to the last: axis times angle, shape (3,),
-    degrees, world.
+    """Return how far the base turned in a record.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Rotation vector (axis times angle) from the first row to the last, in the world frame [°].
     """
     first, last = (record.state(i).frame_pose("base_link").rotation for i in (0, -1))
     return read_only(np.degrees(pin.log3(last @ first.T)))

@@ -1,6 +1,4 @@
-"""Lesson 01, What is a floating base: an arm with its bolts cut, and the pictures of Figure 1 as
-experiments.
-"""
+"""Lesson 01: an arm whose bolts are cut, and the parts of Figure 1 as experiments."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import props
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.lessons.rounding import rounded
 from floatbase.objectives import Task, centroidal_momentum_rate
@@ -22,19 +20,13 @@ from floatbase.viewer import Item, Picture, View, Viewer, markers, prefixed, sha
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene.colours import MEASURED
 
-PRESSING_POSTURE = (
-    0.0,
-    -1.7,
-    1.2,
-    0.5,
-    np.pi / 2,
-    0.0,
-)  # joints of ur5, rad: the tool points along x, 0.6 m above the ground
+# joints of ur5, rad: the tool points along x, 0.6 m above the ground
+PRESSING_POSTURE = (0.0, -1.7, 1.2, 0.5, np.pi / 2, 0.0)
 PRESSING_VIEW = View(100.0, 14.0, 1.0, around=((-0.05, 0.0, 0.38), 0.62))
 
 
 def show_arm(view: Viewer, state: fb.State) -> Viewer:
-    """The arm in front of the wall, with the axes x, y, z of the world at its base."""
+    """Draw the arm in front of the wall, with the axes x, y, z of the world at its base."""
     tool = state.point("tool0")
     extra = _wall(tool) | prefixed("axes", markers.frame_axes(np.eye(4), 0.28))
     names: dict[str, npt.ArrayLike] = {
@@ -50,10 +42,21 @@ def show_arm(view: Viewer, state: fb.State) -> Viewer:
 
 
 def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """Figure 1, left: a slider for how hard the arm presses; the wall answers with f_r, the bolts
-    with a force and τ_b.
+    """Return a panel for Figure 1, left: a slider sets how hard the arm presses against a wall.
 
-    state: the bolted arm at rest, its tool at the wall.
+    The wall responds with f_r, and the bolts with a force and τ_b.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    state : State
+        The bolted arm at rest with its tool at the wall.
+
+    Returns
+    -------
+    SliderPanel
+        The panel.
     """
     view.show(state, com=False)
     view.camera(PRESSING_VIEW)
@@ -94,9 +97,7 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
 
 def play_pressing(view: Viewer, record: Rollout) -> Viewer:
-    """The arm on its plate in front of the wall, as the record has it, with the wall's force on the
-    tool.
-    """
+    """Play a record of the arm on its plate, with the force of the wall on the tool."""
     scene = _wall(record.state(0).point("tool0"))
     view.add_legend_entry("f", MEASURED, "force of the wall")
 
@@ -116,8 +117,9 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:
-    """The arm without bolts, gravity and ground, with axes on its base; a veil stays where it was
-    first.
+    """Play a record of the arm without bolts, gravity and ground, with axes on its base.
+
+    A ghost shows the initial state.
     """
 
     def picture(state: fb.State, i: int) -> Picture:
@@ -128,8 +130,9 @@ def play_floating(view: Viewer, record: Rollout) -> Viewer:
 
 
 def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """go2 in the air: a slider swings its legs. The base, with its axes, stays, and the centre of
-    mass does not (note 3).
+    """Return a panel with go2 in the air: a slider swings its legs.
+
+    The base stays in place, but the centre of mass moves (note 3 of the course text).
     """
     first = state.robot.nv - state.robot.d
     swing = np.zeros(state.robot.nv)
@@ -151,8 +154,9 @@ def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
 
 def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """Figure 1, right: sliders for how the body should accelerate; the feet answer with f_i, which
-    add up to f_c and τ_c.
+    """Return a panel for Figure 1, right: sliders set the acceleration of the body.
+
+    The feet respond with the forces f_i, which add up to f_c and τ_c.
     """
 
     def draw(forwards: float, up: float, turn: float) -> str:
@@ -179,9 +183,14 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
 
 
 def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """go2 in space with a thruster at every foot, (4): sliders for the vertical thrust of each left
-    and each right foot and for a horizontal one, forwards at the left feet and backwards at the
-    right ones.
+    """Return a panel with go2 in space and a thruster at every foot.
+
+    Sliders set the vertical thrust of the left and of the right feet, and a horizontal thrust that
+    points forwards at the left feet and backwards at the right feet.
+
+    Notes
+    -----
+    [FBR]_, eq. (4).
     """
     eom = fb.equations_of_motion(state, contacts)
     left = np.array([name[1] == "L" for name in contacts.names])
@@ -220,7 +229,7 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
 
 
 def _without_ground(picture: Picture) -> Picture:
-    """A picture without its ground, and without the shadow of the centre of mass on it."""
+    """Remove the ground and the projection of the centre of mass from a picture."""
     return {
         path: item
         for path, item in picture.items()
@@ -229,7 +238,7 @@ def _without_ground(picture: Picture) -> Picture:
 
 
 def _wall(tool: Array) -> Picture:
-    """The wall that the tool touches, 0.6 m wide and 0.9 m high. tool: shape (3,), m, world."""
+    """Return the wall that the tool touches at a point, shape (3,), 0.6 m wide and 0.9 m high."""
     normal = np.array([-1.0, 0.0, 0.0])
     return prefixed(
         "wall", {"/slab": props.wall([tool[0] + 0.003, tool[1], 0.45], normal, 0.6, 0.9)}
@@ -237,7 +246,7 @@ def _wall(tool: Array) -> Picture:
 
 
 def _plate(state: fb.State) -> Item:
-    """The plate below the base: the slab of a wall, placed flat."""
+    """Return the plate below the base: a wall that lies flat."""
     width, thick = PLATE_SIZE
     slab = props.wall(np.zeros(3), [1.0, 0.0, 0.0], 1.0, 1.0)
     pose = state.frame_pose("base_link")
@@ -246,9 +255,7 @@ def _plate(state: fb.State) -> Item:
 
 
 def _draw_arm(view: Viewer, state: fb.State, first: fb.State | None = None) -> Picture:
-    """The arm. first: a state to show as a veil; then axes on the base and the centre of mass are
-    drawn too.
-    """
+    """Draw the arm; with a first state as ghost, also the base's axes and the centre of mass."""
     drawn = view.painter.picture(state, com=first is not None, ghost=first)
     if first is not None:
         drawn |= prefixed(
@@ -264,8 +271,8 @@ def _play_record(
     look: View,
     speed: float = 1.0,
 ) -> Viewer:
-    """Play a record as pictures, 30 a second. picture: (state, row of the record) -> `Picture`."""
+    """Play a record as 30 pictures per second; picture: (state, row of the record) -> `Picture`."""
     rows = recording.sampled_rows(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]
-    view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="where it was first")
+    view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="initial state")
     return view.camera(look)

@@ -1,4 +1,4 @@
-"""Lesson 02, experiments: constant torques, how far feet and tools stray, a wheel that parks."""
+"""Lesson 02: constant torques, displacements of feet and tools, and a wheel that parks."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from floatbase.lessons.controllers import ConstantTorques
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
-MotionSolver = Callable[
-    [EquationsOfMotion, Array, Array], tuple[Array, Array]
-]  # (eom, τ, b) -> (q̈, λ), by (7)
+# (eom, τ, b) -> (q̈, λ), by (7)
+MotionSolver = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]
 DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
 
 
@@ -29,13 +28,26 @@ def run_constant_torques(
     motion: MotionSolver,
     duration: float = 0.2,
 ) -> Rollout:
-    """MuJoCo under constant torques; `planned` holds the λ of (7) at every millisecond, `measured`
-    the engine's.
+    """Simulate a robot under constant torques, with the contact forces of (7) as planned forces.
 
-    contacts: the stance of (7).
-    tau: shape (d,), N·m.
-    motion: solves (7), (eom, τ, b) -> (q̈, λ).
-    duration: s.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        Contacts in (7).
+    tau : array_like, shape (d,)
+        Torques [N·m].
+    motion : callable
+        Solver of (7): a function of (eom, τ, b) that returns (q̈, λ).
+    duration : float, optional
+        Duration [s].
+
+    Returns
+    -------
+    Rollout
+        The record. `planned` contains the λ of (7) in every millisecond, `measured` the contact
+        forces of the physics engine.
     """
     torques = np.array(tau, dtype=np.float64)
 
@@ -49,28 +61,53 @@ def run_constant_torques(
 
 
 def foot_displacement(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
-    """Distance of the worst foot from its first position, m, for each state; shape (number of
-    states,).
+    """Return how far the feet have moved from their first position.
+
+    Parameters
+    ----------
+    states : sequence of State
+        The states.
+    contacts : Contacts
+        The feet.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Largest displacement of a foot in each state [m].
     """
     places = np.array([contacts.positions(state) for state in states])
     return np.asarray(np.linalg.norm(places - places[0], axis=2).max(axis=1))
 
 
 def tool_displacement(record: Rollout) -> Array:
-    """Distance of the arm's tool from its first position, mm, for every row of a record; shape
-    (rows,).
+    """Return how far the tool of an arm has moved from its first position.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Displacement of the tool in each row [mm].
     """
     places = np.array([record.state(i).point("tool0") for i in range(len(record))])
     return 1e3 * np.asarray(np.linalg.norm(places - places[0], axis=1))
 
 
 def load_disc() -> Robot:
-    """A robot without joints: a solid disc, 1 kg and 0.2 m radius, free to move; its axle is y."""
+    """Load a free solid disc without joints: mass 1 kg, radius 0.2 m, axle along y."""
     return fb.load_urdf(assets_root() / "models" / "disc.urdf")
 
 
 def rolling_wheel() -> RollingWheel:
-    """The constraint (6) of `load_disc`: it rolls on the level ground."""
+    """Return the rolling constraint of the disc of `load_disc` on level ground.
+
+    Notes
+    -----
+    [FBR]_, eq. (6).
+    """
     return RollingWheel("disc", np.array([0.0, 1.0, 0.0]), DISC_RADIUS)
 
 
@@ -78,13 +115,27 @@ def disc_state(
     robot: Robot, place: Sequence[float] = (0.0, 0.0), heading: float = 0.0, rolled: float = 0.0,
     speed: float = 0.0, turning: float = 0.0,
 ) -> fb.State:  # fmt: skip
-    """The disc upright on the ground, rolling without slip.
+    """Return a state of the disc, upright on the ground and rolling without slip.
 
-    place: x and y of its centre, m, world.
-    heading: of its rolling, rad about the vertical; 0 is along x.
-    rolled: how far it has rolled about its axle, rad.
-    speed: m/s along its heading.
-    turning: rad/s about the vertical.
+    Parameters
+    ----------
+    robot : Robot
+        The disc.
+    place : sequence of float, optional
+        x and y of its centre in the world frame [m].
+    heading : float, optional
+        Direction of rolling: angle about the vertical [rad]; 0 is along x.
+    rolled : float, optional
+        Angle by which it has turned about its axle [rad].
+    speed : float, optional
+        Speed along its heading [m/s].
+    turning : float, optional
+        Angular velocity about the vertical [rad/s].
+
+    Returns
+    -------
+    State
+        The state.
     """
     R = pin.utils.rotate("z", heading) @ pin.utils.rotate("y", rolled)
     velocity = speed * np.array([np.cos(heading), np.sin(heading), 0.0])
@@ -96,10 +147,25 @@ def disc_state(
 def parking_states(
     robot: Robot, distance: float = 0.5, angle: float = 0.7, steps: int = 20
 ) -> list[fb.State]:
-    """The disc parks: it rolls ahead, turns, rolls back, turns back, 1 s each; a list of states
-    with their velocities.
+    """Return the states of a disc that parks: it rolls ahead, turns, rolls back and turns back.
 
-    distance: how far it rolls, m. angle: how far it turns, rad. steps: states a second.
+    Each of the four parts takes 1 s.
+
+    Parameters
+    ----------
+    robot : Robot
+        The disc.
+    distance : float, optional
+        Distance that it rolls [m].
+    angle : float, optional
+        Angle that it turns [rad].
+    steps : int, optional
+        States per second.
+
+    Returns
+    -------
+    list of State
+        The states, with their velocities.
     """
     states, x, y, heading, rolled = [], 0.0, 0.0, 0.0, 0.0
     for speed, turning in ((distance, 0.0), (0.0, angle), (-distance, 0.0), (0.0, -angle)):

@@ -1,6 +1,4 @@
-"""Lesson 02, Equations of motion and contact: pictures of (4), of contacts with and without b, of a
-wheel that parks.
-"""
+"""Lesson 02: pictures of (4), of contacts with and without b, and of a wheel that parks."""
 
 from __future__ import annotations
 
@@ -16,7 +14,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons import props
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.lessons.lesson02.helpers import DISC_RADIUS, parking_states, rolling_wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
@@ -29,13 +27,27 @@ MOMENT_SCALE = 0.01  # m drawn for a newton metre
 
 
 def draw_equation(eom: EquationsOfMotion) -> Figure:
-    """(4) drawn to scale for four point feet: which entries of M, h, S and Jᵀ are not zero, the
-    base's rows above the line.
+    """Draw (4) to scale for four point feet: the non-zero entries of M, h, S and Jᵀ.
+
+    The base rows are above the line.
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        The equations of motion.
+
+    Returns
+    -------
+    Figure
+        The figure.
+
+    Notes
+    -----
+    [FBR]_, eq. (4).
     """
     feet = [str(name).split("_")[0] for name in eom.contacts.names]
-    in_threes = (
-        3.0 * np.arange(len(feet)) + 1.0
-    )  # the middle of each leg's joints, and of each foot's force
+    # middle of each leg's joints, and of each foot's force
+    in_threes = 3.0 * np.arange(len(feet)) + 1.0
     parts = [
         ("M q̈", eom.M, 6.0),
         ("+ h", eom.h[:, None], None),
@@ -58,11 +70,26 @@ def draw_equation(eom: EquationsOfMotion) -> Figure:
 
 
 def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str) -> SliderPanel:
-    """Sliders for a force at one foot: the picture shows the force and moment on the base that Jᵀ
-    makes of it.
+    """Return a panel with sliders for a force at one foot.
 
-    The note has all of Jᵀ λ: the base's rows and the torques of the leg. foot: its name in
-    `contacts`.
+    The picture shows the force and moment on the base that follow by Jᵀ. The note lists Jᵀ λ: the
+    base rows and the torques of the leg.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Its contacts.
+    foot : str
+        Name of the foot in `contacts`.
+
+    Returns
+    -------
+    SliderPanel
+        The panel.
     """
     J = fb.equations_of_motion(state, contacts).J[contacts.force_slice(foot)]
     base = state.frame_pose("base")
@@ -83,9 +110,9 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
             else {}
         )
         if extra:
-            above = (
-                base.translation + np.maximum(scale * f, [-np.inf, -np.inf, 0.1]) + [0.0, 0.0, 0.04]
-            )  # and above the trunk
+            # above the arrow and above the trunk
+            lift = np.maximum(scale * f, [-np.inf, -np.inf, 0.1])
+            above = base.translation + lift + [0.0, 0.0, 0.04]
             extra["label/base"] = shapes.label(above, "on the base", 0.028)
             ahead = state.point(foot) + [0.14, 0.0, -0.06]  # neither leg nor arrow comes here
             extra["label/foot"] = shapes.label(ahead, "on the foot", 0.028)
@@ -109,8 +136,21 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
 
 
 def plot_vertical_forces(record: Rollout, title: str) -> Axes:
-    """Vertical forces at a front and at a rear foot, by (7) and by the engine; left and right are
-    alike.
+    """Plot the vertical forces at a front and a rear foot, by (7) and by the physics engine.
+
+    The forces on the left and on the right are equal.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    title : str
+        Title of the plot.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     names = list(record.contacts.names)
@@ -133,24 +173,46 @@ def plot_vertical_forces(record: Rollout, title: str) -> Axes:
 
 
 def plot_foot_displacement(curves: dict[str, Array], duration: float) -> Axes:
-    """Curves of how far feet stray, name -> distances in mm over `duration` s, on a logarithmic
-    scale.
+    """Plot displacements of feet on a logarithmic scale.
+
+    Parameters
+    ----------
+    curves : dict of str to ndarray, shape (n,)
+        For each name: displacements [mm].
+    duration : float
+        Time from the first value to the last [s].
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
     for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         time = np.linspace(0.0, duration, len(curve))
         axis.semilogy(time[1:], curve[1:], style, color=hex_code(colour), linewidth=2.0, label=name)
-    axis.set(xlabel="time [s]", ylabel="worst foot strayed [mm]", ylim=(1e-3, 1e2))
+    axis.set(xlabel="time [s]", ylabel="largest foot displacement [mm]", ylim=(1e-3, 1e2))
     axis.grid(alpha=0.25)
     axis.legend(loc="lower right", fontsize="small")
     return axis
 
 
 def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> Viewer:
-    """The arm without b, and as a veil the arm with b. A pin stands where the tool was, a thick
-    line leads from there to it.
+    """Play the arm without b, and the arm with b as a ghost.
 
-    forgotten, kept: records without and with b, equally long.
+    A pin marks the initial position of the tool. A thick line leads from there to the tool.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    without_b, with_b : Rollout
+        Records of the same length.
+
+    Returns
+    -------
+    Viewer
+        The viewer.
     """
     home, colour = without_b.state(0).point("tool0"), view.painter.text_colour
     pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
@@ -178,12 +240,25 @@ def play_collapse_comparison(
     contacts: fb.Contacts,
     duration: float,
 ) -> Viewer:
-    """The robot without b, and as a veil the robot with b; marks where the feet belong, lines to
-    where they are.
+    """Play the robot without b, and the robot with b as a ghost.
 
-    without_b, with_b: states without and with b, equally many.
-    contacts: the pinned feet.
-    duration: from the first state to the last, s.
+    Marks show where the feet belong, and lines lead from there to where they are.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    without_b, with_b : sequence of State
+        The same number of states.
+    contacts : Contacts
+        The pinned feet.
+    duration : float
+        Time from the first state to the last [s].
+
+    Returns
+    -------
+    Viewer
+        The viewer.
     """
     places = contacts.positions(without_b[0])
     home = {
@@ -217,11 +292,9 @@ def play_collapse_comparison(
 
 
 def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
-    """Sliders for how far the disc rolls and turns as it parks, and for the time at which it is
-    shown.
+    """Return a panel with sliders for a parking disc: how far it rolls and turns, and the time.
 
-    The picture has the disc at that time, its way on the ground, and marks where it starts and
-    ends.
+    The picture shows the disc at that time, its path on the ground, and its start and end.
     """
 
     def draw(distance: float, angle: float, time: float) -> str:
@@ -254,7 +327,7 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(rolling_wheel().slip(state)).max()) for state in states)
         return (
-            f"in the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as "
+            f"at the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as "
             f"before; "
             f"largest slip on the way {abs(slip):.3f} m/s"
         )
@@ -271,9 +344,7 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
 
 
 def _disc_picture(state: fb.State, distance: float, time: float) -> shapes.Item:
-    """The disc at a time, s, of parking with rolls of `distance` m, with spokes that show how far
-    it has rolled.
-    """
+    """Return the parking disc at a time [s], with spokes that show how far it has rolled."""
     legs = np.clip(time - np.arange(4), 0.0, 1.0)
     rolled = distance / DISC_RADIUS * (legs[0] - legs[2])
     return props.wheel(

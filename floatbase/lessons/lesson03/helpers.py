@@ -1,6 +1,4 @@
-"""Lesson 03, The space of possible motions: points and directions in β, and the states that the
-lesson looks at.
-"""
+"""Lesson 03: states, points and directions in the space of possible motions."""
 
 from __future__ import annotations
 
@@ -18,15 +16,31 @@ from floatbase.robots import Robot
 
 @cache
 def standing_go2_eom() -> EquationsOfMotion:
-    """(7) of go2 standing on four feet."""
+    """Return the equations of motion of go2 standing on four feet.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     robot = fb.load("go2")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
 
 
 @cache
 def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
-    """(7) of go2 tilted and moving, and forces, shape (12,), N, world: 10 N push the feet FL and RR
-    apart along their line.
+    """Return go2 tilted and moving, with internal forces that push two feet apart.
+
+    Returns
+    -------
+    EquationsOfMotion
+        The equations of motion, (7).
+    ndarray, shape (12,)
+        Forces that push FL and RR apart with 10 N along the line between them, in the world frame
+        [N].
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
     """
     robot = fb.load("go2")
     eom = fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7))
@@ -37,11 +51,14 @@ def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
 
 @cache
 def rising_solo8_eom() -> EquationsOfMotion:
-    """(7) of solo8 in its standing posture, moving forwards, upwards and nodding on four feet that
-    stay: b is not zero.
+    """Return the equations of motion of solo8 in its standing posture, moving on four fixed feet.
 
-    J has rank 10 of 12 there. All feet move in planes along the body, so b asks for nothing in the
-    lost directions.
+    The base moves forwards and upwards and pitches, so b is not zero. J has rank 10 instead of 12.
+    All feet move in planes along the body, so b has no component in the lost directions.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
     """
     robot = fb.load("solo8")
     contacts = fb.Contacts.points(robot)
@@ -54,10 +71,19 @@ def rising_solo8_eom() -> EquationsOfMotion:
 
 
 def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
-    """The step in β, shape (dimension,), that changes the base's acceleration by `base` and the
-    forces as little as possible.
+    """Return the step in β that changes the base's acceleration and the contact forces least.
 
-    base: shape (6,), m/s² and rad/s², base frame.
+    Parameters
+    ----------
+    space : FeasibleSpace
+        The space of possible motions.
+    base : array_like, shape (6,)
+        Change of the base's acceleration, linear and angular, in the base frame [m/s², rad/s²].
+
+    Returns
+    -------
+    ndarray, shape (dimension,)
+        The step in β.
     """
     to_base, to_forces = space.qdd.A[:6], space.forces.A
     step = np.linalg.pinv(to_base, rcond=RANK_TOLERANCE) @ np.asarray(base, dtype=np.float64)
@@ -66,7 +92,18 @@ def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
 
 
 def standing_still_beta(space: FeasibleSpace) -> Array:
-    """The β with q̈ = 0 and the smallest forces that allow it, shape (dimension,)."""
+    """Return the β with q̈ = 0 and the smallest contact forces that allow it.
+
+    Parameters
+    ----------
+    space : FeasibleSpace
+        The space of possible motions.
+
+    Returns
+    -------
+    ndarray, shape (dimension,)
+        The β.
+    """
     eom = space.eom
     J_base, J_joints = eom.J[:, :6], eom.J[:, 6:]
     forces = np.linalg.lstsq(J_base.T, eom.h[:6], rcond=RANK_TOLERANCE)[0]
@@ -74,8 +111,19 @@ def standing_still_beta(space: FeasibleSpace) -> Array:
 
 
 def upright_solo12(robot: Robot, bend: float) -> fb.State:
-    """solo12 at rest on the ground, every foot below its hip, every knee bent by `bend` rad; 0 is a
-    straight leg.
+    """Return solo12 at rest on the ground with every foot below its hip.
+
+    Parameters
+    ----------
+    robot : Robot
+        solo12.
+    bend : float
+        Angle by which every knee is bent [rad]; 0 is a straight leg.
+
+    Returns
+    -------
+    State
+        The state.
     """
     q = robot.standing().q.copy()
     for leg in range(4):

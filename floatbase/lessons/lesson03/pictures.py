@@ -1,6 +1,4 @@
-"""Lesson 03, The space of possible motions: all numbers of a motion as bars, where a matrix is not
-zero, a stiff knee.
-"""
+"""Lesson 03: the numbers of a motion as bars, non-zero entries of a matrix, and a stiff knee."""
 
 from __future__ import annotations
 
@@ -22,31 +20,36 @@ from floatbase.robots import Robot
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import GHOST, GREYS, PLANNED, hex_code
 
-GHOST_TIME = 0.25  # s: the veil shows where an acceleration leads in this time from rest
-FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: bars of full length
-BAR, FULL_BAR, ZERO_LINE = (
-    14,
-    40,
-    62,
-)  # px: width of a bar, length of a full one, and where they begin, below the top
-LETTER_WIDTH = 7  # px: width of a letter of a title, on average and at most
-BLOCK, GAP = (
-    58,
-    16,
-)  # px: a name of a leg, 11 px high, fits below its three bars; between the bars of two legs
+GHOST_TIME = 0.25  # s: the ghost shows where an acceleration leads from rest in this time
+FULL = (20.0, 20.0, 100.0)  # m/s² or rad/s², N·m, N: values of bars of full length
+# px: width of a bar, length of a full bar, and distance of the zero line from the top
+BAR, FULL_BAR, ZERO_LINE = 14, 40, 62
+LETTER_WIDTH = 7  # px: upper bound of the mean width of a letter in a title
+# px: the name of a leg, 11 px high, fits below its three bars; gap between the bars of two legs
+BLOCK, GAP = 58, 16
 
-_Blocks: TypeAlias = Sequence[
-    tuple[str, tuple[str, ...], str]
-]  # name, marks of its three numbers, unit
+# name, labels of its three numbers, unit
+_Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bool = True) -> str:
-    """Draw (q̈, τ, λ) of a β, shape (dimension,): forces as arrows, where q̈ leads from rest as a
-    veil.
+    """Draw (q̈, τ, λ) of a β: forces as arrows, and where q̈ leads from rest as a ghost.
 
-    cones: also the friction cones around the forces.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    space : FeasibleSpace
+        The space of possible motions.
+    beta : array_like, shape (dimension,)
+        The β.
+    cones : bool, optional
+        Whether to draw the friction cones as well.
 
-    Returns all the numbers as bars, HTML.
+    Returns
+    -------
+    str
+        All the numbers as bars, as HTML.
     """
     qdd, tau, forces = space(beta)
     state = space.eom.state
@@ -69,18 +72,30 @@ def motion_bars(
     forces: npt.ArrayLike,
     full: tuple[float, float, float] = FULL,
 ) -> str:
-    """All numbers of a quadruped's motion as bars, HTML, leg by leg. Under the mouse a bar says its
-    name, number and unit.
+    """Draw all numbers of a quadruped's motion as bars, leg by leg.
 
-    qdd: shape (18,), m/s² and rad/s².
-    tau: shape (12,), N·m.
-    forces: shape (12,), N.
-    full: what a bar of full length means for each of the three; longer ones get a dark end.
+    Hovering over a bar shows its name, number and unit.
+
+    Parameters
+    ----------
+    qdd : array_like, shape (18,)
+        Acceleration [m/s², rad/s²].
+    tau : array_like, shape (12,)
+        Torques [N·m].
+    forces : array_like, shape (12,)
+        Contact forces [N].
+    full : tuple of float, optional
+        Value of a bar of full length for each of the three. A longer bar gets a dark end.
+
+    Returns
+    -------
+    str
+        The bars as HTML.
     """
     legs = ("front left", "front right", "rear left", "rear right")
     joints, axes = ("hip", "thigh", "knee"), ("x", "y", "z")
     qdd = np.asarray(qdd)
-    groups = (  # two for q̈: a narrow page has no room for 18 numbers in a line
+    groups = (  # two groups for q̈: 18 numbers do not fit on a line of a narrow page
         (
             "q̈",
             "m/s², rad/s²",
@@ -107,14 +122,10 @@ def motion_bars(
 
 
 def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
-    """The bars of q̈, τ or λ, SVG, as large as it says: it wraps, but never shrinks. Text has the
-    page's own colour.
+    """Draw the bars of q̈, τ or λ as SVG of a fixed size, which wraps but never shrinks.
 
-    title: what stands above, the symbol first.
-    colour: of the bars.
-    blocks: of three numbers each.
-    values: shape (len(blocks), 3).
-    most: what a bar of full length means.
+    title: text above, beginning with the symbol; blocks: three numbers each; values: shape
+    (len(blocks), 3); most: value of a bar of full length. Text has the colour of the page.
     """
     width, bottom = BLOCK * len(blocks), ZERO_LINE + FULL_BAR
     drawn = svg.element("text", title, y=12, font_size=13)
@@ -135,9 +146,7 @@ def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: fl
 
 
 def _bar(x: int, part: float, colour: str) -> str:
-    """A bar at x, up or down from the middle, on a column that feels the mouse. part: of the full
-    length.
-    """
+    """Draw a bar at x, up or down from the zero line, in a column that reacts to the mouse."""
     length = float(min(abs(part), 1.0) * FULL_BAR)
     top, end = (
         (ZERO_LINE - length, ZERO_LINE - FULL_BAR)
@@ -152,9 +161,19 @@ def _bar(x: int, part: float, colour: str) -> str:
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
-    """Where a matrix is not zero, and beside it its singular values.
+    """Draw the non-zero entries of a matrix, and beside it its singular values.
 
-    rows, columns: the blocks of A in order, name -> size.
+    Parameters
+    ----------
+    A : array_like, shape (m, n)
+        The matrix.
+    rows, columns : mapping of str to int
+        The blocks of A in order: name and size.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     A = np.asarray(A)
     figure, (left, right) = plt.subplots(
@@ -165,7 +184,7 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
         np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5
     )
     figure.colorbar(
-        shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8
+        shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="magnitude, as a power of ten", shrink=0.8
     )
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)
@@ -195,10 +214,23 @@ def _name_blocks(axes: Any, rows: Mapping[str, int], columns: Mapping[str, int])
 
 
 def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
-    """Draw solo12 standing still and return what that takes, HTML.
+    """Draw solo12 standing still, and return the torques that this takes.
 
-    bend: of every knee, rad. wobble: internal forces to add to those that carry the weight, shape
-        (12,), N, world.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    robot : Robot
+        solo12.
+    bend : float
+        Angle of every knee [rad].
+    wobble : ndarray, shape (12,)
+        Internal forces in addition to those that carry the weight, in the world frame [N].
+
+    Returns
+    -------
+    str
+        The torques and bars, as HTML.
     """
     contacts = fb.Contacts.points(robot)
     eom = fb.equations_of_motion(upright_solo12(robot, bend), contacts)

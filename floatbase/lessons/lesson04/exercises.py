@@ -10,9 +10,9 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, internal_forces
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
@@ -25,8 +25,9 @@ from floatbase.objectives import tangential_bias
 
 
 def _gradient_by_newton() -> Array:
-    """By the forces, a_c = Σ f / m + g with λ = ζ(τ): no Jacobian of the centre of mass, no drift
-    of it.
+    """Compute the gradient from the contact forces: a_c = Σ f / m + g with λ = ζ(τ).
+
+    It needs neither the Jacobian nor the drift of the centre of mass.
     """
     eom = tilted_go2_eom()
     zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
@@ -72,17 +73,16 @@ def _gradients() -> dict[str, Callable[[], Any]]:
 
 
 def _gradient_of_standing() -> Array:
-    """The lesson's own cost, made where the robot stands, pulled back through η of the moving
-    robot.
-    """
+    """Return the gradient of the standing robot's cost through η of the moving robot."""
     state = standing_go2_eom().state
     cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED_ACCELERATION - state.com_drift)
     return cost.pullback(fb.accelerations_from_torques(tilted_go2_eom())).g
 
 
 def _flat_on_three_feet() -> int:
-    """Flat directions of com + turn on three feet, counted in τ: β is as long as τ there, since J
-    has full rank.
+    """Count the flat directions of com + turn on three feet, in τ.
+
+    β has the same dimension as τ there, since J has full rank.
     """
     state = standing_go2_eom().state
     return _unseen_by(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]))
@@ -102,15 +102,18 @@ def _squeezes_on_three_feet() -> int:
 
 
 def _three_feet_eom() -> EquationsOfMotion:
-    """(7) of go2 standing on all feet but FL."""
+    """Return the equations of motion of go2 standing on all feet except FL.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     standing = standing_go2_eom()
     return fb.equations_of_motion(standing.state, standing.contacts.without("FL_foot"))
 
 
 def _lesson_costs() -> dict[str, Any]:
-    """η and the lesson's three costs: on q̈ the centre of mass and the turning of the base, on τ
-    the effort.
-    """
+    """Return η and the lesson's costs: centre of mass and base rotation on q̈, effort on τ."""
     eom = standing_go2_eom()
     J, drift = eom.state.frame_jacobian("base")[3:], eom.state.frame_drift("base")[3:]
     return {
@@ -124,7 +127,7 @@ def _lesson_costs() -> dict[str, Any]:
 
 
 def _judge_design(answer: Any) -> Verdict:
-    """Any cost on torques whose least point does what exercise 04.3 states."""
+    """Judge a cost on torques by what its minimum does."""
     eom = standing_go2_eom()
     tau = minimiser_or_verdict(answer, eom.d, "τ", "Pull it back through η.")
     if isinstance(tau, Verdict):
@@ -134,32 +137,32 @@ def _judge_design(answer: Any) -> Verdict:
     turning = np.linalg.norm(eta(tau)[3:6])
     friction = np.linalg.norm(zeta(tau).reshape(4, 3)[:, :2], axis=1).max()
     if np.linalg.norm(a + DESIRED_ACCELERATION) < 0.05:
-        return Verdict(False, "The sign: this accelerates to the right.", "sign")
+        return Verdict(False, "The sign is wrong: this accelerates to the right.", "sign")
     if np.linalg.norm(a - DESIRED_ACCELERATION) > 0.01:
         moves = (
             f"The centre of mass accelerates by {_rounded(a)} m/s², not "
             f"{_rounded(DESIRED_ACCELERATION)}"
         )
-        return Verdict(False, f"{moves}: weigh that more.", "com")
+        return Verdict(False, f"{moves}. Increase the weight of this cost.", "com")
     if turning > 0.05:
         return Verdict(
             False,
-            f"The centre of mass is right, but the base turns at {turning:.1f} rad/s². Which cost "
-            f"is missing?",
+            f"The centre of mass is right, but the base turns with {turning:.1f} rad/s². Which "
+            f"cost is missing?",
             "turning",
         )
     if friction > 6.0:
-        most = f"one foot leans on friction with {friction:.1f} N"
+        most = f"the friction force at one foot is {friction:.1f} N"
         return Verdict(
             False,
-            f"It moves as desired, but {most}. Effort does not mind; a cost on λ does, pulled back "
-            f"to τ.",
+            f"The robot moves as desired, but {most}. The effort does not depend on friction. Use "
+            f"a cost on λ, pulled back to τ.",
             "friction",
         )
     return Verdict(
         True,
-        "Three costs, each in the space where it is easy to say, added in the space where the "
-        "motors are.",
+        "Three costs, each written in the space where it is simple, and added in the space of "
+        "the motors.",
     )
 
 
@@ -190,53 +193,52 @@ def _designs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="04.1",
-        statement="The gradient at τ = 0 of ½‖J_c q̈ + J̇_c q̇ - desired‖², seen from the torques.",
+        statement="The gradient of ½‖J_c q̈ + J̇_c q̇ - desired‖² at τ = 0, with respect to the "
+        "torques.",
         stub="gradient = np.zeros(12)  # replace: from eta_moving, J_moving, drift_moving, desired",
         solution="residual = J_moving @ eta_moving.b + drift_moving - desired\n"
         "gradient = eta_moving.A.T @ J_moving.T @ residual",
         judge=ShapeJudge(
             NumericJudge(
                 right=_gradient_by_newton,
-                praise="The chain rule: points go forward by η, slopes come back by its transpose.",
+                praise="This is the chain rule: points go forward through η, and gradients come "
+                "back through its transpose.",
                 mistakes=_gradients(),
                 hints={
-                    "zero": "There is nothing there yet: at a minimum the gradient is zero, but τ "
-                    "= 0 is none.",
-                    "sign": "The sign: residual = actual - desired, and the gradient points "
-                    "uphill.",
-                    "drift_forgotten": "The drift is forgotten: the centre of mass accelerates by "
+                    "zero": "There is no answer yet. The gradient is zero at a minimum, but τ = "
+                    "0 is not a minimum.",
+                    "sign": "The sign is wrong. The residual is actual - desired, and the "
+                    "gradient points uphill.",
+                    "drift_forgotten": "The drift is missing. The centre of mass accelerates by "
                     "J_c q̈ + J̇_c q̇.",
                     "drift_sign": "The drift has the wrong sign.",
-                    "offset_forgotten": "η has an offset: with the motors off the robot "
-                    "accelerates too, by `eta_moving.b`.",
-                    "offset_and_drift_forgotten": "The offset of η and the drift are both "
-                    "forgotten.",
-                    "into_world": "The frame: `desired` is in world axes, as Jacobian and drift "
-                    "are; do not turn it.",
-                    "out_of_world": "The frame: `desired` is in world axes already; the base's "
-                    "rotation takes it out of them.",
-                    "pseudo_inverse": "A gradient comes back by the transpose of η's matrix; a "
-                    "pseudo-inverse is for points.",
-                    "standing": "This is the cost of the standing robot; the moving one has "
+                    "offset_forgotten": "η has an offset: even with the motors off, the robot "
+                    "accelerates by `eta_moving.b`.",
+                    "offset_and_drift_forgotten": "The offset of η and the drift are both missing.",
+                    "into_world": "The frame is wrong. `desired` is in world axes, like the "
+                    "Jacobian and the drift. Do not rotate it.",
+                    "out_of_world": "The frame is wrong. `desired` is in world axes already, "
+                    "and the rotation of the base takes it out of these axes.",
+                    "pseudo_inverse": "A gradient comes back through the transpose of η's "
+                    "matrix. A pseudo-inverse is for points.",
+                    "standing": "This is the cost of the standing robot. The moving robot has "
                     "another Jacobian and drift.",
-                    "half": "The cost has a ½ in front, so the square's 2 cancels.",
+                    "half": "The cost has a factor ½, which cancels the 2 from the square.",
                 },
             ),
             {
-                (18,): "18 numbers: that is the slope on q̈. One step is left to come back to the "
-                "torques.",
-                (3,): "3 numbers: that is the residual. Two steps are left to come back to the "
-                "torques.",
-                (12, 1): "This is a matrix with one column; the answer is a vector of shape (12,).",
-                (12, 12): "That is a curvature, shape (12, 12); the gradient is a vector.",
+                (18,): "18 numbers are the gradient with respect to q̈. One step back to the "
+                "torques is missing.",
+                (3,): "3 numbers are the residual. Two steps back to the torques are missing.",
+                (12, 12): "That is a curvature, shape (12, 12). The gradient is a vector.",
             },
         ),
-        explanation="(15) by hand; `pullback(eta).g` of the same cost gives it too.",
+        explanation="This is (15) by hand. `pullback(eta).g` of the same cost gives it, too.",
     ),
     Exercise(
         name="04.2",
-        statement="On three feet: how many independent ones of the flat directions of com + turn, "
-        "in β, move the free foot?",
+        statement="On three feet, com + turn has flat directions in β. How many independent "
+        "ones of them move the free foot?",
         stub="moving = 6  # replace this number by what you find",
         solution="three = fb.feasible_space(fb.equations_of_motion(state, "
         'contacts.without("FL_foot")))\n'
@@ -245,8 +247,8 @@ EXERCISES = (
         judge=NumericJudge(
             is_count=True,
             right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
-            praise="Three squeezes are left on three feet; the other three flat directions take "
-            "the free foot where you like.",
+            praise="Three feet have three internal forces. The other three flat directions move "
+            "the free foot wherever you like.",
             mistakes={
                 "all_flat": _flat_on_three_feet,
                 "com_alone": _flat_for_com,
@@ -256,26 +258,25 @@ EXERCISES = (
                 "all": lambda: _three_feet_eom().d,
             },
             hints={
-                "all_flat": "Those are all flat directions. Can three feet still squeeze, and what "
-                "does that move?",
-                "com_alone": "So many are flat for `com` alone, or if squeezes count twice; for "
-                "com + turn it is six.",
-                "none": "Does a free foot have to stay where it is? Neither cost speaks of it.",
-                "one": "One foot, but a foot can go in more than one direction.",
-                "two": "Upwards is a direction, too: no ground is in the way.",
+                "all_flat": "Those are all flat directions. Do three feet still have internal "
+                "forces, and what do these move?",
+                "com_alone": "That is the number of flat directions for `com` alone, or with "
+                "internal forces counted twice. For com + turn it is six.",
+                "none": "Does a free foot have to stay in place? Neither cost depends on it.",
+                "one": "It is one foot, but a foot can move in more than one direction.",
+                "two": "Upwards is a direction, too: the ground is not in the way.",
                 "all": "That is all of β. Directions along which the costs are curved do not "
                 "count.",
             },
         ),
-        explanation="Three feet have 9 forces, of which 9 - 6 = 3 are squeezes. They are flat and "
-        "move nothing. The other "
-        "3 move the free foot, wherever you like, and base and legs follow so that neither wish is "
-        "missed.",
+        explanation="Three feet have 9 force components, and 9 - 6 = 3 directions are internal "
+        "forces. They are flat and move nothing. The other 3 move the free foot wherever you "
+        "like. Base and legs follow, so that both goals are still met.",
     ),
     Exercise(
         name="04.3",
-        statement="A cost on torques: 0.5 m/s² to the left, no turning, at most 6 N of friction at "
-        "every foot.",
+        statement="A cost on torques: 0.5 m/s² to the left, no turning, and at most 6 N of "
+        "friction at every foot.",
         stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add "
         "costs",
         solution="from floatbase.objectives import tangential_bias\n\n"
@@ -285,8 +286,7 @@ EXERCISES = (
         judge=_judge_design,
         namespace=_lesson_costs,
         examples=_designs,
-        explanation="Friction is easy to say in λ, so say it there and bring it to the torques "
-        "through ζ. Its weight is small "
-        "enough not to spoil the acceleration.",
+        explanation="Friction is simple in λ, so write the cost there and pull it back to the "
+        "torques through ζ. Its weight is small enough not to spoil the acceleration.",
     ),
 )

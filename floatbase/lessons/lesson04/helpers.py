@@ -1,6 +1,4 @@
-"""Lesson 04, One cost, many spaces: a controller of least cost, what it reaches, and β in other
-units.
-"""
+"""Lesson 04: a minimum-cost controller, its measured acceleration, and β in other units."""
 
 from __future__ import annotations
 
@@ -23,8 +21,16 @@ SETTLING_TIME = 0.02  # s in which the engine's soft contact settles
 
 
 class MinimumCostController:
-    """A controller: in every tick the torques of least cost. contacts: its stance. cost: eom ->
-    `Quadratic` on τ.
+    """Controller that minimises a cost on the torques in every control step.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        Its contacts.
+    cost : callable
+        Function of the equations of motion that returns a `Quadratic` on τ.
     """
 
     def __init__(
@@ -33,14 +39,24 @@ class MinimumCostController:
         self.robot, self.contacts, self.cost = robot, contacts, cost
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
+        """Return the torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
         return TorqueCommand(self.cost(eom).minimiser())
 
 
 def measured_acceleration(record: Rollout) -> Array:
-    """Mean acceleration of the centre of mass, shape (3,), m/s², from its velocities in a record of
-    the physics.
+    """Return the mean acceleration of the centre of mass in a record.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Acceleration, from the velocities after the contacts have settled, in the world frame
+        [m/s²].
     """
     first = int(np.searchsorted(record.time, SETTLING_TIME))
     change = record.final.com_velocity - record.state(first).com_velocity
@@ -48,10 +64,21 @@ def measured_acceleration(record: Rollout) -> Array:
 
 
 def rescaled_space(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
-    """The same space of motions with another β: v and V⊥ of (13) as they are where a length is ‖W
-    (q̈, τ, λ)‖.
+    """Return the same space of motions with another β, whose unit of length is set by a matrix.
 
-    W: shape (nv + d + k, nv + d + k), invertible. The maps give q̈, τ and λ in SI units as before.
+    v and V⊥ of (13) become what they are if a vector has the length ‖W (q̈, τ, λ)‖.
+
+    Parameters
+    ----------
+    space : FeasibleSpace
+        The space of possible motions.
+    W : array_like, shape (nv + d + k, nv + d + k)
+        The matrix, which must be invertible.
+
+    Returns
+    -------
+    FeasibleSpace
+        The space. Its maps still give q̈, τ and λ in SI units.
     """
     W = np.asarray(W, dtype=np.float64)
     V, v = np.linalg.qr(W @ space.map.A)[0], W @ space.map.b
@@ -63,5 +90,10 @@ def rescaled_space(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
 
 @cache
 def tilted_go2_eom() -> EquationsOfMotion:
-    """(7) of go2 on four feet, tilted and moving."""
+    """Return the equations of motion of go2 on four feet, tilted and moving.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     return tilted_squeeze()[0]

@@ -1,4 +1,4 @@
-"""Lesson 04, One cost, many spaces: costs as level curves, torques as arrows."""
+"""Lesson 04: costs as level curves, and torques as arrows."""
 
 from __future__ import annotations
 
@@ -17,18 +17,31 @@ from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.scene.colours import COM, GREYS, hex_code
 
 ARROW_SCALE = 0.5  # m drawn for 1 m/s²
-LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its least value
-# a direction that is so many times less curved than another counts as the floor of a valley
+LEVELS = (0.02, 0.125, 0.4, 1.0, 2.0)  # of a cost above its minimum
+# ratio of curvatures below which the flatter direction counts as the floor of a valley
 VALLEY_RATIO = 0.02
 
 
 def show_torques(
     view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW_SCALE
 ) -> Array:
-    """Draw the forces that torques bring about and the acceleration of the centre of mass, which is
-    returned.
+    """Draw the contact forces and the acceleration of the centre of mass that torques cause.
 
-    tau: shape (d,), N·m. length: m drawn for 1 m/s². Returns shape (3,), m/s², world.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    eom : EquationsOfMotion
+        The equations of motion.
+    tau : array_like, shape (d,)
+        Torques [N·m].
+    length : float, optional
+        Length of an arrow for 1 m/s² [m].
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Acceleration of the centre of mass in the world frame [m/s²].
     """
     state = eom.state
     a = state.com_jacobian @ fb.accelerations_from_torques(eom)(tau) + state.com_drift
@@ -41,10 +54,19 @@ def show_torques(
 
 
 def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
-    """Level curves of costs on two variables. costs: title=(cost, name of x, name of y, half the
-    width of the picture).
+    """Plot level curves of costs on two variables.
 
-    Yellow is cheap. A dot marks the least point, except where the cost is a valley.
+    Yellow is a low cost. A dot marks the minimum, except where the cost is a valley.
+
+    Parameters
+    ----------
+    **costs : tuple
+        title=(cost, name of x, name of y, half the width of the picture).
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, axes = plt.subplots(
         1, len(costs), figsize=(3.6 * len(costs), 3.5), layout="constrained", squeeze=False
@@ -73,12 +95,23 @@ def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
 def level_curves(
     cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: str, y_name: str
 ) -> str:
-    """Level curves of one cost on two variables with a dot at a point, as SVG: quick enough for a
-    slider.
+    """Draw level curves of a cost on two variables, fast enough for a slider.
 
-    point: shape (2,).
-    half: half the width of the picture, in the units of the variables.
-    x_name, y_name: what stands at the axes.
+    Parameters
+    ----------
+    cost : Quadratic
+        The cost.
+    point : array_like, shape (2,)
+        Point that is marked with a dot.
+    half : float
+        Half the width of the picture, in the units of the variables.
+    x_name, y_name : str
+        Labels of the axes.
+
+    Returns
+    -------
+    str
+        The drawing as SVG.
     """
     values, vectors = np.linalg.eigh(cost.H)
     values = np.maximum(values, 1e-9 * values[-1])
@@ -103,7 +136,18 @@ def level_curves(
 
 
 def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) -> Figure:
-    """Curves of effort over the acceleration to the left: name -> (accelerations, efforts)."""
+    """Plot the effort over the acceleration to the left.
+
+    Parameters
+    ----------
+    curves : mapping of str to tuple
+        For each name: accelerations [m/s²] and efforts [(N·m)²].
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
     for (name, (x, y)), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
         ax.plot(x, y, style, color=hex_code(colour), label=name, linewidth=2)

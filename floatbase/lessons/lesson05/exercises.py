@@ -2,287 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-import numpy as np
-
-import floatbase as fb
-from floatbase._validation import Array
-from floatbase.dynamics import EquationsOfMotion, torque_force_matrix
-from floatbase.lessons.exercises import (
-    Example,
-    Exercise,
-    NumericJudge,
-    ShapeJudge,
-    Verdict,
-    minimiser_or_verdict,
-)
-from floatbase.lessons.lesson03 import standing_go2_eom, standing_still_beta
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import NumericJudge, ShapeJudge
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson05.helpers import (
-    ConstantForceController,
-    arm_robot_eom,
-    friction_ratios,
-    squeeze_forces,
     squeezed_standing_forces,
-    three_feet_eom,
 )
-from floatbase.lessons.rounding import rounded
-from floatbase.objectives import (
-    centroidal_momentum_rate,
-    com_wrench_map,
-    force_bias,
-    tangential_bias,
-    wrench_objective,
+from floatbase.lessons.lesson05.verdicts import (
+    design_examples,
+    force_by_momentum,
+    force_mistakes,
+    judge_design,
+    moment_mistakes,
+    moments_by_jacobian,
+    smallest_by_zeta,
+    stub_names,
+    torque_mistakes,
 )
-
-UPWARDS = np.array([0.5, 0.0, 1.0])  # m/s², world: the acceleration of exercise 05.2
-FORWARDS = 60.0  # N, of exercise 05.4
-MOST_LEAN, MISSED_FORCE, MISSED_MOMENT = (
-    0.5,
-    1.0,
-    0.1,
-)  # of a foot; N; N·m: what exercise 05.4 allows
-ROUNDING = 1e-6  # of a lean that is just what is allowed
-SHORT = 0.1  # s on the physics
-MOST_SLIP = 0.005  # m; the engine's soft contact gives way by 2 mm without a slip
-
-
-def _moments_by_jacobian() -> Array:
-    """G_τ from the base's rows of J: the moment at the base's origin, moved to the CoM."""
-    state, J = three_feet_eom().state, three_feet_eom().J
-    pose = state.frame_pose("base")
-    at_base = pose.rotation @ J[:, 3:6].T
-    return at_base + _blocks([pose.translation - state.com] * 3)
-
-
-def _blocks(levers: Any, order: float = 1.0) -> Array:
-    """One matrix of a cross product for each lever, side by side."""
-    return order * np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])
-
-
-def _moments() -> dict[str, Callable[[], Any]]:
-    def moments(
-        about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)
-    ) -> Callable[[], Array]:
-        def value() -> Array:
-            state = three_feet_eom().state
-            return factor * _blocks(
-                three_feet_eom().contacts.positions(state)[list(feet)] - about(state)
-            )
-
-        return value
-
-    def com(state: fb.State) -> Any:
-        return state.com
-
-    return {
-        "zero": lambda: np.zeros((3, 9)),
-        "sign": moments(com, -1.0),
-        "about_base": moments(lambda state: state.frame_pose("base").translation),
-        "about_origin": moments(lambda state: np.zeros(3)),
-        "millimetres": moments(com, 1000.0),
-        "reversed": moments(com, feet=(2, 1, 0)),
-        "order": moments(com, feet=(1, 0, 2)),
-    }
-
-
-def _force_by_momentum() -> Array:
-    """By the momentum of all links: some q̈ that accelerates the centre of mass so, and what has to
-    change it.
-    """
-    state = standing_go2_eom().state
-    rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
-    return np.asarray(rate - state.robot.mass * state.robot.model.gravity.linear)
-
-
-def _forces() -> dict[str, Callable[[], Any]]:
-    robot = standing_go2_eom().robot
-    m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
-    g = weight / m
-    return {
-        "weight_alone": lambda: weight,
-        "no_gravity": lambda: m * UPWARDS,
-        "gravity_sign": lambda: m * UPWARDS - weight,
-        "weight_twice": lambda: m * UPWARDS + 2 * weight,
-        "no_mass": lambda: UPWARDS + g,
-        "no_mass_on_a": lambda: UPWARDS + weight,
-        "g_without_mass": lambda: m * UPWARDS + g,
-        "weight_times_a": lambda: robot.weight * UPWARDS + weight,
-    }
-
-
-def _smallest_by_zeta() -> Array:
-    """By (9) alone: the shortest τ with ζ(τ) = λ."""
-    zeta = fb.forces_from_torques(arm_robot_eom())
-    return np.asarray(np.linalg.pinv(zeta.A) @ (squeezed_standing_forces() - zeta.b))
-
-
-def _torques() -> dict[str, Callable[[], Any]]:
-    def torques(
-        offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv
-    ) -> Callable[[], Any]:
-        def value() -> Array:
-            C, a = torque_force_matrix(arm_robot_eom())
-            return back(C[:, :18]) @ (offset * a - forces * C[:, 18:] @ squeezed_standing_forces())
-
-        return value
-
-    def whole() -> Array:
-        C, a = torque_force_matrix(arm_robot_eom())
-        return np.asarray((np.linalg.pinv(C) @ a)[:18])
-
-    def still(forces: Callable[[], Array]) -> Callable[[], Array]:
-        return lambda: arm_robot_eom().h[6:] - arm_robot_eom().J[:, 6:].T @ forces()
-
-    def standing_forces() -> Array:
-        space = fb.feasible_space(arm_robot_eom())
-        return space.forces(standing_still_beta(space))
-
-    return {
-        "zero": lambda: np.zeros(18),
-        "whole_C": whole,
-        "a_forgotten": torques(offset=0.0),
-        "forces_forgotten": torques(forces=0.0),
-        "forces_sign": torques(forces=-1.0),
-        "a_sign": torques(offset=-1.0),
-        "transpose": torques(back=np.transpose),
-        "all_still": still(squeezed_standing_forces),
-        "no_squeeze": still(standing_forces),
-        "standing": lambda: (
-            np.linalg.pinv(fb.forces_from_torques(arm_robot_eom()).A)
-            @ (standing_forces() - fb.forces_from_torques(arm_robot_eom()).b)
-        ),
-    }
-
-
-def _cost_60(eom: EquationsOfMotion) -> fb.Quadratic:
-    return wrench_objective(
-        eom.state, eom.contacts, [FORWARDS, 0.0, eom.robot.weight], [0.0, 0.0, 0.0]
-    )
-
-
-def _stub_names() -> dict[str, Any]:
-    """What the stub of exercise 05.4 names."""
-    eom = standing_go2_eom()
-    return {
-        "cost60": _cost_60(eom),
-        "force_bias": force_bias,
-        "tangential_bias": tangential_bias,
-        "contacts": eom.contacts,
-        "robot": eom.robot,
-    }
-
-
-def _judge_design(answer: Any) -> Verdict:
-    """Any cost on λ whose minimum does what exercise 05.4 asks, on paper and in simulation."""
-    eom = standing_go2_eom()
-    forces = minimiser_or_verdict(answer, eom.k, "λ")
-    if isinstance(forces, Verdict):
-        return forces
-    return _wrong_forces(eom, forces) or _on_physics(eom, forces)
-
-
-def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
-    """What the forces of a design miss on paper; None where they miss nothing."""
-    points, state = forces.reshape(-1, 3), eom.state
-    force = points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight]
-    moment = np.cross(eom.contacts.positions(state) - state.com, points).sum(axis=0)
-    if np.linalg.norm(force) > MISSED_FORCE:
-        if _is_on_torques(eom, forces):
-            return Verdict(
-                False,
-                "That is a cost on τ, which has twelve numbers, too. Give it on λ, without the "
-                "pullback.",
-                "on_torques",
-            )
-        f_c = rounded(points.sum(axis=0), "N", digits=3)
-        better = "A smaller weight for the preference, or a better preference."
-        return Verdict(False, f"The wish pays: f_c is {f_c}, forwards, left, up. {better}", "force")
-    if np.linalg.norm(moment) > MISSED_MOMENT:
-        return Verdict(
-            False,
-            f"The force is right, the moment is not: {np.linalg.norm(moment):.2f} N·m are left.",
-            "moment",
-        )
-    if points[:, 2].min() <= 0:
-        return Verdict(False, "The wrench is right, but a foot pulls on the ground.", "pulls")
-    lean = friction_ratios(eom.contacts, forces)
-    if lean.max() > MOST_LEAN + ROUNDING:
-        worst = eom.contacts.names[int(np.argmax(np.round(lean, 4)))].split("_")[0]
-        prefers = (
-            "What does your preference call a good direction for a force, and which would "
-            "be better?"
-        )
-        return Verdict(
-            False,
-            f"The wrench is right, but the foot {worst} leans {lean.max():.2f}. {prefers}",
-            "leans",
-        )
-    return None
-
-
-def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
-    """Whether a least point of twelve numbers has the wrench that is wished for, or nearly, when it
-    is taken as τ.
-    """
-    points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
-    return bool(
-        np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight])
-        < 0.1 * eom.robot.weight
-    )
-
-
-def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
-    """Give the forces for a moment on a floor with μ = 0.5."""
-    record = fb.rollout(
-        fb.Simulation(eom.robot, MOST_LEAN),
-        ConstantForceController(eom.robot, eom.contacts, forces),
-        SHORT,
-    )
-    slip = record.slip().max() if record.outcome == "completed" else np.inf
-    if slip > MOST_SLIP:
-        return Verdict(
-            False,
-            "Right on paper, but on the physics, with μ = 0.5, a foot slips: stay a little further "
-            "inside.",
-            "slips",
-        )
-    speed = record.final.com_velocity[0]
-    return Verdict(True, f"On MuJoCo with μ = 0.5: {speed:.2f} m/s after 0.1 s, and no foot slips.")
-
-
-def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
-    """The wish, and friction counted from another direction than the ground's normal."""
-    eom = standing_go2_eom()
-    normals = np.asarray(direction) / np.linalg.norm(direction)
-    return _cost_60(eom) + weight * tangential_bias(fb.Contacts.points(eom.robot, normals=normals))
-
-
-def _designs() -> list[Example]:
-    eom = standing_go2_eom()
-    cost, share, force = (
-        _cost_60(eom),
-        eom.robot.weight / 4,
-        np.array([FORWARDS, 0.0, eom.robot.weight]),
-    )
-    right, smallest = _leaning(force), cost.minimiser()
-    by_hand = np.linalg.pinv(com_wrench_map(eom.state, eom.contacts).A) @ [*force, 0, 0, 0]
-    by_hand[0::3] += [-7.8, -7.8, 7.8, 7.8]
-    diagonal = squeeze_forces(eom.contacts)["diagonal"]
-    return [
-        (right, ""), (fb.Quadratic.from_residual(np.eye(12), by_hand), ""),
-        (cost + 1e-3 * force_bias(eom.contacts, 0.1, share), "leans"),
-        (_leaning([30.0, 0.0, eom.robot.weight]), "leans"),
-        (cost + force_bias(eom.contacts, 0.1, share), "force"),
-        (force_bias(eom.contacts, 0.1, share), "force"),
-        (cost + 1e-3 * force_bias(eom.contacts, 10.0, share), "moment"),
-        (fb.Quadratic.from_residual(np.eye(12), smallest + 25.0 * diagonal), "pulls"),
-        (cost.pullback(fb.forces_from_torques(eom)), "on_torques"),
-        (right.pullback(fb.forces_from_torques(eom)), "on_torques"),
-        (cost.pullback(fb.forces_from_torques(arm_robot_eom())), "other_block"),
-    ]  # fmt: skip
-
 
 EXERCISES = (
     Exercise(
@@ -296,121 +32,121 @@ EXERCISES = (
         "G_three = np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])",
         judge=ShapeJudge(
             NumericJudge(
-                right=_moments_by_jacobian,
-                praise="One block for each foot; the base's rows of J say the same.",
-                mistakes=_moments(),
+                right=moments_by_jacobian,
+                praise="One block for each foot. The base rows of J give the same matrix.",
+                mistakes=moment_mistakes(),
                 hints={
-                    "zero": "There is nothing there yet: a foot beside the centre of mass has a "
-                    "lever.",
-                    "sign": "The opposite moment: the lever goes from x_c to the foot, and r × y, "
-                    "r × x are columns, not rows.",
-                    "about_base": "These are moments about the base's origin; x_c is another "
-                    "point.",
-                    "about_origin": "These are moments about the world's origin: subtract x_c.",
-                    "millimetres": "The unit: this is in N·mm; lengths are in m.",
-                    "reversed": "The right blocks in the opposite order: λ begins with the first "
-                    "row of `x_feet`.",
-                    "order": "The right blocks in a wrong order: λ has the feet as `x_feet` has "
-                    "them.",
+                    "zero": "There is no answer yet. A foot beside the centre of mass has a "
+                    "lever arm.",
+                    "sign": "This is the opposite moment. The lever arm points from x_c to the "
+                    "foot, and r × x, r × y, r × z are columns, not rows.",
+                    "about_base": "These are moments about the base's origin, but x_c is "
+                    "another point.",
+                    "about_origin": "These are moments about the world's origin. Subtract x_c.",
+                    "millimetres": "The unit is wrong: this is in N·mm. Lengths are in m.",
+                    "reversed": "The blocks are right, but in the opposite order. λ begins with "
+                    "the first row of `x_feet`.",
+                    "order": "The blocks are right, but in the wrong order. λ has the feet in "
+                    "the order of `x_feet`.",
                 },
             ),
             {
-                (3, 12): "Twelve columns are for four feet; FL is in the air.",
-                (9, 3): "The blocks stand side by side, not below each other: `np.hstack`.",
+                (3, 12): "Twelve columns are for four feet. FL is in the air.",
+                (9, 3): "The blocks must be side by side, not below each other: use `np.hstack`.",
                 (
                     3,
                     3,
-                ): "The blocks stand side by side; added up, they would need one force for all "
-                "feet.",
-                (3,): "That is a moment. G_τ is the matrix that makes it from λ.",
+                ): "The blocks must be side by side. Their sum would mean one common force for "
+                "all feet.",
+                (3,): "That is a moment. G_τ is the matrix that maps λ to the moment.",
             },
         ),
-        explanation="(21): the columns of a block are r × x, r × y and r × z with r = x_i - x_c.",
+        explanation="In (21) the columns of a block are r × x, r × y and r × z with r = x_i - x_c.",
     ),
     Exercise(
         name="05.2",
-        statement="f̃_c, shape (3,), N, world: go2 shall accelerate by 0.5 m/s² forwards and 1 "
+        statement="f̃_c, shape (3,), N, world, for go2 to accelerate by 0.5 m/s² forwards and 1 "
         "m/s² upwards.",
         stub="f_wish = np.array([0, 0, robot.weight])  # replace",
         solution="f_wish = robot.mass * np.array([0.5, 0, 1.0]) + np.array([0, 0, robot.weight])",
         judge=NumericJudge(
-            right=_force_by_momentum,
-            praise="m a, and m g on top: gravity is the one outside force that is not in λ.",
-            mistakes=_forces(),
+            right=force_by_momentum,
+            praise="m a plus m g: gravity is the only external force that is not in λ.",
+            mistakes=force_mistakes(),
             hints={
-                "weight_alone": "That holds it still. What accelerates it comes on top.",
-                "no_gravity": "Gravity is forgotten: the ground must carry the weight, too.",
-                "gravity_sign": "The sign of gravity: it pulls down, so the ground must push up by "
-                "more.",
-                "weight_twice": "The weight counts twice.",
-                "no_mass": "The mass is forgotten: these are m/s², not N.",
-                "no_mass_on_a": "The mass is forgotten in one of the two parts.",
-                "g_without_mass": "9.81 is an acceleration; times the mass it is a force.",
-                "weight_times_a": "Weight times acceleration: the weight is m g already.",
+                "weight_alone": "That holds the robot still. Add the force that accelerates it.",
+                "no_gravity": "Gravity is missing. The ground must carry the weight, too.",
+                "gravity_sign": "The sign of gravity is wrong. Gravity pulls down, so the "
+                "ground must push up harder.",
+                "weight_twice": "The weight is counted twice.",
+                "no_mass": "The mass is missing: these are m/s², not N.",
+                "no_mass_on_a": "The mass is missing in one of the two terms.",
+                "g_without_mass": "9.81 is an acceleration. Multiply it by the mass to get a "
+                "force.",
+                "weight_times_a": "This is weight times acceleration. The weight already is m g.",
             },
         ),
         namespace=lambda: {"robot": standing_go2_eom().robot},
-        explanation="Newton: m a = f_c + m g with g pointing down. `desired_wrench(state, a)` of "
-        "floatbase.objectives does it.",
+        explanation="By Newton's law, m a = f_c + m g with g pointing down. "
+        "`desired_wrench(state, a)` of floatbase.objectives computes f_c.",
     ),
     Exercise(
         name="05.3",
-        statement="The smallest torques, shape (18,), N·m, with which anymal_kinova's feet get the "
-        "forces `pressed`.",
+        statement="The smallest torques, shape (18,), N·m, that give anymal_kinova's feet the "
+        "contact forces `pressed`.",
         stub="tau_pressed = np.zeros(18)  # replace: from C_tau, C_forces, a and pressed",
         solution="tau_pressed = np.linalg.pinv(C_tau) @ (a - C_forces @ pressed)",
         judge=ShapeJudge(
             NumericJudge(
-                right=_smallest_by_zeta,
-                praise="(25) in one line: what λ leaves to τ, by the pseudo-inverse of C_τ alone.",
-                mistakes=_torques(),
+                right=smallest_by_zeta,
+                praise="(25) in one line: λ determines τ through the pseudo-inverse of C_τ alone.",
+                mistakes=torque_mistakes(),
                 hints={
-                    "zero": "There is nothing there yet: without torques the feet carry hardly "
+                    "zero": "There is no answer yet. Without torques the feet carry hardly "
                     "anything.",
-                    "whole_C": "The pseudo-inverse of the whole C gives the shortest (τ, λ). λ is "
-                    "not to be chosen: it is "
-                    "`pressed`.",
-                    "a_forgotten": "a is forgotten: gravity is in it.",
-                    "forces_forgotten": "λ is forgotten: move C_λ λ to the right side, then solve "
-                    "for τ.",
-                    "forces_sign": "The sign of C_λ λ: it changes when it moves to the right side.",
-                    "a_sign": "The sign of a.",
-                    "transpose": "A transpose is no inverse: use the pseudo-inverse of C_τ.",
-                    "all_still": "These hold all joints still, the arm too. The same forces can be "
-                    "had for less.",
-                    "no_squeeze": "These hold the robot still without the squeeze.",
-                    "standing": "These are for the forces of standing still; `pressed` has 20 N "
-                    "more between the front feet.",
+                    "whole_C": "The pseudo-inverse of the whole C gives the shortest (τ, λ). "
+                    "But λ is not free: it must be `pressed`.",
+                    "a_forgotten": "a is missing, and it contains gravity.",
+                    "forces_forgotten": "λ is missing. Move C_λ λ to the right-hand side, then "
+                    "solve for τ.",
+                    "forces_sign": "The sign of C_λ λ is wrong. It changes when the term moves "
+                    "to the right-hand side.",
+                    "a_sign": "The sign of a is wrong.",
+                    "transpose": "A transpose is not an inverse. Use the pseudo-inverse of C_τ.",
+                    "all_still": "These torques hold all joints still, including the arm. "
+                    "Smaller torques give the same forces.",
+                    "no_squeeze": "These torques hold the robot still, but without the internal "
+                    "force.",
+                    "standing": "These torques are for the forces of standing still. `pressed` "
+                    "has 20 N more between the front feet.",
                 },
             ),
             {
-                (12,): "12 numbers: those are forces. anymal_kinova has 18 motors.",
-                (30,): "30 numbers: that is (τ, λ); λ is given.",
-                (
-                    24,
-                ): "24 numbers: those are accelerations, or torques with six zeros for the base.",
-                (18, 1): "This is a matrix with one column; the answer is a vector of shape (18,).",
+                (12,): "12 numbers are forces. anymal_kinova has 18 motors.",
+                (30,): "30 numbers are (τ, λ), but λ is given.",
+                (24,): "24 numbers are accelerations, or torques with six zeros for the base.",
             },
         ),
         namespace=lambda: {"pressed": squeezed_standing_forces()},
-        explanation="(10) reads C_τ τ + C_λ λ = a. For a given λ that is a linear system for τ, "
-        "with more unknowns than rows; "
-        "the pseudo-inverse gives its shortest solution. No β is needed.",
+        explanation="(10) is C_τ τ + C_λ λ = a. For a given λ this is a linear system for τ, "
+        "with more unknowns than equations. The pseudo-inverse gives its shortest solution. β "
+        "is not needed.",
     ),
     Exercise(
         name="05.4",
-        statement="A cost on λ: 60 N forwards beside the weight, within 1 N and 0.1 N·m, and no "
-        "foot leans by more than 0.5.",
+        statement="A cost on λ for a force of 60 N forwards in addition to the weight, within 1 "
+        "N and 0.1 N·m. At every foot the tangential force must be at most 0.5 times the normal "
+        "force.",
         stub="design = cost60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
         solution="whole = np.array([60, 0, robot.weight])  # where all forces together point\n"
         "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
         "design = cost60 + 1e-3 * tangential_bias(leaning)",
-        judge=_judge_design,
-        namespace=_stub_names,
-        examples=_designs,
-        explanation="(23) calls a force without friction the best, and shares the friction "
-        "equally. Where friction is the "
-        "wish, a better preference is the direction of the whole: then each foot leans as the sum "
-        "does, by 60 / 158.",
+        judge=judge_design,
+        namespace=stub_names,
+        examples=design_examples,
+        explanation="(23) prefers forces without friction, and distributes the friction "
+        "equally. Where friction is the goal, the direction of the total force is a better "
+        "preference. Then the force at each foot has the same direction as the sum, with a "
+        "ratio of 60 / 158.",
     ),
 )

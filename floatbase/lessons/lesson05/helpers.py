@@ -1,6 +1,4 @@
-"""Lesson 05, Steering the centre of mass: squeezes, leans, a stretched arm, a controller that gives
-forces, the rose's one.
-"""
+"""Lesson 05: internal forces, friction, a stretched arm, and controllers of the contact forces."""
 
 from __future__ import annotations
 
@@ -18,25 +16,28 @@ from floatbase.lessons.lesson03 import standing_still_beta
 from floatbase.objectives import torques_from_forces
 from floatbase.robots import Robot
 
-STRETCHED_ARM = (
-    np.pi / 2,
-    np.pi / 2,
-    np.pi,
-    0.0,
-    0.0,
-    0.0,
-)  # rad: anymal_kinova's arm, straight forwards
+# rad: the arm of anymal_kinova, straight forwards
+STRETCHED_ARM = (np.pi / 2, np.pi / 2, np.pi, 0.0, 0.0, 0.0)
 
 
 def make_controller() -> AnalyticController:
-    """The controller of this lesson, whose push rose ends it: costs alone, on go2."""
+    """Return the controller of the lesson's push-recovery map: objectives alone, on go2."""
     robot = fb.load("go2")
     return AnalyticController(robot, fb.Contacts.points(robot, mu=0.7), robot.standing())
 
 
 def stretched_arm_state(angle: float) -> fb.State:
-    """anymal_kinova at rest with its arm stretched out. angle: rad, of the arm to the left; 0 is
-    forwards.
+    """Return anymal_kinova at rest with its arm stretched out.
+
+    Parameters
+    ----------
+    angle : float
+        Direction of the arm [rad]: 0 is forwards, positive angles are to the left.
+
+    Returns
+    -------
+    State
+        The state.
     """
     robot = fb.load("anymal_kinova")
     q = robot.standing().q.copy()
@@ -46,17 +47,23 @@ def stretched_arm_state(angle: float) -> fb.State:
 
 
 def com_in_base(state: fb.State) -> Array:
-    """Centre of mass seen from the base, in the base's axes, shape (3,), m."""
+    """Return the centre of mass relative to the base, shape (3,), base frame [m]."""
     pose = state.frame_pose("base")
     return np.asarray(pose.rotation.T @ (state.com - pose.translation))
 
 
 def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
-    """Four of the six squeezes of a quadruped on level ground: name -> forces of 1 N at each foot
-    concerned, shape (12,).
+    """Return four of the six internal forces of a quadruped on level ground.
 
-    contacts: feet in the order FL, FR, RL, RR, those at the front side by side, as those at the
-        rear.
+    Parameters
+    ----------
+    contacts : Contacts
+        Feet in the order FL, FR, RL, RR. The front feet are side by side, and so are the rear feet.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (12,)
+        For each name: forces of 1 N at each foot involved.
     """
     rows = {
         "front feet apart": [[0, 1, 0], [0, -1, 0], [0, 0, 0], [0, 0, 0]],
@@ -71,11 +78,22 @@ def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
 
 
 def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
-    """How far the force of each point leans from its normal, tangential over normal part, shape
-    (n,).
+    """Return the ratio of tangential to normal force at each contact point.
 
-    μ where a force lies on its cone. Infinite where it has no normal part or pulls. forces: shape
-    (k,) or (n, 3), N, world.
+    The ratio equals μ for a force on the surface of its cone. It is infinite if the force pulls or
+    has no normal component.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        The contacts.
+    forces : array_like, shape (k,) or (n, 3)
+        Contact forces in the world frame [N].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The ratios [-].
     """
     f = as_forces(forces, contacts.k).reshape(-1, 3)
     normal = np.einsum("ij,ij->i", f, contacts.normals)
@@ -86,23 +104,39 @@ def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
 
 
 class ConstantForceController:
-    """A controller: in every tick the smallest torques that give the same forces, by (25).
+    """Controller that always commands the smallest torques for the same contact forces.
 
-    contacts: its stance. forces: shape (k,), N, world.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        Its contacts.
+    forces : array_like, shape (k,)
+        Contact forces in the world frame [N].
+
+    Notes
+    -----
+    [FBR]_, eq. (25).
     """
 
     def __init__(self, robot: Robot, contacts: fb.Contacts, forces: npt.ArrayLike):
         self.robot, self.contacts, self.forces = robot, contacts, as_forces(forces, contacts.k)
 
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
-        """The torques for configuration q and velocity v."""
+        """Return the torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
         return TorqueCommand(torques_from_forces(eom).torque(self.forces), self.forces)
 
 
 @cache
 def three_feet_eom() -> EquationsOfMotion:
-    """(7) of go2, tilted and moving, on all feet but FL."""
+    """Return the equations of motion of go2, tilted and moving, on all feet except FL.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     robot = fb.load("go2")
     return fb.equations_of_motion(
         robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot")
@@ -111,14 +145,20 @@ def three_feet_eom() -> EquationsOfMotion:
 
 @cache
 def arm_robot_eom() -> EquationsOfMotion:
-    """(7) of anymal_kinova standing on four feet."""
+    """Return the equations of motion of anymal_kinova standing on four feet.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
+    """
     robot = fb.load("anymal_kinova")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
 
 
 def squeezed_standing_forces() -> Array:
-    """The forces of exercise 05.3, shape (12,), N, world: those of standing still, with 20 N
-    between the front feet.
+    """Return the contact forces of exercise 05.3, shape (12,), world frame [N].
+
+    They are the forces of standing still, with an internal force of 20 N between the front feet.
     """
     space = fb.feasible_space(arm_robot_eom())
     forces = space.forces(standing_still_beta(space)).copy()

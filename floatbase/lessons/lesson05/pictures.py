@@ -1,4 +1,4 @@
-"""Lesson 05, Steering the centre of mass: forces with their net wrench, a plan that pulls."""
+"""Lesson 05: forces with their net wrench, a moved centre of mass, and a plan that pulls."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, markers, plots, prefixed, shapes
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
-LEAST_FORCE, LEAST_MOMENT = 5e-3, 5e-4  # N, N·m: less is shown as zero
-PLOT_RANGE = (-40.0, 100.0)  # N: a plan that has lost its robot asks for thousands
+LEAST_FORCE, LEAST_MOMENT = 5e-3, 5e-4  # N, N·m: smaller values are shown as zero
+PLOT_RANGE = (-40.0, 100.0)  # N: after a fall, the planned forces are thousands of newtons
 
 
 def show_forces(
@@ -26,11 +26,27 @@ def show_forces(
     forces: npt.ArrayLike,
     wish: npt.ArrayLike | None = None,
 ) -> str:
-    """Draw forces at the feet and, above the robot, where it can be seen, their wrench (f_c, τ_c);
-    returns it as HTML.
+    """Draw contact forces, and their wrench (f_c, τ_c) above the robot, where it is visible.
 
-    What carries the weight is left out of the wrench. forces: shape (k,), N, world. wish: shape
-    (3,), N, world, the force that was wished for beside the weight: a grey arrow.
+    The wrench does not include the force that carries the weight.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    state : State
+        State of the robot.
+    contacts : Contacts
+        Its contacts.
+    forces : array_like, shape (k,)
+        Contact forces in the world frame [N].
+    wish : array_like, shape (3,), optional
+        Desired force in addition to the weight, in the world frame [N], drawn as a grey arrow.
+
+    Returns
+    -------
+    str
+        The wrench as HTML.
     """
     forces = as_forces(forces, contacts.k)
     wrench = com_wrench_map(state, contacts)(forces) - [0, 0, state.robot.weight, 0, 0, 0]
@@ -41,22 +57,33 @@ def show_forces(
         "wrench", markers.wrench(above, scale * wrench[:3], scale / size * wrench[3:], size)
     )
     if wish is not None and np.linalg.norm(wish) > LEAST_FORCE:
-        view.add_legend_entry("wish", GREYS[1], "force wished for")
+        view.add_legend_entry("wish", GREYS[1], "desired force")
         higher = above + [0.0, 0.0, 0.1 * size]
         drawn["wish"] = shapes.arrow(higher, scale * np.asarray(wish, dtype=float), GREYS[1], size)
     view.show(state, contacts=contacts, planned=forces, extra=drawn)
     f_c, tau_c = np.split(wrench, [3])
     return (
-        f"beside the weight: f<sub>c</sub> = <b>{rounded(f_c, 'N')}</b>, τ<sub>c</sub> = "
+        f"without the weight: f<sub>c</sub> = <b>{rounded(f_c, 'N')}</b>, τ<sub>c</sub> = "
         f"<b>{rounded(tau_c, 'N·m')}</b>"
     )
 
 
 def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> Viewer:
-    """Draw a state and, as a ghost, another; a dark spot marks where on the ground its centre of
-    mass was.
+    """Draw a state, and another one as a ghost, with a dark spot below the ghost's centre of mass.
 
-    name: what the legend calls the ghost.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    now, before : State
+        The state, and the state of the ghost.
+    name : str
+        Name of the ghost in the legend.
+
+    Returns
+    -------
+    Viewer
+        The viewer.
     """
     x, y, _ = before.com
     spot = shapes.contact_patch([x, y, 0.0], [0.0, 0.0, 1.0], 0.035 * view.painter.size)
@@ -68,8 +95,21 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
 
 
 def plot_planned_pull(record: Rollout, until: float) -> Figure:
-    """Normal forces that were planned and measured up to a time in s, N, with a line at zero.
-    Beyond `PLOT_RANGE` they are cut.
+    """Plot planned and measured normal forces with a line at zero.
+
+    The vertical axis is limited to `PLOT_RANGE`.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    until : float
+        End of the time axis [s].
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
     plots.plot_forces(record, axis)

@@ -11,32 +11,30 @@ import numpy.typing as npt
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
 )
 from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
 
-BANK, BANK_MU, BANK_FACETS = (
-    np.array([0.3, -0.2, 1.0]),
-    0.5,
-    5,
-)  # of exercise 06.1: normal, not unit; μ; facets
+# of exercise 06.1: normal, not a unit vector; μ; number of facets
+BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5
 FACETS, MU = 8, 0.7  # of exercise 06.2
 LOSS = 0.05  # of exercise 06.3
 HILL, MARGIN = 20.0, 3.0  # of exercise 06.4: degrees; N
-BALANCE = 0.1  # N, and N·m: what may be missing in exercise 06.4
-SOLVED = 1e-3  # N: what any solver may leave of the margin in exercise 06.4
+BALANCE = 0.1  # N, and N·m: tolerance of the balance in exercise 06.4
+SOLVED = 1e-3  # N: tolerance of the margin in exercise 06.4, for any solver
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
-    """Rows of exercise 06.1 from the polyhedron's edges, which are on the cone: each row is at
-    right angles to two of them.
+    """Compute the constraints of exercise 06.1 from the edges of the polyhedron.
+
+    The edges lie on the cone, and the normal of each facet is perpendicular to two of them.
     """
     n = np.asarray(normal) / np.linalg.norm(normal)
     t1, t2 = tangents(n)
@@ -48,7 +46,7 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
 
 
 def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
-    """The steepest slope [deg] whose cone or polyhedron holds a vertical force, by bisection."""
+    """Find the steepest slope [°] whose cone contains a vertical force, by bisection."""
     low, high = 0.0, 89.0
     while high - low > 1e-9:  # degrees
         middle = 0.5 * (low + high)
@@ -59,15 +57,17 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
 
 
 def _fewest(lost: Any) -> int:
-    """The smallest number of facets that loses less than `LOSS`. lost: number of facets -> part
-    that is lost.
+    """Return the smallest number of facets that loses less than `LOSS`.
+
+    lost: number of facets -> fraction that is lost.
     """
     return next(n for n in range(3, 100) if lost(n) < LOSS)
 
 
 def _lost_force(facets: int, inside: bool = True) -> float:
-    """What the middle of a facet misses of the cone, part of μ, tried with a force: how far it may
-    lean along t1.
+    """Return the fraction of μ that is lost in the middle of a facet.
+
+    It follows from the largest tangential force along t1.
     """
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
     leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])
@@ -80,41 +80,38 @@ def _lost_area(facets: int) -> float:
 
 @cache
 def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
-    """go2 standing on the slope of exercise 06.4, and its contacts."""
+    """Return go2 standing on the slope of exercise 06.4, and its contacts."""
     robot, n = fb.load("go2"), slope_normal(HILL)
     return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
 
 
-def _judge_forces(answer: Any) -> Verdict:
-    """Any forces that do what exercise 06.4 states, judged with forces and levers one by one."""
-    given = array_or_verdict(answer, (12,))
-    if isinstance(given, Verdict):
-        return given
+@array_judge((12,))
+def _judge_forces(given: Array) -> Verdict:
+    """Judge forces for exercise 06.4 by their sum, moment and margins."""
     f = given.reshape(4, 3)
     return _out_of_balance(f) or _judge_margins(f)
 
 
 def _out_of_balance(f: Array) -> Verdict | None:
-    """What is wrong with the sum or the moment of forces on the hill, shape (4, 3), N; None where
-    nothing is.
-    """
+    """Return what is wrong with the sum or moment of forces, shape (4, 3) [N], or None."""
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
-        ("nobody", "Nobody carries the robot yet."): 0.0 * n,
+        ("no_force", "The forces do not carry the robot yet."): 0.0 * n,
         (
             "sign",
-            "The sign: λ is what the ground does to the robot, and it pushes upwards.",
+            "The sign is wrong. λ is the force of the ground on the robot, and it pushes upwards.",
         ): -carried,
         (
             "slides",
-            "These forces carry only the weight's part along the normal: the robot slides.",
+            "These forces carry only the normal component of the weight, so the robot slides.",
         ): weight * n[2] * n,
         (
             "along_normal",
-            "They add up to the weight, but along the slope's normal; gravity is vertical.",
+            "Their sum has the magnitude of the weight, but it is along the normal of the "
+            "slope. Gravity is vertical.",
         ): weight * n,
     }
     for (hint, text), total in sums.items():
@@ -122,51 +119,56 @@ def _out_of_balance(f: Array) -> Verdict | None:
             return Verdict(False, text, hint)
     if missing > BALANCE:
         return Verdict(
-            False, f"The sum is {missing:.1f} N away from what carries the weight.", "sum"
+            False,
+            f"The sum differs by {missing:.1f} N from the force that carries the weight.",
+            "sum",
         )
     moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
     if moment > BALANCE:
         return Verdict(
             False,
-            f"The sum is right, but a moment of {moment:.1f} N·m is left: go2 would turn over.",
+            f"The sum is right, but a moment of {moment:.1f} N·m remains: go2 would turn over.",
             "moment",
         )
     return None
 
 
 def _judge_margins(f: Array) -> Verdict:
-    """Whether each of the forces in balance on the hill, (4, 3), N, is well inside its cone."""
+    """Judge whether each of the balanced forces, shape (4, 3) [N], is well inside its cone."""
     names, n = stance_on_hill()[1].names, slope_normal(HILL)
     margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
     if margins.min() >= MARGIN - SOLVED:
         return Verdict(
-            True, f"In balance, and no foot is nearer to slipping than {margins.min():.1f} N."
+            True,
+            f"The forces are balanced. The smallest margin is {margins.min():.1f} N.",
         )
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(
             False,
-            f"In balance. But all feet hold alike against sliding, and the upper ones carry "
-            f"little: {least}.",
+            f"The forces are balanced. But all feet have the same tangential force, and the upper "
+            f"feet carry little: {least}.",
             "alike",
         )
     if margins.min() >= -BALANCE:
-        return Verdict(False, f"In balance and in the cones, but {least} only.", "in_cones")
+        return Verdict(
+            False, f"The forces are balanced and inside their cones, but {least} only.", "in_cones"
+        )
     if upright.min() >= MARGIN:
         return Verdict(
             False,
-            f"In balance, with room enough in cones about the vertical; in the slope's own, "
-            f"{least}.",
+            f"The forces are balanced and have enough margin in cones about the vertical. But in "
+            f"the cones about the slope's normal, {least}.",
             "vertical_cones",
         )
-    return Verdict(False, f"In balance, but outside of a cone: {least}.", "outside")
+    return Verdict(
+        False, f"The forces are balanced, but one is outside its cone: {least}.", "outside"
+    )
 
 
 def _in_balance(facets: int, room: float) -> Array:
-    """The smallest forces on the hill, (12,) N, that carry go2, with room to polyhedra of so many
-    facets.
-    """
+    """Return the smallest forces that carry go2 on the hill with a margin, shape (12,) [N]."""
     state, contacts = stance_on_hill()
     carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
     rows = np.kron(np.eye(4), FrictionPolyhedron(slope_normal(HILL), MU, facets).face_matrix)
@@ -178,13 +180,12 @@ def _forces() -> list[Example]:
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
-    squeeze = np.zeros(
-        12
-    )  # the left feet against the right ones: it changes neither sum nor moment
+    # the left feet against the right feet: the sum and the moment do not change
+    squeeze = np.zeros(12)
     squeeze[[7, 10]] = 1.0, -1.0
     return [
         *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
-        (np.zeros(12), "nobody"), (-smallest, "sign"),
+        (np.zeros(12), "no_force"), (-smallest, "sign"),
         (np.tile(weight * n[2] * n / 4, 4), "slides"),
         (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
         (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"),
@@ -196,8 +197,8 @@ def _forces() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="06.1",
-        statement="Rows of the polyhedron inside the cone for a normal that is not unit, shape (5, "
-        "3).",
+        statement="The matrix of the polyhedron inside the cone for a normal that is not a unit "
+        "vector, shape (5, 3).",
         stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the "
         "cone",
         solution="from floatbase.friction import tangents\n\n"
@@ -209,7 +210,7 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_rows_from_edges,
-                praise="Five half-spaces; where two meet is an edge, and the edges lie on the "
+                praise="Five half-spaces. Two of them meet at an edge, and the edges lie on the "
                 "cone.",
                 mistakes={
                     "zero": lambda: np.zeros((5, 3)),
@@ -225,38 +226,40 @@ EXERCISES = (
                     "level": lambda: _rows_from_edges(normal=[0.0, 0.0, 1.0]),
                 },
                 hints={
-                    "zero": "Nothing there yet: zero rows allow every force.",
-                    "outside": "That polyhedron lies outside the cone: its facets touch it in "
-                    "their middle.",
-                    "not_unit": "The normal is not of length one: make it so before its length "
-                    "counts as friction.",
-                    "scale": "The right half-spaces, in another scale: without the normal's part "
-                    "each row has length one.",
-                    "sign": "The sign: rows @ f ≤ 0 must hold for forces inside.",
-                    "normal_sign": "The sign of the normal's part: with + the rows forbid to push.",
+                    "zero": "There is no answer yet. Zero rows allow every force.",
+                    "outside": "That polyhedron is outside the cone: its facets touch the cone "
+                    "in their middle.",
+                    "not_unit": "The normal is not a unit vector. Normalize it before you use "
+                    "it for the friction term.",
+                    "scale": "These are the right half-spaces with another scale. Without its "
+                    "normal component, each row must have length one.",
+                    "sign": "The sign is wrong. rows @ f ≤ 0 must hold for forces inside.",
+                    "normal_sign": "The sign of the normal component is wrong. With a plus, the "
+                    "constraints forbid pushing.",
                     "no_mu": "μ is missing: these are the facets for μ = 1.",
-                    "turned": "The facets are turned by half a facet: facet 0 must face t1.",
-                    "level": "These are the rows of level ground: use the normal that is given.",
+                    "turned": "The facets are rotated by half a facet. Facet 0 must face t1.",
+                    "level": "These are the constraints on level ground. Use the given normal.",
                 },
             ),
             {
-                (3, 5): "This is the transpose: one row for each facet.",
-                (4, 3): "Four rows; five facets are asked for.",
-                (5,): "Five numbers; each facet needs a row of three.",
+                (3, 5): "This is the transpose. The matrix has one row for each facet.",
+                (4, 3): "There are four rows, but five facets are required.",
+                (5,): "There are five numbers, but each facet needs a row of three.",
             },
         ),
-        explanation="A facet's row takes the force along d_i and subtracts what friction allows in "
-        "its middle, μ cos(π/5) nᵀf.",
+        explanation="The row of a facet takes the force along d_i and subtracts what friction "
+        "allows in the middle of the facet, μ cos(π/5) nᵀf.",
     ),
     Exercise(
         name="06.2",
-        statement="The steepest slope, degrees, on which a force straight up stays in 8 facets "
-        "inside the cone, μ = 0.7.",
+        statement="The steepest slope, in degrees, on which a vertical force stays inside a "
+        "polyhedron with 8 facets inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
         judge=NumericJudge(
             right=_slip_angle,
-            praise="Two degrees less than the cone itself: the price of flat facets.",
+            praise="This is two degrees less than for the cone itself, because the facets are "
+            "flat.",
             mistakes={
                 "45": lambda: 45.0,
                 "radians": lambda: np.deg2rad(_slip_angle()),
@@ -269,34 +272,35 @@ EXERCISES = (
                 "cosine_on_angle": lambda: _slip_angle(None) * np.cos(np.pi / 8),
             },
             hints={
-                "45": "At 45° a force straight up needs μ = 1.",
+                "45": "At 45°, a vertical force needs μ = 1.",
                 "radians": "That is in radians.",
-                "round": "That is the round cone. A facet faces uphill, as this force leans; its "
-                "middle allows less than μ.",
-                "round_radians": "That is the angle in radians, and of the round cone.",
-                "sine": "A sine: on a slope α_∥ / α_⊥ is a tangent.",
-                "round_sine": "A sine, and the round cone: α_∥ / α_⊥ is a tangent, and a facet "
-                "allows less than μ.",
-                "four_facets": "That is for 4 facets, as before; here are 8.",
-                "outside": "That is for facets outside the cone; ask what their middle allows "
-                "inside.",
-                "cosine_on_angle": "That is the loss in degrees on the angle itself; the cosine "
-                "goes with μ.",
+                "round": "That is the round cone. A facet faces uphill, in the direction of "
+                "this force, and its middle allows less than μ.",
+                "round_radians": "That is the angle in radians, and for the round cone.",
+                "sine": "This uses a sine. On a slope, α_∥ / α_⊥ is a tangent.",
+                "round_sine": "This uses a sine and the round cone. α_∥ / α_⊥ is a tangent, and "
+                "a facet allows less than μ.",
+                "four_facets": "That is for 4 facets, as before. Here there are 8.",
+                "outside": "That is for facets outside the cone. What does the middle of a "
+                "facet allow inside?",
+                "cosine_on_angle": "This multiplies the angle by the cosine. The cosine belongs "
+                "to μ.",
             },
         ),
-        explanation="α_∥ / α_⊥ of a vertical force is the slope's tangent, and the middle of a "
-        "facet allows μ cos(π/8).",
+        explanation="α_∥ / α_⊥ of a vertical force is the tangent of the slope, and the middle "
+        "of a facet allows μ cos(π/8).",
     ),
     Exercise(
         name="06.3",
-        statement="The fewest facets inside the cone whose middles lose less than 5 % of the "
-        "tangential force.",
+        statement="The smallest number of facets inside the cone with which the middle of a "
+        "facet loses less than 5 % of the tangential force.",
         stub="fewest = 4  # replace this number",
         solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
         judge=NumericJudge(
             is_count=True,
             right=partial(_fewest, _lost_force),
-            praise="With 10 facets 4.9 % are lost in their middle, nothing at the edges.",
+            praise="With 10 facets, 4.9 % is lost in the middle of a facet and nothing at the "
+            "edges.",
             mistakes={
                 "area": partial(_fewest, _lost_area),
                 "outside": lambda: _fewest(partial(_lost_force, inside=False)),
@@ -306,21 +310,22 @@ EXERCISES = (
                 "not_fewest": lambda: 16,
             },
             hints={
-                "area": "That many are needed to lose less than 5 % of the area; the question is "
-                "about force.",
-                "outside": "That is for a polyhedron outside: what its edges promise too much.",
-                "one_too_few": "One facet too few: it loses 6 %.",
-                "four": "Four lose 29 %.",
-                "eight": "Eight lose 7.6 %.",
-                "not_fewest": "Enough, but not the fewest.",
+                "area": "That number is needed to lose less than 5 % of the area. The question "
+                "is about the force.",
+                "outside": "That is for a polyhedron outside the cone: how much its edges allow "
+                "in excess.",
+                "one_too_few": "That is one facet too few: it loses 6 %.",
+                "four": "Four facets lose 29 %.",
+                "eight": "Eight facets lose 7.6 %.",
+                "not_fewest": "That is enough, but not the smallest number.",
             },
         ),
-        explanation="1 - cos(π/n) < 0.05; for small angles it is about 5 / n².",
+        explanation="1 - cos(π/n) < 0.05. For small angles, 1 - cos(π/n) is about 5 / n².",
     ),
     Exercise(
         name="06.4",
-        statement="Forces on a slope of 20°, shape (12,), N, world: in balance, each with a margin "
-        "of 3 N to its true cone.",
+        statement="Forces on a slope of 20°, shape (12,), N, world, that are balanced and each "
+        "have a margin of 3 N to their round cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import com_wrench_map\n\n"
@@ -335,14 +340,14 @@ EXERCISES = (
         judge=_judge_forces,
         namespace=lambda: {"robot": fb.load("go2"), "on_hill": stance_on_hill},
         examples=_forces,
-        explanation="The rows of all feet with -3 on their right side, the balance as equalities, "
-        "and least forces to choose.",
+        explanation="The constraints of all feet with -3 on the right-hand side, the balance as "
+        "equality constraints, and the smallest forces as the objective.",
     ),
 )
 
 
 def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
-    """d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
+    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
     n = BANK / np.linalg.norm(BANK)
     t1, t2 = tangents(n)
     angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS

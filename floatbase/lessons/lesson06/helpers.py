@@ -1,6 +1,4 @@
-"""Lesson 06, Friction cones: the controller that keeps forces in their cones, legs that reach given
-places, a steep valley.
-"""
+"""Lesson 06: a controller that keeps forces inside their cones, and unusual stances."""
 
 from __future__ import annotations
 
@@ -25,37 +23,35 @@ from floatbase.objectives import (
     wrench_objective,
 )
 
-STIFFNESS, DAMPING = (
-    100.0,
-    20.0,
-)  # 1/s² and 1/s of the centre of mass and of the base's rotation, as in lesson 05
+# 1/s² and 1/s: gains for the centre of mass and for the rotation of the base, as in lesson 05
+STIFFNESS, DAMPING = 100.0, 20.0
 FACETS = 4  # of each foot's polyhedron, inside its cone
 BIAS, NORMAL_BIAS = 1e-3, 0.1  # weight of (23) beside (22), and its α, as in lesson 05
-# degrees: each side of the valley in which the centre of mass stands beside the feet
+# degrees: slope of each side of the valley in which the centre of mass is beside the feet
 VALLEY_SLOPE = 40.0
-LEFT_FEET_Y, RIGHT_FEET_Y = (
-    0.16,
-    -0.06,
-)  # m: where the left and the right feet stand on its sides, y
-_MAX_STEPS, _FOOT_TOLERANCE, _LARGEST_STEP = (
-    50,
-    1e-9,
-    0.2,
-)  # of Newton's method for the legs; m; rad
+LEFT_FEET_Y, RIGHT_FEET_Y = 0.16, -0.06  # m: y of the left and the right feet in the valley
+# Newton's method for the legs: iterations; m; rad
+_MAX_STEPS, _FOOT_TOLERANCE, _LARGEST_STEP = 50, 1e-9, 0.2
 
 
 class ConeController:
-    """Forces in their cones: of all λ that the polyhedra allow, the one of least cost, and the
-    torques that give it by (25).
+    """Controller that minimises a cost on the contact forces, subject to the friction polyhedra.
 
-    The cost is lesson 05's, (22) for the wrench that brings centre of mass and base back, with a
-    little of (23). New are the rows. Nothing limits the torques, and nothing asks how the joints
-    move.
+    The torques follow from the contact forces by (25). The cost is that of lesson 05: (22) for the
+    wrench that brings back the centre of mass and the base, plus a small multiple of (23). The
+    inequality constraints are new. The torques are not limited, and there is no objective for the
+    joint motion.
 
-    robot: the robot to control.
-    contacts: its contacts with the ground, each with a polyhedron of 4 facets inside its cone.
-    state: where to stand.
-    moment_weight: 1/m², what (N·m)² cost in (22) beside N².
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        Its contacts with the ground. Each gets a polyhedron of 4 facets inside its cone.
+    state : State
+        Where to stand.
+    moment_weight : float, optional
+        Weight of the moment in (22) relative to the force [1/m²].
     """
 
     def __init__(
@@ -72,9 +68,7 @@ class ConeController:
         self._bias = BIAS * force_bias(contacts, NORMAL_BIAS, robot.weight / contacts.n_points)
 
     def __call__(self, q: Array, v: Array, t: float = 0.0) -> TorqueCommand:
-        """The torques for configuration q and velocity v, with the forces that they are to bring
-        about.
-        """
+        """Return the torques for configuration q and velocity v, and the planned contact forces."""
         eom = equations_of_motion(fb.State(self.robot, q, v), self.contacts, t)
         wish = self.wrench_goal(eom.state)
         cost = (
@@ -85,7 +79,7 @@ class ConeController:
         return TorqueCommand(torques_from_forces(eom).torque(forces), forces)
 
     def wrench_goal(self, now: fb.State) -> tuple[Array, Array]:
-        """(f̃_c, τ̃_c) that brings centre of mass and base back, N and N·m."""
+        """Return the wrench (f̃_c, τ̃_c) [N, N·m] that brings back centre of mass and base."""
         a = -STIFFNESS * (now.com - self.state.com) - DAMPING * now.com_velocity
         R, R_desired = (state.frame_pose("base").rotation for state in (now, self.state))
         turn = -STIFFNESS * pin.log3(R @ R_desired.T) - DAMPING * now.frame_velocity("base")[3:]
@@ -93,7 +87,20 @@ class ConeController:
 
 
 def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
-    """The x of least cost among those with rows @ x ≤ 0, shape (n,)."""
+    """Minimise a cost subject to G x ≤ 0.
+
+    Parameters
+    ----------
+    cost : Quadratic
+        The cost.
+    G : array_like, shape (m, n)
+        Matrix of the inequality constraints.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The minimiser.
+    """
     matrix = np.asarray(G)
     return fb.solve(
         fb.QP(cost.H, cost.g, np.zeros((0, cost.n)), np.zeros(0), matrix, np.zeros(len(matrix)))
@@ -101,7 +108,7 @@ def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
 
 
 def make_controller() -> ConeController:
-    """The controller whose push rose ends the lesson."""
+    """Return the controller of the lesson's push-recovery map."""
     robot = fb.load("go2")
     return ConeController(robot, fb.Contacts.points(robot), robot.standing())
 
@@ -109,10 +116,28 @@ def make_controller() -> ConeController:
 def state_with_feet_at(
     robot: fb.Robot, base: npt.ArrayLike, centres: Mapping[str, npt.ArrayLike]
 ) -> fb.State:
-    """The state with a level base there, shape (3,), m, and each foot's centre at its place, shape
-    (3,), m, by Newton's method.
+    """Return the state with a level base at one place and the feet at given places.
 
-    For legs with three joints. Raises `InputError` for places that they do not reach.
+    The joints are found by Newton's method. The legs must have three joints each.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    base : array_like, shape (3,)
+        Position of the base in the world frame [m].
+    centres : mapping of str to array_like, shape (3,)
+        For each foot: position of its centre in the world frame [m].
+
+    Returns
+    -------
+    State
+        The state.
+
+    Raises
+    ------
+    InputError
+        If the legs cannot reach these places.
     """
     q = robot.standing().q.copy()
     q[:3], q[3:7] = base, [0.0, 0.0, 0.0, 1.0]
@@ -126,15 +151,32 @@ def state_with_feet_at(
         J = np.vstack([state.frame_jacobian(name)[:3, 6:] for name in centres])
         q[7:] -= np.clip(np.linalg.pinv(J) @ error, -_LARGEST_STEP, _LARGEST_STEP)
     raise InputError(
-        f"{robot.name} cannot put its feet there: {np.max(np.abs(error)):.2g} m remain."
+        f"{robot.name} cannot put its feet there: an error of {np.max(np.abs(error)):.2g} m "
+        f"remains. Choose places within reach of the legs."
     )
 
 
 def com_beside_feet(robot: fb.Robot, mu: float = 1.0) -> tuple[fb.State, fb.Contacts, fb.Ground]:
-    """A robot in a steep valley along x, right feet low on one side, left feet high on the other,
-    and the body beyond these.
+    """Return a robot in a steep valley whose centre of mass is not above its feet.
 
-    mu: friction of the ground, and what the contacts count on.
+    The valley runs along x. The right feet are low on one side, the left feet are high on the
+    other, and the body is beyond the left feet.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    mu : float, optional
+        Friction coefficient of the ground and of the contacts [-].
+
+    Returns
+    -------
+    State
+        The state.
+    Contacts
+        The contacts.
+    Ground
+        The ground.
     """
     angle, slope = np.deg2rad(VALLEY_SLOPE), np.tan(np.deg2rad(VALLEY_SLOPE))
     sides = {

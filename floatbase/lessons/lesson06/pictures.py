@@ -1,6 +1,4 @@
-"""Lesson 06, Friction cones: one cone and its force, facets from above, compasses, slopes and where
-the CoM may be.
-"""
+"""Lesson 06: cones and forces, facets from above, compass plots, slopes and support regions."""
 
 from __future__ import annotations
 
@@ -26,10 +24,21 @@ DRAWING_SIZE = (250, 250)  # pixels of a drawing from above
 
 
 def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
-    """Draw one round cone about the vertical with a force at its tip, in one scale; what (28) says
-    of it, as text.
+    """Draw a round cone about the vertical with a force at its tip.
 
-    force: shape (3,), N.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    force : array_like, shape (3,)
+        The force in the world frame [N].
+    mu : float
+        Friction coefficient [-].
+
+    Returns
+    -------
+    str
+        What (28) says about the force.
     """
     cone, f = FrictionCone(np.array([0.0, 0.0, 1.0]), mu), np.asarray(force, dtype=np.float64)
     picture = {
@@ -46,25 +55,33 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
         f"α⊥ = {parts.alpha_perp:.0f} N, α∥ = {parts.alpha_par:.0f} N, μ α⊥ - α∥ = {margin:.0f} N: "
     )
     if margin < 0:
-        return sizes + "no friction makes this force"
-    return sizes + f"{margin:.0f} N may be added sideways"
+        return sizes + "friction cannot provide this force"
+    return sizes + f"{margin:.0f} N more is possible sideways"
 
 
 def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
-    """Draw the polyhedron inside a cone, the cone, and a force that leans as far forwards as the
-    polyhedron lets it.
+    """Draw a cone, the polyhedron inside it, and a force that leans as far forwards as possible.
 
-    From above, as SVG with their areas: the polyhedra inside and outside.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    mu : float
+        Friction coefficient [-].
+    facets : int
+        Number of facets.
 
-    mu, facets: as for `FrictionPolyhedron`.
+    Returns
+    -------
+    str
+        The polyhedra inside and outside from above with their areas, as SVG.
     """
     inner, outer = (
         FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside)
         for inside in (True, False)
     )
-    most = 45.0 * np.array(
-        [inner.mu_facet, 0.0, 1.0]
-    )  # N: the furthest that facet 0 lets a force lean forwards
+    # N: facet 0 lets a force lean forwards as far as this
+    most = 45.0 * np.array([inner.mu_facet, 0.0, 1.0])
     picture = prefixed(
         "cone", shapes.friction_polyhedron(np.zeros(3), inner, CONE_HEIGHT, inner.status(most))
     )
@@ -93,8 +110,17 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
 
 
 def compass_row(**stances: WrenchSet) -> Figure:
-    """Compasses side by side, in one scale: title=the wrenches of a stance. "_" in a title shows as
-    a blank.
+    """Plot horizontal force limits of some stances side by side, with the same scale.
+
+    Parameters
+    ----------
+    **stances : WrenchSet
+        title=wrenches of a stance. "_" in a title is shown as a space.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     polar = {"projection": "polar"}
     figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 5.0), subplot_kw=polar)
@@ -106,23 +132,34 @@ def compass_row(**stances: WrenchSet) -> Figure:
     most = max(axis.get_rmax() for axis in axes)
     for axis in axes:
         axis.set_rlim(0.0, most)
-        axis.set_xticks(
-            np.pi / 2 * np.arange(4), ["x", "y", "-x", ""]
-        )  # the last would lie upon its neighbour's
+        # the last label would overlap that of the next plot
+        axis.set_xticks(np.pi / 2 * np.arange(4), ["x", "y", "-x", ""])
         axis.get_legend().remove()
     figure.subplots_adjust(left=0.05, right=0.97, bottom=0.14, top=0.84, wspace=0.25)
     figure.supxlabel(
-        "horizontal force at full weight without moment [N], from above", fontsize="medium"
+        "largest horizontal force with the full weight and no moment [N], from above",
+        fontsize="medium",
     )
     plt.close(figure)
     return figure
 
 
 def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> str:
-    """Draw a robot on a slope, with cones and planned forces of a controller that believes in
-    another; the true lean as text.
+    """Draw a robot on a slope, and the planned forces of a controller that assumes another slope.
 
-    slope, believed: degrees, up towards x.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    slope, believed : float
+        Actual and assumed slope, rising towards x [°].
+    facets : int, optional
+        Number of facets.
+
+    Returns
+    -------
+    str
+        The actual ratios of tangential to normal force, as text.
     """
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
@@ -138,16 +175,31 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
         picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"}
     )
     return (
-        f"planned lean from the true normal: front {front:.2f}, rear {rear:.2f}; the ground "
-        f"holds 0.70"
+        f"planned tangential over normal force on the actual slope: front {front:.2f}, rear "
+        f"{rear:.2f}; the ground allows 0.70"
     )
 
 
 def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
-    """Draw a robot that stands on a slope, turned with it; from above, as SVG, where its centre of
-    mass may be.
+    """Draw a robot on a slope, and from above where its centre of mass may be.
 
-    slope: degrees, up towards x. mu, facets: of its friction polyhedra.
+    The body is tilted with the slope.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    slope : float
+        Slope, rising towards x [°].
+    mu : float
+        Friction coefficient [-].
+    facets : int, optional
+        Number of facets of each friction polyhedron.
+
+    Returns
+    -------
+    str
+        The drawing from above, as SVG.
     """
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
@@ -158,25 +210,38 @@ def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
 
 
 def slope_normal(degrees: float) -> Array:
-    """Unit normal of a slope that rises towards x, shape (3,)."""
+    """Return the unit normal of a slope [°] that rises towards x, shape (3,)."""
     angle = np.deg2rad(degrees)
     return np.array([-np.sin(angle), 0.0, np.cos(angle)])
 
 
 def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
-    """α_∥ / α_⊥ of the force at each point, shape (n,): how far it leans from the normal; μ at the
-    surface of its cone.
+    """Return α_∥ / α_⊥ of the force at each point, shape (n,) [-].
+
+    The ratio equals μ on the surface of the cone.
     """
     parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
     return np.array([part.alpha_par / part.alpha_perp for part in parts])
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:
-    """From above, as SVG: where the centre of mass may be (filled), the hull of the feet (dashed),
-    and where it is (dot).
+    """Draw from above where the centre of mass may be, the hull of the feet, and where it is.
 
-    feet: shape (n, 3), m. region: vertices, shape (k, 2), m, as `support_region` gives them; none
-        says nowhere.
+    The region is filled, the hull is dashed, and a dot marks the centre of mass.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    feet : ndarray, shape (n, 3)
+        Positions of the feet in the world frame [m].
+    region : ndarray, shape (k, 2)
+        Vertices of the region from `support_region` [m]; none if there is no such place.
+
+    Returns
+    -------
+    str
+        The drawing as SVG.
     """
     middle, (width, height) = feet[:, :2].mean(axis=0), DRAWING_SIZE
 

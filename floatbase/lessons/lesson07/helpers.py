@@ -1,6 +1,4 @@
-"""Lesson 07, Control as a quadratic program: pushes on the physics, and controllers whose rows were
-added or taken away.
-"""
+"""Lesson 07: pushes in simulation, and controllers with some constraints added or removed."""
 
 from __future__ import annotations
 
@@ -20,16 +18,20 @@ from floatbase.lessons.controllers import SolverController
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.simulation import Controller, Rollout
 
-PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: when a push begins, and how long it lasts
+PUSH_START, PUSH_DURATION = 0.05, 0.1  # s: start and duration of a push
 MU = 0.7
 LEFT = np.array([0.0, 1.0, 0.0])
 
 
 class WithoutInequalities(SolverController):
-    """A controller from which the inequality rows of some kinds were taken away: its QP without
-    them, at every tick.
+    """Controller without some kinds of inequality constraints, which are removed from every QP.
 
-    controller: the controller. kinds: "friction", "normal force" and others, as of `QP.without`.
+    Parameters
+    ----------
+    controller : WholeBodyController
+        The controller.
+    *kinds : str
+        Kinds of constraints, such as "friction" or "normal force", as for `QP.without`.
     """
 
     def __init__(self, controller: fb.WholeBodyController, *kinds: str):
@@ -37,9 +39,16 @@ class WithoutInequalities(SolverController):
 
 
 class WithConstraints(SolverController):
-    """The costs of one controller with the rows of another: ψ of lesson 05, least where (27) holds.
+    """Controller with the costs of one controller and the constraints of another.
 
-    costs: of objectives alone. constraints: gives the equalities and inequalities.
+    It minimises the ψ of lesson 05 subject to (27).
+
+    Parameters
+    ----------
+    costs : AnalyticController
+        Controller of objectives alone, which provides the costs.
+    constraints : WholeBodyController
+        Controller that provides the equality and inequality constraints.
     """
 
     def __init__(self, costs: AnalyticController, constraints: fb.WholeBodyController):
@@ -47,7 +56,7 @@ class WithConstraints(SolverController):
         self.costs = costs
 
     def qp(self, state: fb.State, t: float = 0.0) -> fb.QP:
-        """The QP of one tick."""
+        """Return the QP of one control step."""
         qp = super().qp(state, t)
         costs = self.costs.objective(fb.equations_of_motion(state, self.costs.contacts))
         H, g = block_diag(*(cost.H for cost in costs)), np.concatenate([cost.g for cost in costs])
@@ -59,16 +68,30 @@ class WithConstraints(SolverController):
 def run_with_push(
     controller: Controller, newtons: float, duration: float = 0.6, towards: Array = LEFT
 ) -> Rollout:
-    """The record of go2 on the physics, pushed at the base from 0.05 to 0.15 s.
+    """Simulate go2 with a push at the base from 0.05 to 0.15 s.
 
-    newtons: how hard. duration: s, of the record. towards: (3,), unit vector.
+    Parameters
+    ----------
+    controller : callable
+        Controller of go2.
+    newtons : float
+        Force of the push [N].
+    duration : float, optional
+        Duration of the record [s].
+    towards : ndarray, shape (3,), optional
+        Unit vector in the direction of the push, in the world frame; by default to the left.
+
+    Returns
+    -------
+    Rollout
+        The record.
     """
     push = fb.Push(newtons * towards, start=PUSH_START, duration=PUSH_DURATION)
     return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, duration, [push])
 
 
 def make_controller() -> fb.WholeBodyController:
-    """Motion, forces and torques in one QP: the controller whose push rose ends the lesson."""
+    """Return the controller of the push-recovery map: motion, forces and torques in one QP."""
     state = standing_go2_eom().state
     return fb.WholeBodyController(
         state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state)
@@ -76,7 +99,20 @@ def make_controller() -> fb.WholeBodyController:
 
 
 def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
-    """How long a function takes, ms: the median of some calls, after one that does not count."""
+    """Measure the time that a function takes.
+
+    Parameters
+    ----------
+    function : callable
+        Function without arguments.
+    repeats : int, optional
+        Number of calls, after a first one that does not count.
+
+    Returns
+    -------
+    float
+        Median of the times [ms].
+    """
     function()
     took = []
     for _ in range(repeats):
@@ -88,8 +124,17 @@ def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
 
 @cache
 def leaning_controller(mu: float) -> fb.WholeBodyController:
-    """The controller of exercise 07.3, for a coefficient of friction: 8 facets, and more wish than
-    friction gives.
+    """Return the controller of exercise 07.3, which asks for more force than friction allows.
+
+    Parameters
+    ----------
+    mu : float
+        Friction coefficient [-]; the polyhedra have 8 facets.
+
+    Returns
+    -------
+    WholeBodyController
+        The controller.
     """
     state = standing_go2_eom().state
     wish = fb.CoMTask(state.com, acceleration=[6.0, 0.0, 0.0])
@@ -100,8 +145,19 @@ def leaning_controller(mu: float) -> fb.WholeBodyController:
 
 
 def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
-    """The controller of exercise 07.4: gains and weight of the centre of mass, and the weight of
-    the posture.
+    """Return the controller of exercise 07.4.
+
+    Parameters
+    ----------
+    kp, kd, weight : float
+        Gains [1/s², 1/s] and weight [-] of the task for the centre of mass.
+    posture : float
+        Weight of the posture task [-].
+
+    Returns
+    -------
+    WholeBodyController
+        The controller.
     """
     state = standing_go2_eom().state
     com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)

@@ -1,6 +1,4 @@
-"""Lesson 07, Control as a quadratic program: rounds of a solver, ways of the centre of mass, and
-rows by name.
-"""
+"""Lesson 07: iterations of a solver, displacements of the centre of mass, and multipliers."""
 
 from __future__ import annotations
 
@@ -17,17 +15,32 @@ from floatbase.simulation import Rollout
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _STYLES = ("-", "--", ":")
-_MAX_LISTED = 4  # rows that a note lists
+_MAX_LISTED = 4  # constraints that a note lists
 
 
 def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figure:
-    """Rounds of the active-set method in each tick. ms: (n,), the time of each. rounds: how it
-    started -> (n,) numbers.
+    """Plot the iterations of the active-set method in each control step.
+
+    Parameters
+    ----------
+    ms : array_like, shape (n,)
+        Time of each control step since the push began [ms].
+    rounds : mapping of str to sequence of int
+        For each way to start the solver: its iterations, n numbers.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(rounds.items(), GREYS[:2], _STYLES, strict=False):
         ax.plot(ms, numbers, style, color=hex_code(colour), label=name, linewidth=2)
-    ax.set(xlabel="time since the push began [ms]", ylabel="rounds in a tick", ylim=(0, None))
+    ax.set(
+        xlabel="time since the push began [ms]",
+        ylabel="iterations per control step",
+        ylim=(0, None),
+    )
     ax.grid(alpha=0.3)
     ax.legend()
     plt.close(figure)
@@ -35,8 +48,19 @@ def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figur
 
 
 def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
-    """How far the centre of mass is from where it was first, and each foot at most. records: name
-    -> record.
+    """Plot how far the centre of mass and the feet are from their initial positions.
+
+    Of the feet, the largest displacement is plotted.
+
+    Parameters
+    ----------
+    records : mapping of str to Rollout
+        The records by name.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.2), layout="constrained")
     for (name, record), colour, style in zip(records.items(), GREYS, _STYLES, strict=False):
@@ -45,7 +69,7 @@ def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
         for ax, away in zip(axes, (com, feet), strict=True):
             ax.plot(record.time, 1e3 * away, style, color=hex_code(colour), label=name, linewidth=2)
     for ax, title in zip(
-        axes, ("centre of mass, away [mm]", "foot that strayed most [mm]"), strict=True
+        axes, ("displacement of the CoM [mm]", "largest foot displacement [mm]"), strict=True
     ):
         ax.set(xlabel="time [s]", title=title, ylim=(0, None))
         ax.grid(alpha=0.3)
@@ -55,10 +79,12 @@ def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
 
 
 def multiplier_text(solution: Solution) -> str:
-    """The active rows of a solution with their prices, dearest first, as a line of text."""
+    """Return the active constraints with their multipliers, largest first, as a line of text."""
     prices = sorted(solution.multipliers.items(), key=lambda row: -row[1])
     shown = [f"{name} {rounded(price)}" for name, price in prices if price > 1e-3]
     more = f" and {len(shown) - _MAX_LISTED} more" if len(shown) > _MAX_LISTED else ""
     return (
-        "dearest rows: " + ", ".join(shown[:_MAX_LISTED]) + more if shown else "no row has a price"
+        "largest multipliers: " + ", ".join(shown[:_MAX_LISTED]) + more
+        if shown
+        else "no constraint has a multiplier above zero"
     )

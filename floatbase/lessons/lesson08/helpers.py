@@ -1,6 +1,4 @@
-"""Lesson 08, Standing, shifting, stepping, walking: bodies that move over feet that stay, what a
-record says, crawls.
-"""
+"""Lesson 08: stances with a shifted body, measures of a record, and crawls."""
 
 from __future__ import annotations
 
@@ -18,24 +16,41 @@ from floatbase.lessons.lesson06 import state_with_feet_at
 from floatbase.simulation import Rollout
 
 MU = 0.7
-PERIOD = 2e-3  # s, between ticks of the records: half the work of 1 ms, and nothing else changes
-SLOW_PERIOD = 4e-3  # s, of exercise 08.4: what it judges changes by about 2 %
-FOOT_SETBACK = 0.06  # m by which RR stands further back in exercise 08.1
+PERIOD = 2e-3  # s, control period of the records: half the work of 1 ms, with the same results
+SLOW_PERIOD = 4e-3  # s, of exercise 08.4: the quantities it judges change by about 2 %
+FOOT_SETBACK = 0.06  # m: how much further back RR stands in exercise 08.1
 CRAWL_DURATION = 6.0  # s of exercise 08.4
-_ROW_STEP = 3  # rows of a record from one look at the margin to the next: 12 ms of a crawl
+_ROW_STEP = 3  # the margin is computed in every third row: every 12 ms of a crawl
 
 
 def make_controller() -> Stand:
-    """Standing, and trotting on the spot when it must: the controller whose push rose ends the
-    lesson.
+    """Return the controller of the lesson's push-recovery map.
+
+    It makes go2 stand, and trot on the spot when it must.
     """
     robot = fb.load("go2")
     return Stand(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
 
 
 def state_with_moved_body(state: fb.State, move: npt.ArrayLike) -> fb.State:
-    """The state with the body moved by (3,) m while all feet stay. Raises `InputError` for what the
-    legs do not reach.
+    """Return a state with the body moved while all feet stay.
+
+    Parameters
+    ----------
+    state : State
+        The state before.
+    move : array_like, shape (3,)
+        Displacement of the body in the world frame [m].
+
+    Returns
+    -------
+    State
+        The state.
+
+    Raises
+    ------
+    InputError
+        If the legs cannot reach so far.
     """
     feet = {foot.frame: state.frame_pose(foot.frame).translation for foot in state.robot.feet}
     return state_with_feet_at(state.robot, state.q[:3] + np.asarray(move), feet)
@@ -43,7 +58,7 @@ def state_with_moved_body(state: fb.State, move: npt.ArrayLike) -> fb.State:
 
 @cache
 def uneven_stance() -> fb.State:
-    """go2 with its RR foot further back than it stands usually."""
+    """Return go2 with its RR foot 6 cm further back than usual."""
     state = standing_go2_eom().state
     feet = {
         foot.frame: np.array(state.frame_pose(foot.frame).translation) for foot in state.robot.feet
@@ -59,32 +74,61 @@ def run_go2(
     start: float = 1.0,
     period: float = PERIOD,
 ) -> Rollout:
-    """The record of go2 on the physics, pushed at the base for 0.1 s.
+    """Simulate go2 with a push at the base for 0.1 s.
 
-    controller: of go2. seconds: of the record. push: (3,) N, world; none by default. start: s, of
-        the push.
-    period: s, between two ticks.
+    Parameters
+    ----------
+    controller : callable
+        Controller of go2.
+    seconds : float
+        Duration of the record [s].
+    push : array_like, shape (3,), optional
+        Force of the push in the world frame [N]; no push by default.
+    start : float, optional
+        Start of the push [s].
+    period : float, optional
+        Control period [s].
+
+    Returns
+    -------
+    Rollout
+        The record.
     """
     pushes = [fb.Push(np.asarray(push, dtype=np.float64), start)] if np.any(push) else []
     return fb.rollout(fb.Simulation(standing_go2_eom().robot), controller, seconds, pushes, period)  # type: ignore[arg-type]
 
 
 def largest_tilt(record: Rollout) -> float:
-    """The largest angle between the base's and the world's vertical in a record, degrees."""
+    """Return the largest angle between the base's vertical and the world's in a record [°]."""
     upright = 1.0 - 2.0 * (record.q[:, 3] ** 2 + record.q[:, 4] ** 2)
     return float(np.rad2deg(np.arccos(np.clip(upright, -1.0, 1.0)).max()))
 
 
 def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
-    """Mean velocity of the centre of mass in the last seconds of a record, shape (3,), m/s."""
+    """Return the mean velocity of the centre of mass at the end of a record.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    seconds : float, optional
+        Duration of the part at the end [s].
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Velocity in the world frame [m/s].
+    """
     first = int(np.searchsorted(record.time, record.time[-1] - seconds))
     mean: Array = (record.com[-1] - record.com[first]) / (record.time[-1] - record.time[first])
     return mean
 
 
 def torque_jump(record: Rollout) -> float:
-    """The jump of a torque from one tick to the next where a foot lifts, N·m: the largest of all
-    joints, median of lifts.
+    """Return the typical jump of a torque when a foot lifts off [N·m].
+
+    For each lift-off it takes the largest jump of all joints from one control step to the next. The
+    result is the median over all lift-offs.
     """
     counts = [len(record.contacts_at(i)) for i in range(len(record))]
     lifts = [i for i in range(1, len(record)) if counts[i] < counts[i - 1]]
@@ -94,8 +138,10 @@ def torque_jump(record: Rollout) -> float:
 
 
 def smallest_support_margin(record: Rollout) -> float:
-    """The least distance of the centre of mass from the edge of the feet that stand, seen from
-    above, m.
+    """Return the smallest margin of the centre of mass in a record [m].
+
+    The margin is its distance, seen from above, from the edge of the support polygon of the feet on
+    the ground.
     """
     names = record.contacts.names
     margins = []
@@ -107,8 +153,19 @@ def smallest_support_margin(record: Rollout) -> float:
 
 @cache
 def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
-    """The record of a crawl by `Walk`, 6 s long. swing, pause: s, as of `Gait.crawl`. forwards:
-    m/s.
+    """Simulate 6 s of a crawl.
+
+    Parameters
+    ----------
+    swing, pause : float
+        Durations of a swing and of a pause, as for `Gait.crawl` [s].
+    forwards : float
+        Speed [m/s].
+
+    Returns
+    -------
+    Rollout
+        The record.
     """
     robot = standing_go2_eom().robot
     gait = Gait.crawl(robot, swing, pause, start=0.5)
@@ -120,7 +177,7 @@ def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
 
 
 def opposite_foot(foot: str) -> str:
-    """The foot on the other diagonal, across: the one that lies opposite."""
+    """Return the diagonally opposite foot."""
     return {"FL_foot": "RR_foot", "FR_foot": "RL_foot", "RL_foot": "FR_foot", "RR_foot": "FL_foot"}[
         foot
     ]
@@ -129,11 +186,24 @@ def opposite_foot(foot: str) -> str:
 def shortest_com_shift(
     state: fb.State, foot: str, to: Callable[[Array], Array] | None = None
 ) -> Array:
-    """The shortest way of the centre of mass, (2,) m, after which a foot's opposite carries nothing
-    when it lifts.
+    """Return the shortest shift of the centre of mass that lets a foot lift off.
 
-    to: exchanges the point from which it is measured, for mistakes: the centre of mass, (2,) m, to
-        another point.
+    After this shift, the diagonally opposite foot carries nothing when the foot lifts off.
+
+    Parameters
+    ----------
+    state : State
+        The state before.
+    foot : str
+        Foot that is to lift off.
+    to : callable, optional
+        Function that replaces the centre of mass, shape (2,), [m], by another starting point. It is
+        used for known mistakes.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        The shift in the world frame [m].
     """
     contacts = fb.Contacts.points(state.robot)
     feet = dict(zip(contacts.names, contacts.positions(state)[:, :2], strict=True))

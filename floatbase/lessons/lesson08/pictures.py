@@ -1,6 +1,4 @@
-"""Lesson 08, Standing, shifting, stepping, walking: triangles from above, a falling pendulum,
-footholds, two robots to push.
-"""
+"""Lesson 08: support triangles, a falling pendulum, footholds, and two robots to push."""
 
 from __future__ import annotations
 
@@ -29,21 +27,31 @@ from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
-_PATCH_HEIGHT = 0.003  # m above the ground: no flicker with its lines
+_PATCH_HEIGHT = 0.003  # m above the ground, so that its lines do not flicker
 _MAX_PUSH = 600.0  # N: the hardest push of the panel
-_RECORDED_PUSHES = (
-    150.0,
-    250.0,
-    350.0,
-)  # N: what both stand, what only steps save, what they save to the side only
-_HALF_WIDTH = widgets.Layout(
-    flex="1 1 45%", min_width="min(260px, 100%)"
-)  # below each other where a page is narrow
+# N: both withstand the first, only stepping withstands the second; stepping withstands the third to
+# the side only
+_RECORDED_PUSHES = (150.0, 250.0, 350.0)
+# one below the other on a narrow page
+_HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")
 
 
 def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
-    """From above, side by side: where the centre of mass may be with each of these feet lifted, and
-    where it is.
+    """Draw from above where the centre of mass may be while a foot is lifted, and where it is.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        All contacts.
+    *lifted : str
+        Names of the feet to lift, one per drawing.
+
+    Returns
+    -------
+    HTML
+        The drawings side by side.
     """
     feet = contacts.positions(state)
     drawn = ""
@@ -55,8 +63,21 @@ def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str)
 
 
 def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
-    """The distance of the centre of mass from the line of two feet, m, over time, s, and that of
-    the pendulum of ω, 1/s.
+    """Plot how far the centre of mass falls away from the line between two feet, and the pendulum.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time [s].
+    away : array_like, shape (n,)
+        Distance of the centre of mass from the line [m].
+    omega : float
+        Rate of the pendulum [1/s].
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     t, d = np.asarray(time), np.asarray(away)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
@@ -69,7 +90,7 @@ def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -
         linewidth=2,
         label="pendulum, d cosh ωt",
     )
-    ax.set(xlabel="time [s]", ylabel="away from the line [mm]", ylim=(0, None))
+    ax.set(xlabel="time [s]", ylabel="distance from the line [mm]", ylim=(0, None))
     ax.grid(alpha=0.3)
     ax.legend()
     plt.close(figure)
@@ -77,8 +98,21 @@ def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -
 
 
 def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
-    """The normal force of one foot, planned and measured, N, from begin to end, s. records: title
-    -> record.
+    """Plot the planned and measured normal force of a foot for some records.
+
+    Parameters
+    ----------
+    records : mapping of str to Rollout
+        The records by title.
+    foot : str
+        Name of the foot.
+    begin, end : float
+        Time range [s].
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, axes = plt.subplots(
         1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained"
@@ -97,14 +131,25 @@ def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end
 
 
 def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Marks on the ground, for `extra` of `view.show`: name -> place, (2,) m, world. Feet get a
-    patch, others a label.
+    """Return marks on the ground: a patch for a foot, a label for any other name.
 
-    Two feet have the line between them, too.
+    If there are two feet, they are connected by a line.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer of the picture.
+    places : mapping of str to array_like, shape (2,)
+        For each name: its place in the world frame [m].
+
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
     """
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
-    aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one stands on the other side
+    aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one is on the other side
     for name, place in places.items():
         at = np.array([*np.asarray(place, dtype=np.float64)[:2], _PATCH_HEIGHT])
         foot = name in feet
@@ -129,10 +174,14 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
 
 
 class PushComparison(widgets.VBox):
-    """Robots side by side, each with a controller of its own, pushed alike by one handle. Nothing
-    moves before the first push.
+    """Robots side by side, each with its own controller, pushed by the same sliders.
 
-    controllers: title -> controller; each has a `robot`.
+    Nothing moves before the first push.
+
+    Parameters
+    ----------
+    controllers : mapping of str to callable
+        The controllers by title; each has a `robot`.
     """
 
     def __init__(self, controllers: Mapping[str, Any]):
@@ -168,13 +217,13 @@ class PushComparison(widgets.VBox):
         super().__init__([row, self.force, self.towards, buttons])
 
     def push(self) -> None:
-        """Push all of them now, for 0.1 s."""
+        """Push all robots now, for 0.1 s."""
         angle = math.radians(self.towards.value)
         for run in self.runs.values():
             run.push([self.force.value * math.cos(angle), self.force.value * math.sin(angle), 0.0])
 
     def reset(self) -> None:
-        """Put all of them back on their feet."""
+        """Put all robots back on their feet."""
         for run in self.runs.values():
             run.reset()
 
@@ -182,7 +231,7 @@ class PushComparison(widgets.VBox):
         self.lines[title].value = status_message(status, self.runs[title].reason)
 
     def close(self) -> None:
-        """Stop the runs and close the pictures."""
+        """Stop the simulations and close the pictures."""
         for run in self.runs.values():
             run.close()
         for view in self.views.values():
@@ -190,8 +239,10 @@ class PushComparison(widgets.VBox):
         super().close()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The pictures are put in only here, as those of a slider panel; a site has some recorded
-        pushes of both.
+        """Return what a notebook shows.
+
+        The pictures are added only here, as in a slider panel. A static page shows some recorded
+        pushes of both robots.
         """
         if display_mode() == "site":
             titles = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,13 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import FlatFootContact
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import (
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import (
     Example,
-    Exercise,
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_or_verdict,
+    array_judge,
     lasting_or_verdict,
 )
 from floatbase.lessons.lesson09.helpers import (
@@ -35,16 +34,12 @@ from floatbase.linear_algebra import rank
 from floatbase.simulation import Rollout
 
 ANKLE = 0.107  # m: height of the sensor of exercise 09.1 above the sole
-CORNER_FORCES = (
-    (30.0, 5.0, 210.0),
-    (24.0, -6.0, 120.0),
-    (14.0, 2.0, 60.0),
-    (12.0, 9.0, 90.0),
-)  # N, of exercise 09.1
+# N, of exercise 09.1
+CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12.0, 9.0, 90.0))
 LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
-ROUND = 360  # facets that stand for a round cone: they miss 4e-5 of it
-LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: what exercise 09.4 asks for
-_LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little holds arms and trunk
+ROUND = 360  # facets that approximate a round cone with an error of 4e-5
+LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: requirements of exercise 09.4
+_LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it, arms and trunk are loose
 
 
 # 09.1 ---------------------------------------------------------------------------------------------
@@ -52,8 +47,9 @@ _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it little hold
 
 @cache
 def ankle_sensor_reading() -> Array:
-    """What a sensor in the left ankle of Talos reads, shape (6,): force, N, and moment about
-    itself, N·m, world.
+    """Return the reading of a sensor in the left ankle of Talos, shape (6,).
+
+    It contains the force [N] and the moment about the sensor [N·m], in the world frame.
     """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
@@ -63,8 +59,9 @@ def ankle_sensor_reading() -> Array:
 
 
 def _pushed() -> Array:
-    """As the mean of the corners, weighted by their forces: no moment in it. Shape (2,), m, from
-    the point below the sensor.
+    """Compute the centre of pressure as the mean of the corners, weighted by their forces.
+
+    No moment is used. The result has shape (2,) and is relative to the point below the sensor [m].
     """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
@@ -74,8 +71,9 @@ def _pushed() -> Array:
 
 
 def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
-    """The centre of pressure from the sensor. height: which is added to the moments as height ·
-    force, m.
+    """Return a function that computes the centre of pressure from the sensor.
+
+    height [m]: the moments are changed by height · force.
     """
 
     def value() -> Array:
@@ -91,7 +89,7 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
 
 @cache
 def _new_soles() -> fb.Contacts:
-    """Two soles with six corners each."""
+    """Return two soles with six corners each."""
     angles = np.pi / 3 * np.arange(6)
     corners = np.column_stack([0.1 * np.cos(angles), 0.06 * np.sin(angles), np.zeros(6)])
     return fb.Contacts(
@@ -100,7 +98,7 @@ def _new_soles() -> fb.Contacts:
 
 
 def _counted() -> Array:
-    """By rank: λ that nobody feels, internal forces, and the dimension of all motions."""
+    """Count by rank: λ without any effect, internal forces, and the dimension of all motions."""
     eom = fb.equations_of_motion(load_talos().standing(), _new_soles())
     J = eom.J
     return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
@@ -110,7 +108,7 @@ def _counted() -> Array:
 
 
 def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
-    """The largest twist of the sole, N·m, by a linear program over its corner forces."""
+    """Compute the largest twist of the sole [N·m] by a linear program over its corner forces."""
     corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
     limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), LOAD, np.full(4, np.inf))
@@ -122,9 +120,7 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
 
 @cache
 def run_lean(seconds: float, posture: float) -> Rollout:
-    """The record of the lean that exercise 09.4 asks for. seconds: it takes. posture: weight of the
-    posture.
-    """
+    """Simulate the lean of exercise 09.4 with a duration [s] and a weight of the posture."""
     controller = leaning_controller(LEAN, seconds, posture)
     ticks = int(np.ceil((LEAN_START + seconds + TIME_AFTER_LEAN) / SLOW_PERIOD))
     return fb.rollout(
@@ -132,25 +128,21 @@ def run_lean(seconds: float, posture: float) -> Rollout:
     )
 
 
-def _judge_lean(answer: Any) -> Verdict:
-    """A lean, judged on the physics."""
-    given = array_or_verdict(answer, (2,))
-    if isinstance(given, Verdict):
-        return given
+@array_judge((2,))
+def _judge_lean(given: Array) -> Verdict:
+    """Judge a lean in simulation."""
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
         return Verdict(
-            False, "A time from 0.05 to 20 s and a weight from 0 to 1000, please.", "range"
+            False, "The time must be from 0.05 to 20 s, and the weight from 0 to 1000.", "range"
         )
-    why = " Hardly any wish says what arms and trunk do." if posture < _LOOSE else ""
+    why = " Hardly any task controls the arms and the trunk." if posture < _LOOSE else ""
     record = lasting_or_verdict(lambda: run_lean(seconds, posture), why)
     return record if isinstance(record, Verdict) else _judge_record(record, seconds)
 
 
 def _judge_record(record: Rollout, seconds: float) -> Verdict:
-    """Of a lean that lasted: where it ended, how near to the edge the ground had to push, and how
-    long it took.
-    """
+    """Judge a complete lean: where it ended, the centre of pressure, and the duration."""
     settled = record.time > 0.1  # the robot is put down at first
     toes, heels = (
         record.foot_positions[..., 0].max(axis=1),
@@ -160,46 +152,54 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     if np.isnan(pushed[settled]).any():
         return Verdict(
             False,
-            "For a moment no corner touches the ground. Arms and trunk are thrown about: what "
-            "holds them?",
+            "For a moment no corner touches the ground. Arms and trunk are thrown about. What "
+            "controls them?",
             "in_the_air",
         )
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
-    told = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
-    told += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
-    told += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
+    text = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
+    text += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
+    text += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
         return Verdict(
-            False, f"It tips: {told}. At an edge the sole has nothing left to push with.", "tips"
+            False,
+            f"The robot tips: {text}. At an edge, the sole cannot push any harder.",
+            "tips",
         )
     if ahead < EDGE and abs(short) > NEAR:
         return Verdict(
             False,
-            f"Too near to the toes, and it does not get there either: {told}.",
+            f"Too close to the toes, and the lean does not reach its goal: {text}.",
             "toes_and_short",
         )
     if ahead < EDGE:
         return Verdict(
             False,
-            f"Too near to the toes: {told}. Braking pushes there. How does it depend on the time?",
+            f"Too close to the toes: {text}. Braking pushes there. How does it depend on the time?",
             "toes",
         )
     if short > NEAR:
         return Verdict(
-            False, f"It does not get there: {told}. Another wish holds it back.", "short"
+            False,
+            f"The lean does not reach its goal: {text}. Another task holds it back.",
+            "short",
         )
     if short < -NEAR:
         return Verdict(
-            False, f"It goes beyond: {told}. Nothing brakes the rest of the body.", "beyond"
+            False,
+            f"The lean goes too far: {text}. Nothing brakes the rest of the body.",
+            "beyond",
         )
     if seconds > QUICK:
         slow = rounded(seconds, "s", digits=3)
         return Verdict(
-            False, f"All is well, but it takes {slow}: {told}. There is room to be quicker.", "slow"
+            False,
+            f"Everything is right, but the lean takes {slow}: {text}. It can be faster.",
+            "slow",
         )
-    return Verdict(True, f"On the physics: {told}.")
+    return Verdict(True, f"In simulation: {text}.")
 
 
 def _leans() -> list[Example]:
@@ -215,14 +215,14 @@ EXERCISES = (
     Exercise(
         name="09.1",
         statement="The centre of pressure of the left sole, shape (2,), m, from the point below "
-        "the sensor: a sensor in the "
-        "ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N and N·m, world, about itself.",
+        "the sensor. A sensor in the ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N "
+        "and N·m, world, about itself.",
         stub="pushed_at = np.zeros(2)  # replace: forwards and to the left, m",
         solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - "
         "0.107 * fy]) / fz",
         judge=NumericJudge(
             right=_pushed,
-            praise="The tangential force has a lever as long as the ankle is high.",
+            praise="The tangential force has a lever arm equal to the height of the ankle.",
             mistakes={
                 "zero": lambda: np.zeros(2),
                 "no_height": _read(0.0),
@@ -247,36 +247,34 @@ EXERCISES = (
                 ),
             },
             hints={
-                "zero": "Nothing there yet: that is the point below the sensor.",
-                "no_height": "The ankle's height is missing: the formula of the lesson is about a "
-                "point on the ground.",
-                "height_sign": "The height goes in with the wrong sign: the ground is below the "
-                "sensor.",
-                "swapped": "x and y are swapped: a push that is further ahead makes a moment about "
-                "y.",
-                "no_height_swapped": "Height forgotten, and x and y swapped.",
-                "sign": "The sign: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).",
-                "millimetres": "That is in mm.",
-                "not_divided": "Divide by the normal force: these are moments.",
-                "whole_force": "The normal force is f_z alone, not the length of f.",
+                "zero": "There is no answer yet: this is the point below the sensor.",
+                "no_height": "The height of the ankle is missing. The formula in the lesson is "
+                "for a point on the ground.",
+                "height_sign": "The sign of the height is wrong: the ground is below the sensor.",
+                "swapped": "x and y are swapped. A force further ahead has a moment about y.",
+                "no_height_swapped": "The height is missing, and x and y are swapped.",
+                "sign": "The sign is wrong: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).",
+                "millimetres": "That is in mm. The answer must be in m.",
+                "not_divided": "These are moments. Divide them by the normal force.",
+                "whole_force": "The normal force is f_z alone, not the magnitude of f.",
             },
         ),
         examples=lambda: [(np.round(_pushed(), 5), "")],
-        explanation="Moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x - h f_y "
-        "and τ_y + h f_x.",
+        explanation="The moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x "
+        "- h f_y and τ_y + h f_x.",
     ),
     Exercise(
         name="09.2",
-        statement="Talos gets soles with six corners each. Three numbers: dimensions of λ that "
-        "move nothing and that no torque "
-        "feels; dimensions of λ that do not push the base; dimension of all motions, dim β.",
+        statement="Talos gets soles with six corners each. Find three numbers: the dimensions "
+        "of λ without any effect on motion or torques, the dimensions of λ without any effect "
+        "on the base, and the dimension of all motions, dim β.",
         stub="counted = np.array([12, 18, 44])  # of the lesson; replace all three",
         solution="k, r, d = 36, 12, 32\ncounted = np.array([k - r, k - 6, d + k - r])",
         judge=ShapeJudge(
             NumericJudge(
                 right=_counted,
-                praise="More corners add nothing to what a sole can do, only to what nobody can "
-                "know.",
+                praise="More corners do not increase what a sole can do. They only increase "
+                "what cannot be known.",
                 tolerance=1e-6,
                 is_count=True,
                 mistakes={
@@ -290,33 +288,33 @@ EXERCISES = (
                     "length_of_forces": lambda: np.array([36, 30, 56]),
                 },
                 hints={
-                    "four_corners": "That is for four corners each.",
-                    "one_sole": "That is one sole: there are two.",
-                    "rank": "J has rank 12, however many corners a rigid sole has.",
-                    "rows_of_corners": "Rows of corners are no rows of motion: J has 36 rows and "
-                    "rank 12.",
-                    "swapped": "The first two are swapped.",
-                    "beta": "The first two are right. dim β = d + k - r, with k = 36.",
-                    "base_twelve": "The first and the last are right. What the base feels has six "
-                    "dimensions, not twelve.",
-                    "length_of_forces": "36 is the length of λ; what is left once each sole's six "
-                    "numbers are taken off?",
+                    "four_corners": "That is for four corners per sole.",
+                    "one_sole": "That is for one sole. There are two.",
+                    "rank": "J has rank 12, whatever the number of corners of a rigid sole.",
+                    "rows_of_corners": "The rows of the corners are not independent: J has 36 "
+                    "rows and rank 12.",
+                    "swapped": "The first two numbers are swapped.",
+                    "beta": "The first two numbers are right. dim β = d + k - r, with k = 36.",
+                    "base_twelve": "The first and the last number are right. The wrench on the "
+                    "base has six dimensions, not twelve.",
+                    "length_of_forces": "36 is the length of λ. What remains after subtracting "
+                    "the six numbers of each sole?",
                 },
             ),
-            {(): "Three numbers are asked for: np.array([…, …, …])."},
+            {(): "The answer must be three numbers: np.array([…, …, …])."},
         ),
         explanation="k = 36 and r = 12: k - r = 24, k - rank J_b = 30, d + k - r = 56.",
     ),
     Exercise(
         name="09.3",
-        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm bears on a floor of μ = "
-        "0.6, pressed with 400 N in its "
-        "middle, without a sideways force, by four corners with round cones.",
+        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm withstands on a floor "
+        "with μ = 0.6. It is pressed with 400 N in its middle, without a tangential force, and "
+        "stands on four corners with round cones.",
         stub="largest_twist = 0.0  # N·m; replace by your expression",
         solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
         judge=NumericJudge(
             right=_twist,
-            praise="Each corner pushes at a right angle to its lever, as hard as friction lets it.",
+            praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
             mistakes={
                 "zero": lambda: 0.0,
                 "pyramids": lambda: _twist(4),
@@ -331,39 +329,39 @@ EXERCISES = (
                 "disc": lambda: 2 / 3 * SOLE_MU * LOAD * LENGTH / 2,
             },
             hints={
-                "zero": "Nothing there yet.",
-                "pyramids": "That is for pyramids with four facets inside the cones; here they are "
-                "round.",
-                "half_length": "That is μ f_z times half the length: the lever of a corner goes "
-                "from the middle to the corner.",
-                "half_width": "That is μ f_z times half the width: the lever of a corner goes from "
-                "the middle to the corner.",
-                "whole_sides": "Half the sides, not the sides: the levers begin in the middle.",
-                "one_corner": "That is one corner; four carry.",
-                "four_times": "Four corners share the 400 N: each has 100 N.",
-                "no_mu": "μ is missing: friction gives less than the normal force.",
-                "mu_of_lesson": "That is with the μ of the lesson; here it is 0.6.",
-                "square": "Half the length plus half the width is the lever for square pyramids; "
-                "use the distance.",
-                "disc": "That is a disc of the sole's length that presses evenly: 2/3 μ f_z times "
-                "its radius.",
+                "zero": "There is no answer yet.",
+                "pyramids": "That is for pyramids with four facets inside the cones. Here the "
+                "cones are round.",
+                "half_length": "That is μ f_z times half the length. The lever arm of a corner "
+                "goes from the middle to the corner.",
+                "half_width": "That is μ f_z times half the width. The lever arm of a corner "
+                "goes from the middle to the corner.",
+                "whole_sides": "Use half the sides, not the sides: the lever arms begin in the "
+                "middle.",
+                "one_corner": "That is for one corner, but four corners carry the load.",
+                "four_times": "Four corners share the 400 N, so each has 100 N.",
+                "no_mu": "μ is missing: friction is less than the normal force.",
+                "mu_of_lesson": "That is for the μ of the lesson. Here it is 0.6.",
+                "square": "Half the length plus half the width is the lever arm for square "
+                "pyramids. Use the distance.",
+                "disc": "That is for a disc with the length of the sole and uniform pressure: "
+                "2/3 μ f_z times its radius.",
             },
         ),
-        explanation="The levers of all corners are as long, so however they share the load: μ f_z "
-        "times the distance.",
+        explanation="All corners have the same lever arm. So the result is μ f_z times the "
+        "distance, however they share the load.",
     ),
     Exercise(
         name="09.4",
-        statement="Seconds for a lean of 6 cm forwards, and the weight of the posture: it ends "
-        "within 2 mm of its goal, the "
-        "centre of pressure stays 15 mm from every edge, in at most 1.5 s.",
+        statement="Two numbers for a lean of 6 cm forwards: its duration in seconds and the "
+        "weight of the posture. The lean must end within 2 mm of its goal, keep the centre of "
+        "pressure 15 mm away from every edge, and take at most 1.5 s.",
         stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
         solution="design = np.array([1.5, 0.01])",
         judge=_judge_lean,
         examples=_leans,
-        explanation="Braking takes the centre of pressure ahead of x_c by the deceleration over "
-        "ω², which falls with the "
-        "square of the time. The posture is a wish, too: with a tenth of its weight the lean ends "
-        "where it should.",
+        explanation="Braking moves the centre of pressure ahead of x_c by the deceleration over "
+        "ω². The deceleration falls with the square of the time. The posture is a competing "
+        "task: with a tenth of its weight, the lean ends where it should.",
     ),
 )

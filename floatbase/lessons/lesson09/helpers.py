@@ -1,6 +1,4 @@
-"""Lesson 09, Feet with area: Talos held upright, where the ground pushes, a lean, and the
-controllers of its roses.
-"""
+"""Lesson 09: Talos standing, centres of pressure, a lean, and controllers of push-recovery maps."""
 
 from __future__ import annotations
 
@@ -20,19 +18,18 @@ from floatbase.lessons.lesson06 import constrained_minimiser
 from floatbase.simulation import Rollout
 
 MU = 0.7
-# s: a tick of the controller; 1 ms makes no difference to what the lesson shows, and takes twice as
-# long
+# s: control period; 1 ms gives the same results in the lesson and takes twice as long
 PERIOD = 2e-3
 SLOW_PERIOD = 4e-3  # s, for long records
-PUSH_RECOVERY_WATCH_TIME = 4.0  # s: who steps may fall late
-SWING = 0.4  # s of each step after a push
-_FORCE_WEIGHT = 1e-4  # weight of least corner forces beside a wish in N²
+PUSH_RECOVERY_WATCH_TIME = 4.0  # s: a robot that steps may fall late
+SWING = 0.4  # s: duration of each step after a push
+_FORCE_WEIGHT = 1e-4  # weight of small corner forces relative to an error of the wrench in N²
 LEAN_START, TIME_AFTER_LEAN = 0.2, 1.0  # s: before and after the lean of exercise 09.4
 
 
 @cache
 def load_talos() -> fb.Robot:
-    """The humanoid on its two soles."""
+    """Load the humanoid Talos, which stands on two soles."""
     return fb.load("talos")
 
 
@@ -43,10 +40,25 @@ def run_standing(
     sim: fb.Simulation | None = None,
     **options: object,
 ) -> Rollout:
-    """The record of a robot that the QP of lesson 07 keeps where it stands, ticking every 2 ms.
+    """Simulate a robot that the QP of lesson 07 keeps standing, with a control period of 2 ms.
 
-    contacts: what the controller believes in. duration: s. pushes: on the robot.
-    sim: the physics; Talos on its soles by default. options: of `fb.WholeBodyController`.
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts that the controller assumes.
+    duration : float
+        Duration [s].
+    pushes : sequence of Push, optional
+        Pushes on the robot.
+    sim : Simulation, optional
+        The simulation; by default Talos on its soles.
+    **options
+        Options of `WholeBodyController`.
+
+    Returns
+    -------
+    Rollout
+        The record.
     """
     sim = fb.Simulation(load_talos()) if sim is None else sim
     tasks = fb.standing_tasks(sim.state)
@@ -55,9 +67,7 @@ def run_standing(
 
 
 def outcome_text(record: Rollout) -> str:
-    """Whether a record's robot stands, or to which side it falls: where its centre of mass went, in
-    words.
-    """
+    """Return in words whether the robot of a record stands, or in which direction it falls."""
     x, y, _ = record.com[-1] - record.com[0]
     if record.outcome == "completed":
         return "stands"
@@ -67,10 +77,19 @@ def outcome_text(record: Rollout) -> str:
 
 
 def centre_of_pressure_path(record: Rollout) -> Array:
-    """Where the ground pushed: the centre of pressure of all points together at each row, shape (n,
-    2), m, world.
+    """Return the centre of pressure of all contact points together in each row of a record.
 
-    NaN while nothing touches. The ground is level.
+    The ground is level. The centre of pressure is NaN while nothing touches the ground.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Centre of pressure in the world frame [m].
     """
     normal = record.measured[:, 2::3]
     total = np.sum(normal, axis=1)
@@ -81,10 +100,19 @@ def centre_of_pressure_path(record: Rollout) -> Array:
 
 
 def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
-    """Rows of a record in which one foot stands alone, and its corners there from above, shape (n,
-    2), m, world.
+    """Return the rows of a record with one foot on the ground, and the corners of this foot.
 
-    every: of so many rows one is looked at.
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    every : int, optional
+        Only every so many rows are examined.
+
+    Returns
+    -------
+    dict of int to ndarray, shape (n, 2)
+        For each row: the corners from above, in the world frame [m].
     """
     stances = {i: record.contacts_at(i) for i in range(0, len(record), every)}
     return {
@@ -97,17 +125,32 @@ def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
 def corner_forces(
     state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4
 ) -> Array:
-    """The forces at the corners of one sole, inside their pyramids, whose wrench is nearest to the
-    one given, shape (k,), N.
+    """Return the forces at the corners of a sole whose wrench is closest to a given one.
 
-    Of those that make it, the smallest. wrench: shape (6,), about the origin of the sole's frame, N
-    and N·m, world.
-    facets: of each pyramid.
+    The forces are inside their pyramids. If many forces have that wrench, they are the smallest.
+
+    Parameters
+    ----------
+    state : State
+        The state.
+    sole : Contacts
+        Contacts of one sole.
+    wrench : array_like, shape (6,)
+        Force and moment about the origin of the sole's frame, in the world frame [N, N·m].
+    facets : int, optional
+        Number of facets of each pyramid.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Forces in the world frame [N].
     """
     cones = zip(sole.normals, sole.mus, strict=True)
     rows = block_diag(*(FrictionPolyhedron(n, mu, facets).face_matrix for n, mu in cones))
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
-    weights = np.repeat([1.0, 10.0], 3)  # 1 N·m counts as 10 N: at the corners, 10 cm away, it is
+    weights = np.repeat(
+        [1.0, 10.0], 3
+    )  # 1 N·m counts as 10 N, its force at the corners, 10 cm away
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
     return constrained_minimiser(
         cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows
@@ -117,10 +160,23 @@ def corner_forces(
 def leaning_controller(
     centimetres: float, seconds: float, posture: float
 ) -> fb.WholeBodyController:
-    """Talos moves its centre of mass forwards along a minimum-jerk path, from 0.2 s on, and stays
-    there.
+    """Return a controller that leans Talos forwards.
 
-    centimetres: how far. seconds: how long it takes. posture: weight of the posture.
+    The centre of mass moves along a minimum-jerk path, starting at 0.2 s, and stays at its end.
+
+    Parameters
+    ----------
+    centimetres : float
+        Distance [cm].
+    seconds : float
+        Duration [s].
+    posture : float
+        Weight of the posture task [-].
+
+    Returns
+    -------
+    WholeBodyController
+        The controller.
     """
     robot, state = load_talos(), load_talos().standing()
     path = Swing(
@@ -131,8 +187,9 @@ def leaning_controller(
 
 
 def make_controller() -> Stand:
-    """Talos stands on its soles, and steps when its capture point comes near their edge: its rose
-    ends the lesson.
+    """Return the controller of the lesson's push-recovery map.
+
+    Talos stands on its soles, and steps when its capture point comes close to their edge.
     """
     return Stand(
         load_talos(),
@@ -142,5 +199,5 @@ def make_controller() -> Stand:
 
 
 def make_standing_controller() -> Stand:
-    """The same without steps."""
+    """Return the same controller without steps."""
     return Stand(load_talos(), fb.Contacts.flat_feet(load_talos(), mu=MU))

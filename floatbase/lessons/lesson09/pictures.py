@@ -1,6 +1,4 @@
-"""Lesson 09, Feet with area: soles with their corner forces and resultants, one sole's limits, and
-a walk from above.
-"""
+"""Lesson 09: soles with corner forces and resultants, limits of a sole, and walks from above."""
 
 from __future__ import annotations
 
@@ -22,35 +20,47 @@ from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, prefixed, shapes
 from floatbase.viewer.scene.colours import GREYS, PLANNED, hex_code
 
-SOLES_VIEW = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # where Talos stands
+SOLES_VIEW = View(30.0, 30.0, 1.0, around=((0.0, 0.03, 0.06), 0.27))  # both feet of Talos
 ONE_SOLE_VIEW = View(30.0, 30.0, 1.0, around=((0.0, 0.1, 0.07), 0.2))
 _FRAME_RATE = 30.0  # 1/s: pictures of a movie
-_MAX_DISTANCE = 1.0  # m from a sole: a plan that wants to be pushed there is not drawn
-MIN_FORCE = 1.0  # N: a force that is not drawn
-_HIDDEN_PARTS = ("robot", "com", "scale")  # what is drawn of Talos beside its feet
-_BESIDE, _SIZE = (
-    (-0.1, 0.21, 0.002),
-    0.3,
-)  # m, world: where the scale of forces is, and the size of two feet
+_MAX_DISTANCE = 1.0  # m from a sole: planned forces beyond this are not drawn
+MIN_FORCE = 1.0  # N: smaller forces are not drawn
+_HIDDEN_PARTS = ("robot", "com", "scale")  # parts of the picture other than the feet
+# m: position of the force scale in the world frame, and size of two feet
+_BESIDE, _SIZE = (-0.1, 0.21, 0.002), 0.3
 DRAWING_SIZE = WIDE, HIGH = 300, 250  # pixels of a drawing
 _COLUMNS = 261  # of a slice: one for each mm
-_LIMIT_TOLERANCE = 1e-6  # of the normal force: a wrench this near to a limit is within it
-_ZERO_TOLERANCE = 1e-9  # of a row of length one: rounding
+_LIMIT_TOLERANCE = 1e-6  # fraction of the normal force: a wrench this close to a limit is allowed
+_ZERO_TOLERANCE = 1e-9  # rounding of a constraint of length one
 
 
 def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Draw planned forces at the corners of soles; from above, as SVG, where each sole and both
-    together are pushed.
+    """Draw planned forces at the corners of soles, and from above the centres of pressure.
 
-    forces: at the corners, shape (k,), N, world.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    state : State
+        State of the robot.
+    contacts : Contacts
+        The soles.
+    forces : array_like, shape (k,)
+        Forces at the corners in the world frame [N].
+
+    Returns
+    -------
+    str
+        The drawing from above, as SVG.
     """
     view.draw(_feet_only(view, view.painter.picture(state, contacts, planned=forces)))
     return soles_picture(state, contacts, forces)
 
 
 def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
-    """A picture of Talos without what is above its feet, its scale of forces beside them. side: of
-    the one foot to keep.
+    """Remove everything above the feet of Talos from a picture, and add a scale of forces.
+
+    With a `side`, only that foot remains.
     """
     feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
     kept = {
@@ -63,10 +73,24 @@ def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
 
 
 def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Soles from above, as SVG: corners as dots with their normal force as area, centres of
-    pressure as crosses, x_c as a ring.
+    """Draw soles from above with their centres of pressure.
 
-    forces: at the corners, shape (k,), N, world.
+    Corners are dots whose area is proportional to their normal force, centres of pressure are
+    crosses, and x_c is a ring.
+
+    Parameters
+    ----------
+    state : State
+        State of the robot.
+    contacts : Contacts
+        The soles.
+    forces : array_like, shape (k,)
+        Forces at the corners in the world frame [N].
+
+    Returns
+    -------
+    str
+        The drawing as SVG.
     """
     flat, drawn = np.asarray(forces, dtype=np.float64), ""
     first = 0
@@ -84,19 +108,32 @@ def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike)
     drawn += _cross(_to_pixels(centre_of_pressure(state, contacts, flat)[None])[0], 9)
     com = _to_pixels(state.com[None])[0]
     drawn += svg.circle(com, 9, fill="none", stroke=hex_code(GREYS[1]), stroke_width=3)
-    words = ("small crosses: where each sole is pushed", "large cross: both together; ring: x_c")
+    words = ("small crosses: centre of pressure of each sole", "large cross: of both; ring: x_c")
     return svg.captioned(drawn, DRAWING_SIZE, 20, "from above; forwards is up", *words)
 
 
 def show_sole(
     view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSet, wrench: npt.ArrayLike
 ) -> str:
-    """Draw one sole with the corner forces that make a wrench, and their sum where the ground
-    pushes; its limits as SVG.
+    """Draw a sole with the corner forces of a wrench and their sum at the centre of pressure.
 
-    sole: contacts of one sole. limits: its wrenches about the origin of its frame. wrench: shape
-        (6,), about that point, N and
-    N·m, world; it presses.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    state : State
+        State of the robot.
+    sole : Contacts
+        Contacts of one sole.
+    limits : WrenchSet
+        Possible wrenches about the origin of the sole's frame.
+    wrench : array_like, shape (6,)
+        Force and moment about that point in the world frame [N, N·m], with a positive normal force.
+
+    Returns
+    -------
+    str
+        The limits as SVG.
     """
     w = np.asarray(wrench, dtype=np.float64)
     forces = corner_forces(state, sole, w)
@@ -108,24 +145,37 @@ def show_sole(
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
     possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
-    told = (
+    summary = (
         "corner forces exist"
         if possible
-        else f"no corner forces make this: {_violated_limits(limits, w)}"
+        else f"impossible with corner forces: {_violated_limits(limits, w)}"
     )
     nearest = (
         ""
         if possible
-        else f"the nearest miss it by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
+        else f"closest forces: off by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
     )
-    return _slice(limits, w, told, nearest)
+    return _slice(limits, w, summary, nearest)
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
-    """Play a record whose plan holds a wrench for each sole, about its frame's origin: its force,
-    where the plan wants it.
+    """Play a record with the planned force of each sole at its planned centre of pressure.
 
-    speed: 1 for real time. title: a line in the corner.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    record : Rollout
+        The record; its planned wrenches are about the origins of the soles' frames.
+    speed : float
+        Speed; 1 is real time [-].
+    title : str
+        Text in the corner.
+
+    Returns
+    -------
+    Viewer
+        The viewer.
     """
     rows = range(
         0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0]))))
@@ -150,14 +200,23 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
 
 
 def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
-    """Which kinds of rows a wrench breaks."""
+    """Return the kinds of limits that a wrench violates."""
     broken = limits.face_matrix[limits.face_matrix @ wrench > _LIMIT_TOLERANCE * wrench[2]]
     return ", ".join(dict.fromkeys(limit_kinds(broken)))
 
 
 def limit_kinds(rows: npt.ArrayLike) -> list[str]:
-    """What each row on the wrench of a level sole forbids, shape (n, 6), about the middle of the
-    sole: its name.
+    """Return what each constraint on the wrench of a level sole forbids.
+
+    Parameters
+    ----------
+    rows : array_like, shape (n, 6)
+        Constraints on the wrench about the middle of the sole.
+
+    Returns
+    -------
+    list of str
+        "sliding", "tipping" or "twisting" for each constraint.
     """
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
@@ -172,18 +231,17 @@ def limit_kinds(rows: npt.ArrayLike) -> list[str]:
 
 
 def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
-    """As SVG: all centres of pressure along x with all twists that the sole can make at this force;
-    the wrench as a dot.
+    """Draw which centres of pressure along x and twists the sole allows at this force, as SVG.
+
+    The wrench is a dot.
     """
     half, most = 150.0, 60.0  # mm, N·m: the ends of the axes
     sx, sy = WIDE / (2 * half), HIGH / (2 * most)
     x = np.linspace(-half, half, _COLUMNS)
     many = np.tile(wrench, (len(x), 1))
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
-    room, by_twist = (
-        -many @ limits.face_matrix.T,
-        limits.face_matrix[:, 5],
-    )  # each row says: by_twist · twist ≤ room
+    # each constraint is by_twist · twist ≤ room
+    room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]
     up, down, free = (
         by_twist > _ZERO_TOLERANCE,
         by_twist < -_ZERO_TOLERANCE,
@@ -211,8 +269,19 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
 
 
 def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
-    """A walk from above: where x_c was, where the ground pushed, and the soles that stood. steps:
-    `walk.history`.
+    """Plot a walk from above: centre of mass, centre of pressure and the soles on the ground.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    steps : iterable of StepPlan
+        The steps, `walk.history`.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     figure, axis = plt.subplots(figsize=(8.5, 3.0), layout="constrained")
     for step in steps:
@@ -246,8 +315,17 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
 
 
 def plot_lean(record: Rollout) -> Axes:
-    """Forwards and backwards through time: x_c, the centre of pressure, and between which edges of
-    the soles it must stay.
+    """Plot the motion of x_c and of the centre of pressure along x between the edges of the soles.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     edges = record.foot_positions[..., 0]

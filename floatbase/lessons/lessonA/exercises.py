@@ -11,26 +11,25 @@ import floatbase as fb
 from floatbase._geometry import rotation_z
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
-from floatbase.lessons.exercises import Exercise, NumericJudge
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import NumericJudge
 
 PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
-CHILD_POSITION, CHILD_VELOCITY = (
-    np.array([2.0, 0.0, 0.0]),
-    np.array([1.5, 0.0, 0.0]),
-)  # m and m/s, in the merry-go-round's axes
+# m and m/s, in the axes of the merry-go-round
+CHILD_POSITION, CHILD_VELOCITY = np.array([2.0, 0.0, 0.0]), np.array([1.5, 0.0, 0.0])
 LIFT_JOINT, ELBOW_JOINT = 1, 2  # of exercise A.2: ur5's joints
 JOINT_VELOCITY = 2.0 * np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # rad/s, of exercise A.3
-STEP = 1e-4  # s, and of differences
+STEP = 1e-4  # s, and step of finite differences
 
 
 @cache
 def arm_state(v: tuple[float, ...] = (0.0,) * 6) -> fb.State:
-    """ur5 as it stands, its joints moving with v, rad/s."""
+    """Return ur5 in its standing posture, its joints moving with v [rad/s]."""
     return fb.load("ur5").standing().replace(v=np.array(v))
 
 
 def _force_on_the_walker() -> Array:
-    """Mass times the second difference of where the child is in the world."""
+    """Compute the force as mass times the second difference of the child's position."""
 
     def place(t: float) -> Array:
         return rotation_z(PLATFORM_RATE[2] * t) @ (CHILD_POSITION + t * CHILD_VELOCITY)
@@ -39,7 +38,7 @@ def _force_on_the_walker() -> Array:
 
 
 def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callable[[], Array]:
-    """Multiples of m 2 ω × ṗ and of m ω × (ω × p)."""
+    """Return a function that combines m 2 ω × ṗ and m ω × (ω × p)."""
 
     def force() -> Array:
         turned = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
@@ -55,8 +54,9 @@ def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callabl
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
-    """What two joints at 1 rad/s make together: both columns of the Coriolis matrix, at the other's
-    velocity.
+    """Compute the joint effect of two joints at 1 rad/s.
+
+    It is the sum of both columns of the Coriolis matrix, each at the other joint's velocity.
     """
     e = np.eye(6)
     return np.asarray(
@@ -75,20 +75,21 @@ def _velocity_part() -> Array:
 
 
 def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callable[[], Array]:
-    """rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
+    """Return a function that computes rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
 
     def force() -> Array:
         state = arm_state(tuple(JOINT_VELOCITY))
         v = state.v
 
-        def change(way: Array) -> Array:
+        def inertia_derivative(direction: Array) -> Array:
             after, before = (
-                state.replace(q=state.integrate(s * STEP * way)).M for s in (1.0, -1.0)
+                state.replace(q=state.integrate(s * STEP * direction)).M for s in (1.0, -1.0)
             )
             return np.asarray((after - before) / (2.0 * STEP))
 
-        gradient = np.array([v @ change(unit) @ v for unit in np.eye(6)])
-        return np.asarray(rate * change(v) @ v + slope * gradient + gravity * arm_state().h)
+        gradient = np.array([v @ inertia_derivative(unit) @ v for unit in np.eye(6)])
+        rate_force = rate * inertia_derivative(v) @ v
+        return np.asarray(rate_force + slope * gradient + gravity * arm_state().h)
 
     return force
 
@@ -96,16 +97,16 @@ def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callab
 EXERCISES = (
     Exercise(
         name="A.1",
-        statement="The force of the floor on a child that walks straight out on a merry-go-round, "
-        "shape (3,), N.",
+        statement="The force of the floor on a child that walks straight out on a "
+        "merry-go-round, shape (3,), N.",
         stub="floor = np.zeros(3)  # N, in the merry-go-round's axes; replace by your expression",
         solution="coriolis = -2 * np.cross(omega, p_dot)\n"
         "centrifugal = -np.cross(omega, np.cross(omega, p))\n"
         "floor = -mass * (coriolis + centrifugal)",
         judge=NumericJudge(
             right=_force_on_the_walker,
-            praise="Inwards to keep the child on the disc, and sideways to keep up with it: a real "
-            "force, from the floor.",
+            praise="The force is inwards to keep the child on the disc, and sideways to keep up "
+            "with it. It is a real force, from the floor.",
             mistakes={
                 "zero": lambda: np.zeros(3),
                 "felt": _walker(-1.0, -1.0),
@@ -117,37 +118,37 @@ EXERCISES = (
                 "no_mass": _walker(1.0, 1.0, 1.0),
             },
             hints={
-                "zero": "Without a force the child would go straight in the world, and curve in "
-                "these axes.",
-                "felt": "That is what the child feels pushed by. The floor has to answer it: the "
-                "opposite.",
-                "no_factor_2": "The factor 2: half of 2 ω × ṗ is for the velocity's axes that "
-                "turn, half for the place that "
-                "does.",
-                "coriolis_alone": "That holds the child against the Coriolis term only; it is off "
-                "the axis, too.",
-                "inwards_alone": "That would do for a child that stands still: it also walks.",
-                "inwards_sign": "Sideways right; but inwards, the other way: the floor has to bend "
-                "the path towards the axis.",
-                "sideways_sign": "Inwards right; but sideways the other way. In ω × ṗ the order "
-                "counts.",
-                "no_mass": "That is an acceleration, m/s²: the mass is missing.",
+                "zero": "Without a force, the child would move straight in the world frame, and "
+                "on a curve in these axes.",
+                "felt": "That is the force that the child seems to feel. The floor has to "
+                "balance it, in the opposite direction.",
+                "no_factor_2": "The factor 2 is wrong. Half of 2 ω × ṗ comes from the rotation "
+                "of the velocity's axes, and half from the change of the position.",
+                "coriolis_alone": "That balances only the Coriolis term. The child is also away "
+                "from the axis.",
+                "inwards_alone": "That would be right for a child that stands still. This child "
+                "also walks.",
+                "inwards_sign": "The sideways part is right, but the other part has the wrong "
+                "sign: the floor has to bend the path towards the axis.",
+                "sideways_sign": "The inward part is right, but the sideways part has the wrong "
+                "sign. The order in ω × ṗ matters.",
+                "no_mass": "That is an acceleration, m/s². The mass is missing.",
             },
         ),
-        explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious terms "
-        "add up to zero.",
+        explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious "
+        "terms add up to zero.",
     ),
     Exercise(
         name="A.2",
-        statement="What lift and elbow of ur5, at 1 rad/s each, make together and neither alone, "
-        "shape (6,), N·m.",
+        statement="The part of h, shape (6,), N·m, that lift and elbow of ur5 cause only "
+        "together, moving with 1 rad/s each, and that neither joint causes alone.",
         stub="pair = np.zeros(6)  # N·m; replace by calls of h_of",
         solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - "
         "h_of(elbow) + g",
         judge=NumericJudge(
             right=_pair,
-            praise="The Coriolis part of this pair. Two calls do: half of h(lift + elbow) - h(lift "
-            "- elbow). Do you see why?",
+            praise="This is the Coriolis term of this pair. Two calls are enough: half of "
+            "h(lift + elbow) - h(lift - elbow). Do you see why?",
             mistakes={
                 "zero": lambda: np.zeros(6),
                 "gravity_short": lambda: _pair() - arm_state().h,
@@ -160,35 +161,36 @@ EXERCISES = (
                 "pan_lift": lambda: _pair(0, 1),
             },
             hints={
-                "zero": "Nothing there yet. Call h_of with the lift alone, with the elbow alone, "
-                "and with both.",
-                "gravity_short": "Gravity stands in each call: here it was taken away once too "
+                "zero": "There is no answer yet. Call h_of with the lift alone, with the elbow "
+                "alone, and with both.",
+                "gravity_short": "Each call includes gravity. Here it was subtracted once too "
                 "often.",
-                "gravity_left": "Gravity is still in it, once.",
-                "all_of_h": "That is all of h with both moving: gravity and what each feels alone "
-                "are in it.",
-                "alone_left": "Without gravity, but what each joint makes alone is still in it.",
-                "half": "That is half of it: the sum over i and j has the pair twice, as (i, j) "
-                "and as (j, i).",
-                "twice": "That is twice the pair: it stands in h(lift + elbow), and with the other "
-                "sign in h(lift - elbow).",
-                "elbow_wrist": "Those are other joints: counted from 0, lift is 1 and elbow 2.",
-                "pan_lift": "Those are pan and lift: counted from 0, lift is 1 and elbow 2.",
+                "gravity_left": "Gravity is still included once.",
+                "all_of_h": "That is all of h with both joints moving. It includes gravity and "
+                "what each joint causes alone.",
+                "alone_left": "Gravity is gone, but what each joint causes alone is still "
+                "included.",
+                "half": "That is half of it. The sum over i and j contains the pair twice, as "
+                "(i, j) and as (j, i).",
+                "twice": "That is twice the pair. It appears in h(lift + elbow), and with the "
+                "opposite sign in h(lift - elbow).",
+                "elbow_wrist": "Those are other joints. Counted from 0, lift is 1 and elbow is 2.",
+                "pan_lift": "Those are pan and lift. Counted from 0, lift is 1 and elbow is 2.",
             },
         ),
-        explanation="h = g + Σ Γ_ij v_i v_j; both moving, minus each alone, leaves 2 Γ_ij and "
-        "minus one g, which goes back in.",
+        explanation="h = g + Σ Γ_ij v_i v_j. Both joints moving minus each alone leaves 2 Γ_ij "
+        "and minus one g, which is added back.",
     ),
     Exercise(
         name="A.3",
-        statement="C v of ur5 from M alone, by differences, shape (6,), N·m.",
+        statement="C v of ur5 from M alone, by finite differences, shape (6,), N·m.",
         stub="Cv = np.zeros(6)  # N·m; replace: from M_at and differences, without h",
         solution="change = lambda way: (M_at(1e-4 * way) - M_at(-1e-4 * way)) / 2e-4\n"
         "slopes = np.array([w @ change(unit) @ w for unit in np.eye(6)])\n"
         "Cv = change(w) @ w - slopes / 2",
         judge=NumericJudge(
             right=_velocity_part,
-            praise="All of the fictitious forces, from how the inertia changes with the posture. "
+            praise="All fictitious forces follow from how the inertia changes with the posture. "
             "That is where h comes from.",
             mistakes={
                 "zero": lambda: np.zeros(6),
@@ -203,20 +205,22 @@ EXERCISES = (
             },
             hints={
                 "zero": "Nothing there yet.",
-                "no_half_in_slope": "Kinetic energy is ½ vᵀ M v: the half is missing in its slope.",
-                "rate_alone": "That is Ṁ v alone; the slope of the kinetic energy is missing.",
-                "slope_sign": "The sign of the slope: momentum changes by what pushes, and the "
-                "slope stands on that side.",
-                "slope_alone": "That is the slope of the kinetic energy alone; d/dt of the "
-                "momentum M v has Ṁ v.",
-                "half_on_rate": "The half belongs to the kinetic energy's slope, not to Ṁ v.",
-                "both_halved": "Both terms are halved: the half belongs to the kinetic energy "
-                "alone.",
-                "sign": "The other sign: C v stands on the side of M q̈.",
-                "gravity_too": "Gravity is in it; C v is the velocity part of h.",
+                "no_half_in_slope": "The kinetic energy is ½ vᵀ M v. The half is missing in its "
+                "gradient.",
+                "rate_alone": "That is Ṁ v alone. The gradient of the kinetic energy is missing.",
+                "slope_sign": "The sign of the gradient is wrong. Forces change the momentum, "
+                "and the gradient is on their side of the equation.",
+                "slope_alone": "That is the gradient of the kinetic energy alone. The rate of "
+                "the momentum M v also contains Ṁ v.",
+                "half_on_rate": "The half belongs to the gradient of the kinetic energy, not to "
+                "Ṁ v.",
+                "both_halved": "Both terms are halved. The half belongs only to the kinetic "
+                "energy.",
+                "sign": "The sign is wrong: C v is on the same side as M q̈.",
+                "gravity_too": "This includes gravity. C v is only the velocity part of h.",
             },
         ),
-        explanation="Lagrange: d/dt (M v) = slope of ½ vᵀ M v + forces, so M q̈ + (Ṁ v - slope) = "
-        "forces; the bracket is C v.",
+        explanation="By Lagrange, d/dt (M v) = gradient of ½ vᵀ M v + forces. So M q̈ + (Ṁ v - "
+        "gradient) = forces, and the bracket is C v.",
     ),
 )

@@ -1,6 +1,4 @@
-"""Lesson A, Fictitious forces: a figure of eight for an arm, a base that circles, and how far balls
-have rolled.
-"""
+"""Lesson A: a figure of eight for an arm, errors of its tool, and a base that circles."""
 
 from __future__ import annotations
 
@@ -14,21 +12,30 @@ from floatbase._validation import Array
 from floatbase.behaviours import pitch_and_yaw
 from floatbase.simulation import Rollout
 
-SWING_AMPLITUDE = np.array(
-    [0.5, 0.35, -0.5, 0.0, 0.0, 0.0]
-)  # rad: how far ur5's joints swing on the figure of eight
+# rad: amplitudes of ur5's joints on the figure of eight
+SWING_AMPLITUDE = np.array([0.5, 0.35, -0.5, 0.0, 0.0, 0.0])
 SWINGS_PER_PERIOD = np.array([1.0, 2.0, 2.0, 0.0, 0.0, 0.0])  # swings of each joint in one period
-TRANSIENT_FRACTION = 1.0 / 3.0  # of a record: what comes before does not count as an error
+TRANSIENT_FRACTION = 1.0 / 3.0  # of a record: errors before that do not count
 FULL_TURN = 2.0 * np.pi  # rad
 
 Trajectory = Callable[[float], tuple[Array, Array, Array]]
 
 
 def figure_of_eight(home: fb.State, period: float) -> Trajectory:
-    """Joint positions, velocities and accelerations as functions of t, each (6,), with which ur5's
-    tool draws an eight.
+    """Return the joint motion with which the tool of ur5 draws a figure of eight.
 
-    period: s, of one eight.
+    Parameters
+    ----------
+    home : State
+        State at the centre of the figure.
+    period : float
+        Duration of one figure [s].
+
+    Returns
+    -------
+    callable
+        Function of time [s] that returns joint positions [rad], velocities [rad/s] and
+        accelerations [rad/s²], each of shape (6,).
     """
     w = FULL_TURN * SWINGS_PER_PERIOD / period
 
@@ -40,8 +47,21 @@ def figure_of_eight(home: fb.State, period: float) -> Trajectory:
 
 
 def tool_error(record: Rollout, path: Trajectory) -> float:
-    """Root mean square of the tool's distance from where the path has it, mm, after the first third
-    of a record.
+    """Return the root mean square distance of the tool from its path.
+
+    The first third of the record does not count.
+
+    Parameters
+    ----------
+    record : Rollout
+        The record.
+    path : callable
+        The desired motion, from `figure_of_eight`.
+
+    Returns
+    -------
+    float
+        The distance [mm].
     """
     rows = range(round(TRANSIENT_FRACTION * len(record)), len(record), 5)
     wanted = [fb.State(record.robot, path(record.time[i])[0]).point("tool0") for i in rows]
@@ -52,14 +72,26 @@ def tool_error(record: Rollout, path: Trajectory) -> float:
 def elliptic_rotation(
     pitch: float, yaw: float, rate: float, loops: int, phase: float = 90.0
 ) -> Trajectory:
-    """Base orientations that describe an ellipse in pitch and yaw `loops` times, as
-    `OrientationTask` takes them.
+    """Return base orientations that follow an ellipse in pitch and yaw, for `OrientationTask`.
 
-    The ellipse grows from nothing in the first loop and shrinks to nothing in the last. Returns R
-    (3, 3), angular velocity and acceleration, rad/s and rad/s², world, as a function of t.
+    The ellipse grows from nothing in the first loop and shrinks to nothing in the last.
 
-    pitch, yaw: rad, half the widths of the ellipse. rate: loops for each second.
-    phase: degrees between the two; 0 makes a line of the ellipse, to and fro.
+    Parameters
+    ----------
+    pitch, yaw : float
+        Half the widths of the ellipse [rad].
+    rate : float
+        Loops per second [1/s].
+    loops : int
+        Number of loops.
+    phase : float, optional
+        Phase between pitch and yaw [°]; at 0 the ellipse becomes a line.
+
+    Returns
+    -------
+    callable
+        Function of time [s] that returns the rotation matrix, shape (3, 3), the angular velocity
+        [rad/s] and the angular acceleration [rad/s²], both of shape (3,) in the world frame.
     """
     total, shift = loops / rate, np.deg2rad(phase)
 

@@ -1,6 +1,4 @@
-"""Lesson A, Fictitious forces: a puck on a turntable, two ways to write one tumble, errors against
-speed, feet that travel.
-"""
+"""Lesson A: a puck on a turntable, a tumbling robot, errors against speed, and drifting feet."""
 
 from __future__ import annotations
 
@@ -15,40 +13,51 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, view_from_rotating_frame
 from floatbase.lessons import props, svg
-from floatbase.lessons.exercises import format_vector
+from floatbase.lessons.judges import format_vector
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, shapes
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 TABLE_RADIUS, TABLE_HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
-START = np.array([-0.7, 0.3, 0.0])  # m: where the puck begins, from the axis
-TABLE_VIEW = View(
-    -90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0)
-)  # x to the right, y away, as in the rider's drawing
+START = np.array([-0.7, 0.3, 0.0])  # m: initial position of the puck relative to the axis
+# x to the right, y away from the viewer, as in the rider's drawing
+TABLE_VIEW = View(-90.0, 48.0, 1.0, around=((0.0, 0.0, 0.2), 1.0))
 PIECES = 24  # of a drawn path
 SIDE = 250  # pixels of a drawing
 ACCELERATION_SCALE = 0.05  # m drawn for 1 m/s²
-FORCE_SCALE = 0.003  # m drawn for 1 N of what is called a force
+FORCE_SCALE = 0.003  # m drawn for 1 N of a fictitious force
 SIDE_VIEW = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
 FEET_VIEW = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
 MIN_ROD_LENGTH = 1e-3  # m: a shorter rod is not drawn
-PIN_DISTANCE = 0.05  # m: from a foot to its pin, away from the robot, where they are seen
-FRAME_RATE = 10  # pictures for each second of the travelling feet
+PIN_DISTANCE = 0.05  # m: from a foot to its pin, away from the robot, where it is visible
+FRAME_RATE = 10  # pictures per second of the drifting feet
 
 
 def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str:
-    """Draw a puck that slides straight over a turning table and leaves chalk on it; what a rider
-    sees, as SVG.
+    """Draw a puck that slides straight over a turning table and leaves a chalk line on it.
 
-    omega: rad/s, of the table, to the left. speed: m/s, of the puck, along x. time: s, at least a
-        moment.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    omega : float
+        Angular velocity of the table, to the left [rad/s].
+    speed : float
+        Speed of the puck along x [m/s].
+    time : float
+        Time since the start [s].
+
+    Returns
+    -------
+    str
+        What a rider on the table sees, as SVG.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
     top = np.array([0.0, 0.0, TABLE_HEIGHT])
     straight = START + np.outer(times, [speed, 0.0, 0.0])
-    chalk = seen.position @ seen.rotation[-1].T  # where the table has carried it by now
+    chalk = seen.position @ seen.rotation[-1].T  # where the table has carried the chalk line by now
     picture = view.painter.ground_only() | {
         "table": props.turntable(top, TABLE_RADIUS, omega * time)
     }
@@ -61,7 +70,7 @@ def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str
 
 
 def _path(name: str, points: Array, radius: float, colour: tuple[float, float, float]) -> Picture:
-    """Rods from point to point, m, world."""
+    """Return rods that connect points in the world frame [m]."""
     return {
         f"{name}/{i}": rod
         for i, (a, b) in enumerate(pairwise(points))
@@ -81,8 +90,9 @@ def _rod(
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
-    """From above, as SVG, with the table at rest: the path, (n, 3), m, and the accelerations at its
-    end, m/s².
+    """Draw the path, shape (n, 3) [m], and the final accelerations [m/s²] from above, as SVG.
+
+    The table is at rest in this drawing.
     """
     half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE_RADIUS)
 
@@ -110,7 +120,7 @@ def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str
 
 
 def _arrow(start: Array, end: Array, dashes: str) -> str:
-    """A line with a tip, pixels; nothing where it would be shorter than its tip."""
+    """Draw a line with a tip [px]; nothing if it would be shorter than its tip."""
     way = end - start
     length = float(np.linalg.norm(way))
     if length < 6.0:
@@ -122,13 +132,24 @@ def _arrow(start: Array, end: Array, dashes: str) -> str:
 
 
 def show_tumble(view: Viewer, glide: float, spin: float) -> str:
-    """Draw a robot in the air that glides to its left and turns about the vertical, and what is
-    called a force on its base.
+    """Draw a robot in the air that moves to its left and turns, and its fictitious base force.
 
-    Grey, since nobody exerts them: the velocity part of h on the base, written in the base's axes
-    (dark) and in the world's (light); their sizes and the base's acceleration, as text.
+    The force is the velocity part of h on the base, written in the base's axes (dark) and in the
+    world's (light). It is grey, because no other body exerts it.
 
-    glide: m/s. spin: rad/s.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    glide : float
+        Velocity to the left [m/s].
+    spin : float
+        Angular velocity about the vertical [rad/s].
+
+    Returns
+    -------
+    str
+        Both forces, and the difference between the base's accelerations that follow from them.
     """
     robot = view.robot
     q, v = robot.standing().q.copy(), np.zeros(robot.nv)
@@ -160,8 +181,9 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
 
 
 def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
-    """Acceleration of the base in the world, (3,), m/s², from the velocity part of h alone, written
-    in those axes.
+    """Return the base's acceleration in the world frame, shape (3,) [m/s²].
+
+    Only the velocity part of h acts, written in the given axes.
     """
     R = state.frame_pose("base").rotation
     if axes == "base":
@@ -174,8 +196,19 @@ def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
 
 
 def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
-    """Curves of errors, name -> mm at each speed, on logarithmic axes, each with the slope of its
-    ends.
+    """Plot errors over speed on logarithmic axes, with the slope between the ends of each curve.
+
+    Parameters
+    ----------
+    speeds : sequence of float
+        Speeds relative to a figure of eight in 6 s [-].
+    errors : mapping of str to sequence of float
+        For each name: the error at each speed [mm].
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     _, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
     for (name, curve), colour, style in zip(
@@ -192,15 +225,30 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
         )
     axis.set_xticks(speeds, [f"{speed:g}" for speed in speeds])
     axis.minorticks_off()
-    axis.set(xlabel="speed, 1 for an eight in 6 s", ylabel="tool's error [mm]", ylim=(1e-2, 1e2))
+    axis.set(xlabel="speed (1: figure of eight in 6 s)", ylabel="tool error [mm]", ylim=(1e-2, 1e2))
     axis.grid(alpha=0.25)
     axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axis
 
 
 def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
-    """A robot whose feet travel: beside each a pin where it began to stand, and a line as far to
-    the side as it is now.
+    """Play a robot whose feet drift, with a pin at each foot's first position.
+
+    A line from the pin shows how far to the side the foot is now.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    record : Rollout
+        The record.
+    speed : float, optional
+        Speed; 1 is real time [-].
+
+    Returns
+    -------
+    Viewer
+        The viewer.
     """
     contacts = record.contacts
     home = contacts.positions(record.state(0))

@@ -1,6 +1,4 @@
-"""Lesson B, Torque is an abstraction: one cylinder of the package on a test bench, and how well
-go2 comes back from a push on slow cylinders.
-"""
+"""Lesson B: a hydraulic cylinder on a test bench, and pushes on go2 with slow cylinders."""
 
 from __future__ import annotations
 
@@ -15,25 +13,34 @@ import floatbase as fb
 from floatbase.actuators import Cylinders, HydraulicActuators, Hydraulics, HydraulicState
 from floatbase.lessons.lesson03 import standing_go2_eom
 
-# N·m: go2's torque limit at the knee, which its cylinder gives where the lever is longest, in the
-# weaker direction
+# N·m: torque limit of go2's knee: what its cylinder exerts in the weaker direction where the lever
+# is longest
 KNEE_TORQUE = 45.43
-SUBSTEPS = 5  # of a millisecond
+SUBSTEPS = 5  # per millisecond
 ROUNDING = 1e-9  # rad
-PUSH = np.array([0.0, 30.0, 0.0])  # N, to the left, for 0.1 s: the lesson's
-SETTLE, BEFORE, AFTER = (
-    0.5,
-    0.1,
-    1.4,
-)  # s: on perfect torques, on oil before the push, and from its start to the end
-JUDGED_TIME = 0.2  # s, at the end, in which it is judged
+PUSH = np.array([0.0, 30.0, 0.0])  # N, to the left, for 0.1 s: the push of the lesson
+# s: with ideal torques, with cylinders before the push, and from the start of the push to the end
+SETTLE, BEFORE, AFTER = 0.5, 0.1, 1.4
+JUDGED_TIME = 0.2  # s at the end in which the response is judged
 
 JointMotion = Callable[[float], tuple[float, float]]
 
 
 class BenchSample(NamedTuple):
-    """The bench at one time: s; N·m; what the valve was told, -1 to 1, or in a force loop its
-    opening; Pa of chambers A and B; angle, rad from the centre.
+    """State of the bench at one time.
+
+    Parameters
+    ----------
+    time : float
+        Time [s].
+    torque : float
+        Torque at the joint [N·m].
+    u : float
+        Command to the valve, from -1 to 1, or the opening of the valve in a force loop [-].
+    pressure_a, pressure_b : float
+        Pressures in the chambers A and B [Pa].
+    angle : float
+        Angle of the joint from the centre [rad].
     """
 
     time: float
@@ -45,10 +52,21 @@ class BenchSample(NamedTuple):
 
 
 def hold_then_turn(speed: float, start: float = 0.15, end: float = 0.6) -> JointMotion:
-    """The joint is held at its centre until `start`, s, then turned evenly, rad/s, and from `end`,
-    rad, on held again.
+    """Return a joint motion: the joint is held at its centre, turned evenly, and held again.
 
-    speed: ≥ 0; the rod goes out.
+    Parameters
+    ----------
+    speed : float
+        Angular velocity, at least 0 [rad/s]; the rod moves out.
+    start : float, optional
+        Time at which the joint starts to turn [s].
+    end : float, optional
+        Angle at which it stops [rad].
+
+    Returns
+    -------
+    callable
+        Function of time [s] that returns angle [rad] and velocity [rad/s].
     """
 
     def motion(t: float) -> tuple[float, float]:
@@ -59,19 +77,25 @@ def hold_then_turn(speed: float, start: float = 0.15, end: float = 0.6) -> Joint
 
 
 class Bench:
-    """The hydraulic cylinder of a knee of go2. The bench holds or turns the joint, whatever its
-    torque; the valve is yours.
+    """Test bench with the hydraulic cylinder of a knee of go2.
 
-    `step(u)` tells the valve u, from -1 to 1, and lets a millisecond pass. `torque`, N·m, is what
-    the joint gets, `desired_torque` what it should; `samples` is the record. Equations, spool and
-    steps are those of `Cylinders` and `HydraulicActuators`.
+    The bench holds or turns the joint, whatever its torque. You control the valve: `step(u)` sends
+    the command u, from -1 to 1, to the valve and advances time by 1 ms. `torque` [N·m] is the
+    torque at the joint, `desired_torque` the desired one, and `samples` is the record. Equations,
+    spool and time steps are those of `Cylinders` and `HydraulicActuators`.
 
-    motion: t -> angle and velocity of the joint, rad from the centre and rad/s; held, by default.
-    desired_torque: N·m, at t ≥ 0. The bench begins at zero torque.
-    hydraulics: the cylinder that is scaled to the knee.
+    Parameters
+    ----------
+    motion : callable, optional
+        Function of time [s] that returns the angle of the joint from the centre [rad] and its
+        velocity [rad/s]; by default the joint is held.
+    desired_torque : float, optional
+        Desired torque from t = 0 on [N·m]. The bench starts at zero torque.
+    hydraulics : Hydraulics, optional
+        The cylinder that is scaled to the knee.
     """
 
-    dt = 1e-3  # s, of a step
+    dt = 1e-3  # s: duration of a step
 
     def __init__(
         self,
@@ -96,35 +120,33 @@ class Bench:
 
     @property
     def torque(self) -> float:
-        """What the joint gets, N·m."""
+        """Torque at the joint [N·m]."""
         return self.lever * float(self.cylinder.force(self.actuators.state.pressures)[0])
 
     @property
     def volumes(self) -> tuple[float, float]:
-        """Of the oil in the chambers A and B, m³."""
+        """Volumes of the oil in the chambers A and B [m³]."""
         a, b = self._geometry.volumes[:, 0].tolist()
         return a, b
 
     @property
     def stiffness(self) -> float:
-        """What closed chambers are for the joint, N·m/rad: L² k."""
+        """Stiffness of the joint with closed chambers [N·m/rad]: L² k."""
         return self.lever**2 * float(self._geometry.stiffness[0])
 
     def torque_rate(self, side: float = 1.0) -> float:
-        """How fast the torque changes with the valve all open, N·m/s: the way that `side` says, 1
-        or -1.
-        """
+        """Return the rate of the torque with the valve fully open to one side, 1 or -1 [N·m/s]."""
         drop = self.cylinder.line_pressures(np.array([side])) - self.actuators.state.pressures
         rates = self.cylinder.orifice_flow(drop) / self._geometry.compliance
         return side * self.lever * float(self.cylinder.force(rates)[0])
 
     def torque_range(self) -> tuple[float, float]:
-        """The least and the largest torque that supply and tank allow at this angle, N·m."""
+        """Return the smallest and largest torque that the supply allows at this angle [N·m]."""
         least, most = sorted((self.lever * self.cylinder.force_limits()[:, 0]).tolist())
         return least, most
 
     def step(self, u: float) -> None:
-        """Tell the valve u and let a millisecond pass."""
+        """Send the command u to the valve and advance time by 1 ms."""
         u = min(1.0, max(-1.0, u))
         opening, pressures = self.actuators.state.opening, self.actuators.state.pressures
         for _ in range(SUBSTEPS):
@@ -140,7 +162,7 @@ class Bench:
         self.record_sample(u)
 
     def record_sample(self, u: float) -> None:
-        """Move on by a millisecond, and keep a row."""
+        """Advance time by 1 ms and record a sample."""
         self.time = self.dt * len(self.samples)
         self._update_geometry()
         self.samples.append(self._sample(u))
@@ -151,8 +173,9 @@ class Bench:
 
 
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
-    """One cylinder with its force loop, at zero torque: the supply may change, its size does
-    not.
+    """Return one cylinder with its force loop, at zero torque.
+
+    Its size does not depend on the supply pressure.
     """
     actuators = HydraulicActuators(standing_go2_eom().robot, hydraulics)
     size = KNEE_TORQUE / Hydraulics().weakest_torque
@@ -162,7 +185,22 @@ def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
 
 
 def run_force_loop(bench: Bench, bandwidth: float, time: float) -> list[BenchSample]:
-    """The package's force loop of so many Hz on a new bench for `time` s: its rows."""
+    """Run the force loop of floatbase on a new bench.
+
+    Parameters
+    ----------
+    bench : Bench
+        The bench.
+    bandwidth : float
+        Bandwidth of the force loop [Hz].
+    time : float
+        Duration [s].
+
+    Returns
+    -------
+    list of BenchSample
+        The samples.
+    """
     bench.actuators = _knee_actuators(replace(bench.hydraulics, loop_bandwidth=bandwidth))
     for _ in range(round(time / bench.dt)):
         bench.actuators.step([bench.desired_torque], [bench.angle], [bench.velocity], bench.dt)
@@ -171,8 +209,16 @@ def run_force_loop(bench: Bench, bandwidth: float, time: float) -> list[BenchSam
 
 
 class PushResponse(NamedTuple):
-    """How a push ended: outcome; mm by which go2 is off its place at worst in the end, and by which
-    it then still swings.
+    """Response to a push.
+
+    Parameters
+    ----------
+    outcome : str
+        Outcome of the run, as in `Rollout`.
+    offset : float
+        Largest distance of go2 from its place at the end [mm].
+    oscillation : float
+        Range of the remaining oscillation at the end [mm].
     """
 
     outcome: str
@@ -182,9 +228,19 @@ class PushResponse(NamedTuple):
 
 @cache
 def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
-    """Push go2 as in the lesson, on the default cylinders.
+    """Push go2 on the default cylinders, as in the lesson.
 
-    kp, kd: gains of all its tasks, 1/s² and 1/s. bandwidth: Hz, of the force loops.
+    Parameters
+    ----------
+    kp, kd : float
+        Gains of all its tasks [1/s², 1/s].
+    bandwidth : float, optional
+        Bandwidth of the force loops [Hz].
+
+    Returns
+    -------
+    PushResponse
+        The response.
     """
     robot = fb.load("go2")
     state = robot.standing()

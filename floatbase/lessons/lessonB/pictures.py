@@ -1,6 +1,4 @@
-"""Lesson B, Torque is an abstraction: a cylinder on its crank, torques on the bench, how far go2
-sways, and where watts go.
-"""
+"""Lesson B: a cylinder on its crank, torques on the bench, sway of go2, and powers."""
 
 from __future__ import annotations
 
@@ -23,27 +21,33 @@ from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 BAR = 1e5  # Pa
-DRAWING_SCALE = 3.0  # times: how the crank and its cylinder are drawn
-JOINT = np.array([0.0, 0.0, 0.35])  # m: where the joint is drawn
-BEND = np.deg2rad(115.0)  # rad: from the crank to the shank, one piece of steel
+DRAWING_SCALE = 3.0  # enlargement of the crank and its cylinder
+JOINT = np.array([0.0, 0.0, 0.35])  # m: position of the joint in the picture
+BEND = np.deg2rad(115.0)  # rad: between crank and shank, which are one piece of steel
 SHANK_LENGTH = 0.35  # m
 JOINT_VIEW = View(-90.0, 4.0, 1.0, around=((0.05, 0.0, 0.55), 0.62))
 DASHES = ("-", "--", ":", "-.")
-WIDTH, HEIGHT, LEFT, GAP = (
-    620.0,
-    150.0,
-    58.0,
-    34.0,
-)  # pixels of a strip in the panel, of what is left of it and below it
-RUN_DURATION = 0.4  # s, of the panel's run
+# px: width and height of a plot in the panel, and space on its left and below it
+WIDTH, HEIGHT, LEFT, GAP = 620.0, 150.0, 58.0, 34.0
+RUN_DURATION = 0.4  # s: duration of the run in the panel
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
-    """Draw a knee's cylinder, three times as large, with its chambers A and B; as text its lever,
-    and pressures for a torque.
+    """Draw the cylinder of a knee with its chambers A and B, enlarged three times.
 
-    angle: °, of the joint from where the lever is longest; the rod goes out as it grows. torque:
-        N·m.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    angle : float
+        Angle of the joint from where the lever is longest [°]; it grows as the rod moves out.
+    torque : float
+        Torque at the joint [N·m].
+
+    Returns
+    -------
+    str
+        The lever, the possible torques, and the pressures for this torque.
     """
     bench = Bench(lambda t: (np.deg2rad(angle), 0.0))
     gamma = np.arccos(bench.crank / bench.base) + bench.angle
@@ -84,23 +88,24 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         GREYS[0],
     )
     view.draw(picture)
-    told = (
-        f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; within reach: "
+    summary = (
+        f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; possible: "
         f"{least:.0f} to {most:.0f} N·m; "
     )
     if not least <= torque <= most:
-        return f"{told}<b>{torque:.0f} N·m are more than the supply gives here</b>"
-    return f"{told}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
+        return f"{summary}<b>{torque:.0f} N·m is more than the supply allows here</b>"
+    return f"{summary}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
 
 
 def _towards(gamma: float) -> Array:
-    """The unit vector, (3,), at an angle from straight up, in the plane of the picture."""
+    """Return the unit vector, shape (3,), at an angle from straight up in the picture."""
     return np.array([np.sin(gamma), 0.0, np.cos(gamma)])
 
 
 def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
-    """Of both chambers, Pa, that make a torque, as much below the supply at one as above the tank
-    at the other.
+    """Return the pressures of both chambers for a torque [Pa].
+
+    One is as far below the supply pressure as the other is above the tank pressure.
     """
     h = bench.hydraulics
     lines, force = (
@@ -112,15 +117,28 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
 
 
 def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
-    """A lever, mm, over the joint's angle from its best, °."""
-    axis = _axes("angle of the joint from the best one [°]", "lever [mm]")
+    """Plot a lever [mm] over the joint angle relative to the angle of the longest lever [°]."""
+    axis = _axes("joint angle, relative to the longest lever [°]", "lever [mm]")
     axis.plot(angles, levers, color=hex_code(GREYS[0]), linewidth=2.0)
     axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
     return axis
 
 
 def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0) -> Axes:
-    """Torques on the bench over time; name -> rows of a run. A thin line is what was wanted."""
+    """Plot torques on the bench over time, with a thin line at the desired torque.
+
+    Parameters
+    ----------
+    runs : mapping of str to sequence of BenchSample
+        The samples of each run.
+    wanted : float, optional
+        Desired torque [N·m].
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     axis = _axes("time [ms]", "torque at the joint [N·m]")
     axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
     for i, (name, rows) in enumerate(runs.items()):
@@ -138,12 +156,21 @@ def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0
 
 
 def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
-    """How far the centre of mass has gone to the left, mm, over time from the start of each record;
-    name -> record.
+    """Plot how far the centre of mass has moved sideways, over time from the start of each record.
 
-    side: -1 for to the right.
+    Parameters
+    ----------
+    records : mapping of str to Rollout
+        The records by name.
+    side : {1.0, -1.0}, optional
+        Side that counts as positive: 1 is left, -1 is right.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
-    axis = _axes("time [s]", f"gone to the {'left' if side > 0 else 'right'} [mm]")
+    axis = _axes("time [s]", f"CoM shift to the {'left' if side > 0 else 'right'} [mm]")
     for i, (name, record) in enumerate(records.items()):
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
         axis.plot(
@@ -160,7 +187,22 @@ def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
 
 
 def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
-    """Powers over time, (n, k), W, with k names."""
+    """Plot powers over time.
+
+    Parameters
+    ----------
+    watts : array_like, shape (n, k)
+        Powers [W].
+    names : sequence of str
+        The k names.
+    step : float, optional
+        Time between two values [s].
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     axis = _axes("time [s]", "power [W]")
     watts = np.asarray(watts)
     for i, name in enumerate(names):
@@ -185,10 +227,23 @@ def _axes(x: str, y: str) -> Axes:
 
 
 def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
-    """The package's loop on the bench: 12 N·m wanted from 0 s on, and the joint turned for a while
-    from 150 ms on; as SVG.
+    """Draw the response of the force loop of floatbase on the bench.
 
-    bandwidth: Hz, of the loop. supply: bar. turning: rad/s; the rod goes out.
+    The desired torque is 12 N·m from 0 s on, and the joint turns for a while from 150 ms on.
+
+    Parameters
+    ----------
+    bandwidth : float
+        Bandwidth of the force loop [Hz].
+    supply : float
+        Supply pressure [bar].
+    turning : float
+        Angular velocity of the joint [rad/s]; the rod moves out.
+
+    Returns
+    -------
+    str
+        The drawing as SVG, and a line of text.
     """
     hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
     rows = run_force_loop(
@@ -206,11 +261,11 @@ def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
     boiling = sum(min(row.pressure_a, row.pressure_b) <= VACUUM for row in rows)
     reached = next((row.time for row in rows if abs(row.torque - 12.0) < 0.6), None)
     late = (
-        "12 N·m are not reached"
+        "12 N·m is not reached"
         if reached is None
         else f"12 N·m ± 5 % after <b>{1000 * reached:.0f} ms</b>"
     )
-    boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "no oil boils"
+    boils = f"<b>the oil boils for {boiling} ms</b>" if boiling else "the oil does not boil"
     picture = svg.drawing(drawn, WIDTH, f"0 -8 {WIDTH} {2 * HEIGHT + 2 * GAP}")
     return (
         f"{picture}<div>{late}; while it turns, {min(torques[150:]):.1f} to "
@@ -219,7 +274,7 @@ def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
 
 
 def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[float]]) -> str:
-    """Curves over the panel's time, one strip of SVG: solid and dark the last, dashed the first."""
+    """Draw two curves over the time of the panel: the first dashed, the last solid and dark."""
     right, low, high = WIDTH - 70.0, ticks[0], ticks[-1]
 
     def x(t: float) -> float:
@@ -235,7 +290,7 @@ def _strip(top: float, title: str, ticks: Array, curves: Mapping[str, Sequence[f
     for t in np.linspace(0.0, RUN_DURATION, 5):
         drawn += svg.text((x(t), top + HEIGHT + 15), f"{1000 * t:.0f} ms", 11)
     heights = [y(values[-1]) for values in curves.values()]
-    if abs(heights[0] - heights[1]) < 12.0:  # names must not lie on each other
+    if abs(heights[0] - heights[1]) < 12.0:  # names must not overlap
         up = 1.0 if heights[0] > heights[1] else -1.0
         middle = sum(heights) / 2
         heights = [middle + 7.0 * up, middle - 7.0 * up]

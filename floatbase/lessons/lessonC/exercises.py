@@ -8,12 +8,8 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import (
-    Example,
-    Exercise,
-    NumericJudge,
-    Verdict,
-)
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict
 from floatbase.lessons.lessonC.helpers import braking_qp
 from floatbase.lessons.lessonC.verdicts import judge_drop, judge_step
 from floatbase.qp import QP, active_set
@@ -25,8 +21,9 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
 def slanted_table() -> QP:
-    """The bowl and the slanted table of exercise C.1: up ≥ 0.5 along, written as a row of 0.5 along
-    - up ≤ 0.
+    """Return the bowl and the slanted table of exercise C.1.
+
+    up ≥ 0.5 along is written as 0.5 along - up ≤ 0.
     """
     H = np.diag([1.0, 4.0])
     return QP(
@@ -40,8 +37,9 @@ def slanted_table() -> QP:
 
 
 def _price() -> float:
-    """By the rate at which the least objective falls when the row is loosened: no system of
-    equations in it.
+    """Compute the multiplier as the rate of the minimum when the constraint is relaxed.
+
+    No system of equations is used.
     """
     qp = slanted_table()
     h = 1e-4
@@ -55,15 +53,17 @@ def _price() -> float:
 
 
 def _judge_guess(answer: Any) -> Verdict:
-    """One system of equations with the rows of the guess, as in the game; whether it is the optimum
-    a solver says.
+    """Judge a guess of the active constraints.
+
+    One system of equations with the guess is solved, as in the game, and the conditions for the
+    optimum are checked as a solver does.
     """
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: list the names of rows.", "no_answer")
+        return Verdict(False, "There is no answer yet. List the names of constraints.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
         return Verdict(
             False,
-            "The answer is a list of names, such as those in qp.inequality_names.",
+            "The answer must be a list of names from qp.inequality_names.",
             "no_names",
         )
     qp = braking_qp()
@@ -71,13 +71,13 @@ def _judge_guess(answer: Any) -> Verdict:
     if unknown := [name for name in names if name not in qp.inequality_names]:
         return Verdict(
             False,
-            f"There is no row {unknown[0]!r}; qp.inequality_names has all of them.",
+            f"There is no constraint {unknown[0]!r}. qp.inequality_names lists all of them.",
             "no_such_row",
         )
     if not names:
         return Verdict(
             False,
-            "With no row on, the plan pulls on the ground. Which feet does the push lift off?",
+            "With an empty list, the plan pulls on the ground. Which feet does the push lift off?",
             "no_row",
         )
     rows = [qp.inequality_names.index(name) for name in names]
@@ -85,8 +85,8 @@ def _judge_guess(answer: Any) -> Verdict:
     if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
         return Verdict(
             False,
-            "These rows depend on one another: a foot has three numbers, and no more than three "
-            "rows can be on at it.",
+            "These constraints depend on one another. The force of a foot has three components, so "
+            "at most three of its constraints can be on.",
             "dependent",
         )
     k = len(rows)
@@ -99,34 +99,37 @@ def _judge_guess(answer: Any) -> Verdict:
     if not broken and not pulls:
         return Verdict(
             True,
-            "One system of equations, and nothing to correct: a solver that begins here is done in "
-            "one round.",
+            "One system of equations, and nothing to correct. A solver that starts here needs only "
+            "one iteration.",
         )
     if not any("foot" in name for name in names):
         return Verdict(
             False,
-            "Motors are far from their limits here. What does a push do to the feet?",
+            "The motors are far from their limits here. What does a push do to the feet?",
             "motors",
         )
-    told = [f"{len(broken)} rows are broken, {_example_of(broken)}"] if broken else []
-    told += [f"{len(pulls)} of yours pull, {_example_of(pulls)}"] if pulls else []
+    faults = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
+    faults += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
     return Verdict(
         False,
-        f"With your rows on, {' and '.join(told)}. Correct the guess as the solver would, and "
-        f"check again.",
+        f"With your list, {' and '.join(faults)}. Correct the guess as the solver would, and check "
+        f"again.",
         "corrections",
     )
 
 
+def _count(names: Sequence[str]) -> str:
+    """Return the number of constraints, with the verb."""
+    return "1 constraint is" if len(names) == 1 else f"{len(names)} constraints are"
+
+
 def _example_of(names: Sequence[str]) -> str:
-    """The first of some rows, and how many more."""
+    """Return the first of some names, and whether there are more."""
     return f"such as {names[0]}" if len(names) > 1 else f"namely {names[0]}"
 
 
 def rounds_from_guess(guess: Sequence[str]) -> int:
-    """How many rounds `active_set` takes for the QP of exercise C.4 from a guess of its active
-    rows.
-    """
+    """Return how many iterations `active_set` takes for exercise C.4 from a guess."""
     return active_set(braking_qp(), working_set=tuple(guess)).solution.iterations
 
 
@@ -154,7 +157,7 @@ ROW_TO_DROP = '''def row_to_drop(W, prices):
     return W[int(np.argmin(prices))]'''
 
 
-def _steps() -> list[Example]:
+def _longest_step_examples() -> list[Example]:
     def step(
         slack: Callable[..., Any] = lambda x, G, h: np.round(h - G @ x, 9),
         counts: Callable[..., Any] = lambda room, speed: speed > 1e-6,
@@ -164,7 +167,7 @@ def _steps() -> list[Example]:
         beyond: float = 1.0,
         held: bool = True,
     ) -> Callable[..., Any]:
-        """A `longest_step` that does one thing in another way."""
+        """Return a `longest_step` that does one thing in another way."""
 
         def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
             rows = [
@@ -247,15 +250,16 @@ def _guesses() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="C.1",
-        statement="The price of the row 0.5 along - up ≤ 0 for ψ = ½(along - 2)² + ½·4 (up + 2)².",
+        statement="The multiplier (price) of the constraint 0.5 along - up ≤ 0 for ψ = ½(along "
+        "- 2)² + ½·4 (up + 2)².",
         stub="price = 8.0  # of a level table; replace this number",
         solution="W = [[0.5, -1]]\n"
         "KKT = np.block([[np.diag([1, 4]), np.transpose(W)], [np.array(W), np.zeros((1, 1))]])\n"
         "price = np.linalg.solve(KKT, [2, -8, 0])[2]",
         judge=NumericJudge(
             right=_price,
-            praise="Three equations: two say that the row balances the slope, one that the marble "
-            "lies on it.",
+            praise="Three equations: two say that the constraint force balances the gradient, "
+            "and one says that the marble lies on the table.",
             mistakes={
                 "sign": lambda: -_price(),
                 "length": lambda: _price() * np.sqrt(1.25),
@@ -267,52 +271,51 @@ EXERCISES = (
                 "distance": lambda: 3.0,
             },
             hints={
-                "sign": "The sign: with H x + g + Gᵀ μ = 0 the price of a table that pushes is "
-                "positive.",
-                "length": "That is the slope's length. A price belongs to the row as it is "
-                "written; this one has length √1.25.",
-                "level": "That is the price of a level table. Here along and up pay together.",
+                "sign": "The sign is wrong. With H x + g + Gᵀ μ = 0, the multiplier of a table "
+                "that pushes is positive.",
+                "length": "That is the magnitude of the gradient. A multiplier belongs to the "
+                "constraint as it is written, and this one has a normal of length √1.25.",
+                "level": "That is the multiplier of a level table. Here along and up both "
+                "contribute.",
                 "no_curvature": "The curvature of 4 is missing.",
                 "no_half": "The objective has a ½ before each square.",
-                "along": "That is where the marble lies along the table.",
-                "height": "That is how high the marble lies.",
-                "distance": "That is the distance by which the row is broken at the bowl's lowest "
-                "point.",
+                "along": "That is the position of the marble along the table.",
+                "height": "That is the height of the marble.",
+                "distance": "That is the violation of the constraint at the lowest point of the "
+                "bowl.",
             },
         ),
-        explanation="On the row up = 0.5 along, so ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = along, "
-        "which is least at a = -1: the "
-        "marble lies at (-1, -0.5), where the slope is (-3, 6); the row (0.5, -1) times 6 balances "
-        "it.",
+        explanation="On the constraint up = 0.5 along, ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = "
+        "along. This is smallest at a = -1, so the marble lies at (-1, -0.5). The gradient "
+        "there is (-3, 6), and 6 times the row (0.5, -1) balances it.",
     ),
     Exercise(
         name="C.2",
-        statement="`longest_step(x, p, G, h, W)`: how far from x along p, at most 1, all rows of G "
-        "x ≤ h hold, and the number "
-        "of the row that blocks, or None. Rows in the list W are held already.",
+        statement="`longest_step(x, p, G, h, W)`: the length of the step from x along p, at "
+        "most 1, for which all constraints G x ≤ h hold, and the index of the blocking "
+        "constraint, or None. The constraints in the list W hold with equality already.",
         stub=LONGEST_STEP_STUB,
         solution=LONGEST_STEP,
         judge=judge_step,
-        examples=_steps,
-        explanation="A row i leaves slack / speed of room along the step, if the step comes closer "
-        "to it at all. The least of "
-        "these lengths decides, and 1 if none is less.",
+        examples=_longest_step_examples,
+        explanation="Constraint i allows a step of length slack / speed, if the step approaches "
+        "it at all. The smallest of these lengths decides, or 1 if none is smaller.",
     ),
     Exercise(
         name="C.3",
-        statement="`row_to_drop(W, prices)`: the number of the row of W with the most negative "
-        "price, or None if no row pulls.",
+        statement="`row_to_drop(W, prices)`: the index of the constraint in W with the most "
+        "negative multiplier (price), or None if none is negative.",
         stub=ROW_TO_DROP_STUB,
         solution=ROW_TO_DROP,
         judge=judge_drop,
         examples=_drops,
-        explanation="A negative price says: ψ would fall if this row were left. The most negative "
-        "one promises the most.",
+        explanation="A negative multiplier means that ψ would decrease without this constraint. "
+        "The most negative one promises the most.",
     ),
     Exercise(
         name="C.4",
-        statement="The names of the rows that are active in go2's QP, 50 ms into a push of 120 N "
-        "forwards and to the left.",
+        statement="The names of the constraints that are active in go2's QP, 50 ms into a push "
+        "of 120 N forwards and to the left.",
         stub='guess = ["RR_foot normal force"]  # more names, or others',
         solution="guess = [\n"
         '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
@@ -320,16 +323,15 @@ EXERCISES = (
         "]",
         judge=_judge_guess,
         examples=_guesses,
-        explanation="To brake, the feet must push backwards and to the right: facets 2 and 3. The "
-        "rear right foot, which the "
-        "push relieves, carries nothing: all its three numbers are held. FL, on which go2 leans, "
-        "is free.",
+        explanation="To brake, the contact forces must point backwards and to the right: facets "
+        "2 and 3. The push relieves the rear right foot, which carries nothing, so all three "
+        "components of its force are fixed. FL, on which go2 leans, is free.",
     ),
 )
 
 
 def _price_of(curvature: Sequence[float]) -> float:
-    """The price of C.1 for another bowl, from its equations."""
+    """Return the multiplier of C.1 for another bowl, from its equations."""
     G, H = np.array([0.5, -1.0]), np.diag(curvature)
     low = np.array([2.0, -2.0])
     return float(G @ low / (G @ np.linalg.solve(H, G)))

@@ -1,6 +1,4 @@
-"""Lesson C, How a QP solver thinks: problems in the plane, Beale's corner, and a controller whose
-solver is the learner's.
-"""
+"""Lesson C: problems in the plane, Beale's problem, and controllers with the learner's solver."""
 
 from __future__ import annotations
 
@@ -23,11 +21,23 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
 def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> fb.QP:
-    """The course text's table: min ½ Σ curvature (x - minimum)² in the plane x = (along, up),
-    subject to up ≥ 0.
+    """Return the table of the course text: a bowl above a level table, in the plane (along, up).
 
-    With the minimum above the table the row "table" is inactive and might not be there; with the
-    minimum below it the row is active and might be an equality.
+    The QP minimises ½ Σ curvature (x - minimum)² subject to up ≥ 0. If the minimum is above the
+    table, the constraint "table" is inactive and could be left out. If it is below, the constraint
+    is active and could be an equality constraint.
+
+    Parameters
+    ----------
+    minimum : array_like, shape (2,), optional
+        Lowest point of the bowl [m].
+    curvature : array_like, shape (2,), optional
+        Curvature along both axes.
+
+    Returns
+    -------
+    QP
+        The problem.
     """
     centre = as_array("minimum", minimum, (2,), "m")
     H = np.diag(as_array("curvature", curvature, (2,)))
@@ -38,10 +48,22 @@ def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (
 def corner_table(
     minimum: npt.ArrayLike = (-1.5, -1.5), curvature: npt.ArrayLike = (1.0, 0.5)
 ) -> fb.QP:
-    """The course text's table with three walls: a bowl with its lowest point at `minimum`, in the
-    plane (along, up).
+    """Return the table of the course text with three walls, in the plane (along, up).
 
-    Rows: table up ≥ 0, ramp along - 3 up ≤ 2, roof 2 along + 3 up ≤ 2, wall along ≥ -3.
+    The constraints are table up ≥ 0, ramp along - 3 up ≤ 2, roof 2 along + 3 up ≤ 2, and wall along
+    ≥ -3.
+
+    Parameters
+    ----------
+    minimum : array_like, shape (2,), optional
+        Lowest point of the bowl.
+    curvature : array_like, shape (2,), optional
+        Curvature along both axes.
+
+    Returns
+    -------
+    QP
+        The problem.
     """
     H = np.diag(as_array("curvature", curvature, (2,)))
     G, h = (
@@ -59,8 +81,9 @@ def corner_table(
 
 
 def hexagon_table() -> fb.QP:
-    """A table with six edges seen from above, 2 from its middle, and a long, slanting bowl that is
-    lowest at (1, 3.9).
+    """Return a hexagonal table, seen from above, with a long slanting bowl.
+
+    Each edge is at a distance of 2 from the middle. The bowl is lowest at (1, 3.9).
     """
     angles = np.pi / 3 * np.arange(6) + np.pi / 6
     axes = rotation_z(np.deg2rad(15.0))[:2, :2]
@@ -71,11 +94,21 @@ def hexagon_table() -> fb.QP:
 
 
 def beale_problem(curvature: float = 0.1) -> fb.QP:
-    """Beale's problem, on which careless rules go round for ever, with a little curvature: 4
-    variables, 7 rows.
+    """Return Beale's problem with a little curvature: 4 variables and 7 inequality constraints.
 
-    Six of the rows meet in the point 0, where it begins. Source: E. M. L. Beale, Cycling in the
-    dual simplex algorithm, Naval Research Logistics Quarterly 2 (1955).
+    On this problem, careless pivoting rules cycle for ever. Six of the constraints meet at the
+    origin, where the solver starts. Source: E. M. L. Beale, Cycling in the dual simplex algorithm,
+    Naval Research Logistics Quarterly 2 (1955).
+
+    Parameters
+    ----------
+    curvature : float, optional
+        Curvature of the objective in all directions.
+
+    Returns
+    -------
+    QP
+        The problem.
     """
     rows = [[0.25, -60.0, -0.04, 9.0], [0.5, -90.0, -0.02, 3.0], [0.0, 0.0, 1.0, 0.0], *-np.eye(4)]
     g = np.array([-0.75, 150.0, -0.02, 6.0])
@@ -90,11 +123,19 @@ def beale_problem(curvature: float = 0.1) -> fb.QP:
 
 
 class LimitedActiveSet:
-    """A solver for `SolverController`: the package's `active_set`, stopped after so many rounds,
-    from nothing or from the tick before.
+    """Solver for `SolverController`: `active_set`, stopped after a number of iterations.
 
-    max_rounds: rounds in a tick. warm: whether it begins with the rows on which the tick before
-        ended. runs: of all ticks.
+    Parameters
+    ----------
+    max_rounds : int
+        Largest number of iterations per control step.
+    warm : bool
+        Whether to start with the working set at the end of the last control step.
+
+    Attributes
+    ----------
+    runs : list of ActiveSetRun
+        The runs of all control steps.
     """
 
     def __init__(self, max_rounds: int, warm: bool):
@@ -102,23 +143,40 @@ class LimitedActiveSet:
         self.runs: list[ActiveSetRun] = []
 
     def __call__(self, qp: fb.QP) -> Array:
-        """x of one tick, shape (n,)."""
+        """Return x of one control step, shape (n,)."""
         working: Sequence[str] = self.runs[-1].working_set if self.warm and self.runs else ()
         self.runs.append(active_set(qp, working_set=working, max_iterations=self.max_rounds))
         return self.runs[-1].solution.x
 
 
 def standing_controller() -> fb.WholeBodyController:
-    """go2 that stands, as in lesson 07: 42 variables, 30 equalities, 44 inequalities."""
+    """Return the standing controller of go2 from lesson 07.
+
+    Its QP has 42 variables, 30 equality and 44 inequality constraints.
+    """
     return lesson07.make_controller()
 
 
 def run_with_push(
     controller: Controller, newtons: float, duration: float = 0.6, towards: float = 90.0
 ) -> Rollout:
-    """The record of go2 on the physics, pushed at the base from 0.05 to 0.15 s.
+    """Simulate go2 with a push at the base from 0.05 to 0.15 s.
 
-    newtons: how hard. duration: s, of the record. towards: degrees, 0 forwards, 90 to its left.
+    Parameters
+    ----------
+    controller : callable
+        Controller of go2.
+    newtons : float
+        Force of the push [N].
+    duration : float, optional
+        Duration of the record [s].
+    towards : float, optional
+        Direction of the push [°]: 0 is forwards, 90 to the left.
+
+    Returns
+    -------
+    Rollout
+        The record.
     """
     angle = np.deg2rad(towards)
     direction = np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -127,18 +185,35 @@ def run_with_push(
 
 @cache
 def braking_qp() -> fb.QP:
-    """The QP of exercise C.4: 50 ms into a push of 120 N forwards and to the left."""
+    """Return the QP of exercise C.4: 50 ms into a push of 120 N forwards and to the left."""
     controller = standing_controller()
     return controller.qp(run_with_push(controller, 120.0, 0.101, 45.0).state(100))
 
 
 def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
-    """Where the marble lies when every row repels it, ψ - t Σ log(h - G x), for each softness t:
-    Newton's method, damped.
+    """Return points on the central path of a QP, as interior-point methods follow it.
 
-    start: (n,), inside all rows. softness: (k,), from soft to hard, each begun where the last
-        ended. This is the central path
-    of interior-point methods. Source: Boyd and Vandenberghe, Convex Optimization, ch. 11.2.
+    Each point minimises ψ - t Σ log(h - G x): every inequality constraint repels the marble with
+    softness t. Newton's method with damping finds it. Source: Boyd and Vandenberghe, Convex
+    Optimization, ch. 11.2.
+
+    Parameters
+    ----------
+    qp : QP
+        The problem.
+    start : array_like, shape (n,)
+        Strictly feasible starting point.
+    softness : array_like, shape (k,)
+        Values of t, from soft to hard. Each point starts from the one before.
+
+    Returns
+    -------
+    list of ndarray, shape (n,)
+        The points.
+
+    Notes
+    -----
+    [Boyd2004]_.
     """
     x, points = as_array("start", start, (qp.n,)), []
     for t in as_array("softness", softness, (None,)):
@@ -155,21 +230,55 @@ def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> li
 
 
 def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
-    """The answer to an exercise if it is right; `otherwise` if it is not, and a line that says so.
-    Counts no try.
+    """Return the answer to an exercise if it is right, or else a default; print which one it is.
+
+    This does not count as a try.
+
+    Parameters
+    ----------
+    name : str
+        Name of the exercise.
+    answer : object
+        The answer.
+    otherwise : object
+        The default.
+
+    Returns
+    -------
+    object
+        `answer` or `otherwise`.
     """
     if all_exercises()[name].judge(answer).right:
-        print(f"{name}: the lesson goes on with yours.")
+        print(f"{name}: the lesson continues with your answer.")
         return answer
-    print(f"{name}: not yet right; the lesson goes on with the package's.")
+    print(f"{name}: not right yet; the lesson continues with the solution of floatbase.")
     return otherwise
 
 
 def longest_step(
     x: Array, p: Array, G: Array, h: Array, W: Sequence[int]
 ) -> tuple[float, int | None]:
-    """The solution of exercise C.2: how far from x along p, at most 1, all rows hold, and the first
-    row in the way, or None.
+    """Return the longest feasible step from x along p, and the constraint that blocks it.
+
+    This is the solution of exercise C.2.
+
+    Parameters
+    ----------
+    x, p : ndarray, shape (n,)
+        Point and direction.
+    G : ndarray, shape (m, n)
+        Matrix of the inequality constraints G x ≤ h.
+    h : ndarray, shape (m,)
+        Their right-hand side.
+    W : sequence of int
+        Indices of the constraints in the working set, which cannot block.
+
+    Returns
+    -------
+    float
+        Length of the step, at most 1 [-].
+    int or None
+        Index of the first blocking constraint.
     """
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
@@ -180,7 +289,22 @@ def longest_step(
 
 
 def row_to_drop(W: Sequence[int], prices: Array) -> int | None:
-    """The solution of exercise C.3: the row of W with the most negative price, or None."""
+    """Return the constraint in W with the most negative multiplier, or None if none is negative.
+
+    This is the solution of exercise C.3.
+
+    Parameters
+    ----------
+    W : sequence of int
+        Indices of the constraints in the working set.
+    prices : ndarray, shape (len(W),)
+        Their multipliers.
+
+    Returns
+    -------
+    int or None
+        Index of the constraint.
+    """
     if len(W) == 0 or min(prices) > -1e-9:
         return None
     return int(W[int(np.argmin(prices))])

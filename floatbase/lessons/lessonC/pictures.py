@@ -1,6 +1,4 @@
-"""Lesson C, How a QP solver thinks: the table, a game of rows on and off, the way of a solver,
-rounds and slacks.
-"""
+"""Lesson C: the table, a game of active sets, the path of a solver, and its iterations."""
 
 from __future__ import annotations
 
@@ -28,24 +26,26 @@ from floatbase.qp import QP
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
-_BESIDE = (-4.2, 3.4, -2.3, 3.2)  # what is seen of the table and its walls
+_BESIDE = (-4.2, 3.4, -2.3, 3.2)  # visible range of the table and its walls
 _COLOURS = 48
-_NEAR = 1e-9  # a row broken by less, or a price less negative, is right but for rounding
-PUZZLES = (
-    (0.5, -1.0),
-    (2.5, 2.0),
-    (-4.0, 1.5),
-    (-1.5, -1.5),
-    (-4.0, -1.0),
-)  # lowest points of the bowls to be played
+_NEAR = 1e-9  # rounding: smaller violations and less negative multipliers count as zero
+# lowest points of the bowls in the game
+PUZZLES = ((0.5, -1.0), (2.5, 2.0), (-4.0, 1.5), (-1.5, -1.5), (-4.0, -1.0))
 _STYLES = ("-", "--", ":")
 
 
 def show_table(lowest: float) -> str:
-    """The course text's table and a bowl with its lowest point so far above it: where the marble
-    rests and what the row costs.
+    """Draw the table of the course text and a bowl, with the marble and the multiplier.
 
-    lowest: m, negative below the table. Returns HTML.
+    Parameters
+    ----------
+    lowest : float
+        Height of the bowl's lowest point above the table [m]; negative below it.
+
+    Returns
+    -------
+    str
+        The picture as HTML.
     """
     qp = table_top((0.5, lowest), (1.0, 2.0))
     solution = fb.solve(qp)
@@ -54,21 +54,35 @@ def show_table(lowest: float) -> str:
     axis.plot(0.5, lowest, "x", color=GREYS[1], markersize=9)
     rests = "rests on the table" if solution.x[1] < _NEAR else "does not touch the table"
     return (
-        _image(axis) + f"<div>the marble {rests}; price of the row: <b>{rounded(price)}</b></div>"
+        _image(axis)
+        + f"<div>the marble {rests}; multiplier of the constraint: <b>{rounded(price)}</b></div>"
     )
 
 
 class ActiveSetGame(widgets.VBox):
-    """A QP in the plane to be solved by hand: a button for each row, which is on or off, and one
-    for the next bowl.
+    """Game in which you solve a QP in the plane by hand.
 
-    Each click solves one linear system, that of the rows which are on. `working` lists their names,
-    `clicks` counts, `solved` says whether the present point is the optimum.
+    There is a button for each constraint, which switches it on or off, and one for the next bowl.
+    Each click solves one linear system with the constraints that are on.
+
+    Parameters
+    ----------
+    puzzles : sequence of tuple of float, optional
+        Lowest points of the bowls.
+
+    Attributes
+    ----------
+    working : tuple of str
+        Names of the constraints that are on.
+    clicks : int
+        Number of clicks.
+    solved : bool
+        Whether the present point is the optimum.
     """
 
     def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
         self._puzzles, self._at = tuple(puzzles), 0
-        self._picture, self._told = widgets.HTML(), widgets.HTML()
+        self._picture, self._message = widgets.HTML(), widgets.HTML()
         self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
         self.next = widgets.Button(
             description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto")
@@ -77,18 +91,18 @@ class ActiveSetGame(widgets.VBox):
         buttons = widgets.HBox(
             [*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap")
         )
-        super().__init__([self._picture, buttons, self._told])
+        super().__init__([self._picture, buttons, self._message])
         self._start_puzzle()
 
     @property
     def qp(self) -> QP:
-        """The problem that is being played."""
+        """The QP of the present bowl."""
         return corner_table(self._puzzles[self._at])
 
     @property
     def message(self) -> str:
-        """What the game says about the rows that are on, HTML."""
-        return str(self._told.value)
+        """Comment on the constraints that are on, as HTML."""
+        return str(self._message.value)
 
     def _button(self, name: str) -> widgets.Button:
         made = widgets.Button(description=name, layout=widgets.Layout(width="8em", flex="0 0 auto"))
@@ -116,8 +130,9 @@ class ActiveSetGame(widgets.VBox):
         )
 
     def _site_bundle(self) -> dict[str, Any]:
-        """For a site: what every set of rows shows, in every bowl. The game is left at its
-        beginning.
+        """Return the mimebundle for a static page: every set of constraints with every bowl.
+
+        The game is reset.
         """
         bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
         pack = static_export.StaticExport([], words="In the live lesson the clicks are counted.")
@@ -132,7 +147,7 @@ class ActiveSetGame(widgets.VBox):
         return pack.bundle([static_export.Control("bowl", bowls, 0, kind="choice"), *rows])
 
     def _current_view(self) -> tuple[str, list[str]]:
-        """The picture of the rows that are on, HTML, and what is wrong with them."""
+        """Return the picture as HTML, and what is wrong with the constraints that are on."""
         x, faults = check_active_set(self.qp, self.working)
         axis = _flat_axis(self.qp, _BESIDE, self.working, x)
         axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)
@@ -146,7 +161,7 @@ class ActiveSetGame(widgets.VBox):
         self._picture.value, faults = self._current_view()
         self.solved = not faults
         clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
-        self._told.value = (
+        self._message.value = (
             f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_describe_faults(faults)}"
         )
 
@@ -155,32 +170,43 @@ def _describe_faults(faults: Sequence[str]) -> str:
     return (
         "; ".join(faults)
         if faults
-        else "<b>solved</b>: no row is broken, and none that is on pulls"
+        else "<b>solved</b>: every constraint is satisfied, and no multiplier is negative"
     )
 
 
 def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
-    """The least point on the rows of `working`, shape (n,), and in words what is wrong with it;
-    nothing at the optimum.
+    """Find the minimum with some constraints as equalities, and say what is wrong with it.
 
-    None where these rows have no point in common, or depend on one another.
+    Parameters
+    ----------
+    qp : QP
+        The problem.
+    working : sequence of str
+        Names of the constraints.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        The minimum; None if the constraints have no common point or depend on one another.
+    list of str
+        What is wrong; empty at the optimum.
     """
     rows = [qp.inequality_names.index(name) for name in working]
     G, k = qp.G[rows], len(rows)
     if k and np.linalg.matrix_rank(G) < k:
-        return None, [f"{' and '.join(working)}: these lines have no point, or too many, in common"]
+        return None, [f"{' and '.join(working)}: no point in common, or dependent on one another"]
     found = np.linalg.solve(
         np.block([[qp.H, G.T], [G, np.zeros((k, k))]]), np.concatenate([-qp.g, qp.h[rows]])
     )
     x, prices = found[: qp.n], found[qp.n :]
     over = qp.G @ x - qp.h
     broken = [
-        f"{name} is broken by {rounded(d)}"
+        f"{name} is violated by {rounded(d)}"
         for name, d in zip(qp.inequality_names, over, strict=True)
         if d > _NEAR
     ]
     pulls = [
-        f"{name} pulls: its price is {rounded(p)}"
+        f"{name} pulls: its multiplier is {rounded(p)}"
         for name, p in zip(working, prices, strict=True)
         if p < -_NEAR
     ]
@@ -188,17 +214,26 @@ def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list
 
 
 def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
-    """A problem in the plane, with a solver's start as a dot."""
+    """Plot a problem in the plane, with the start of a solver as a dot."""
     return qp_plots.plot(qp, _hexagon_example(), point=start)
 
 
 def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
-    """The way of a solver in the plane after so many rounds, as HTML; in words the rows that are
-    on, and the objective.
+    """Draw the path of a solver in the plane after some iterations.
 
-    ways: after each round, beginning with none, the point, shape (2,), and the rows that are on.
-        rounds: between whole numbers
-    the point is under way.
+    Parameters
+    ----------
+    qp : QP
+        The problem.
+    ways : sequence of tuple
+        For each iteration, starting with none: the point, shape (2,), and the working set.
+    rounds : float
+        Number of iterations; between integers, the point is on the way.
+
+    Returns
+    -------
+    str
+        The picture, the working set and the objective, as HTML.
     """
     whole = min(int(rounds), len(ways) - 1)
     x, W = ways[whole]
@@ -209,14 +244,25 @@ def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds
     passed = [point for point, _ in ways[: whole + 1]]
     axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
     return (
-        _image(axis) + f"<div>on: {', '.join(names) or 'no row'}; objective "
+        _image(axis) + f"<div>on: {', '.join(names) or 'no constraint'}; objective "
         f"{rounded(qp.objective(x), digits=3)}</div>"
     )
 
 
 def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
-    """Numbers round by round. curves: name -> (n,) numbers, one before the first round and one
-    after each. label: of them.
+    """Plot numbers over the iterations.
+
+    Parameters
+    ----------
+    curves : mapping of str to array_like, shape (n,)
+        For each name: a number before the first iteration and one after each.
+    label : str
+        Label of the vertical axis.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for (name, numbers), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
@@ -228,7 +274,7 @@ def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
             label=name,
             linewidth=2,
         )
-    ax.set(xlabel="rounds", ylabel=label)
+    ax.set(xlabel="iterations", ylabel=label)
     ax.grid(alpha=0.3)
     ax.legend()
     plt.close(figure)
@@ -242,19 +288,16 @@ def _hexagon_example() -> tuple[float, float, float, float]:
 def _flat_axis(
     qp: QP, box: tuple[float, float, float, float], working: Sequence[str], x: Array | None
 ) -> Axes:
-    """A picture of a problem on a small figure of its own, which pyplot does not know and need not
-    close.
-    """
+    """Plot a problem on its own small figure, which pyplot does not manage."""
     figure = Figure(figsize=(4.6, 3.8), dpi=80)
     FigureCanvasAgg(figure)
-    axis = figure.add_axes(
-        (0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2)
-    )  # few: they take most of the time
+    # few ticks, since they take most of the time
+    axis = figure.add_axes((0.07, 0.07, 0.91, 0.91), xticks=(-2, 0, 2), yticks=(-2, 0, 2))
     return qp_plots.plot(qp, box, working, x, axis)
 
 
 def _image(axis: Axes) -> str:
-    """The figure of an axis as HTML; few colours make it a third as large."""
+    """Return the figure of an axis as HTML; few colours save two thirds of the size."""
     canvas, data = FigureCanvasAgg(axis.figure), io.BytesIO()  # type: ignore[arg-type]
     canvas.draw()
     Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(_COLOURS).save(

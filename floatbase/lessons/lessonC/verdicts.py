@@ -1,4 +1,4 @@
-"""Lesson C, How a QP solver thinks: what is said of a learner's parts of a solver."""
+"""Judges of lesson C for functions of a learner's solver."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from floatbase.lessons.exercises import Verdict, function_or_verdict
+from floatbase.lessons.judges import Verdict, function_or_verdict
 
-_CLOSE = 1e-6  # of lengths, which are between 0 and 1
+_CLOSE = 1e-6  # tolerance of lengths, which are between 0 and 1
 
 
 # C.2 ----------------------------------------------------------------------------------------------
@@ -19,9 +19,7 @@ _CLOSE = 1e-6  # of lengths, which are between 0 and 1
 
 @dataclass(frozen=True)
 class _StepCase:
-    """A step in the plane, whose answer is known from how it was made, and what is said of a
-    function that misses it.
-    """
+    """Step in the plane with a known answer, and the comment on a function that misses it."""
 
     hint: str  # its name
     text: str
@@ -34,64 +32,66 @@ class _StepCase:
 
 _STEP_CASES = (
     _StepCase(
-        "free", "Nothing is in the way here: 1, to arrive, and None.",
+        "free", "Nothing blocks here: return 1, the full step, and None.",
         (1, 0), [[1, 0], [0, 1]], [2, 2], [], (1.0, None),
     ),
     _StepCase(
-        "halfway", "A row is in the way halfway: where it holds with equality, slack = length · "
-                   "speed.",
+        "halfway", "A constraint blocks halfway. Where it holds with equality, slack = length · "
+        "speed.",
         (2, 0), [[0, 1], [1, 0]], [5, 1], [], (0.5, 1),
     ),
     _StepCase(
-        "away", "A row that the step moves away from (speed < 0) is never in the way.",
+        "away", "A constraint that the step moves away from (speed < 0) never blocks.",
         (1, 1), [[-1, 0], [0, -1]], [0.5, 0.25], [], (1.0, None),
     ),
     _StepCase(
-        "along", "A row along which the step runs (speed 0) is never in the way, and nothing can "
-                 "be divided by its speed.",
+        "along", "A constraint that the step is parallel to (speed 0) never blocks, and you "
+        "must not divide by its speed.",
         (1, 0), [[0, 1], [0, -1]], [0, 0], [], (1.0, None),
     ),
     _StepCase(
-        "nearest", "Two rows are in the way: the step must end at the first that it meets.",
+        "nearest", "Two constraints block. The step must end at the first one.",
         (4, 0), [[1, 0], [2, 0], [1, 0]], [3, 2, 2.5], [], (0.25, 1),
     ),
     _StepCase(
         "soonest",
-        "Here two rows are in the way at different speeds: it is not the slack alone that counts, "
-        "but how soon it is used up.",
+        "Here two constraints block at different speeds. The slack alone does not decide, but "
+        "how soon it is used up.",
         (2, 2), [[1, 0], [3, 3]], [1, 3], [], (0.25, 1),
     ),
     _StepCase(
-        "held", "A row of W is held already, and rounding must not let it block.",
+        "held", "A constraint in W holds with equality already, and rounding must not let it "
+        "block.",
         (1, 0), [[1, 1e-8], [1, 0]], [0, 0.5], [0], (0.5, 1),
     ),
     _StepCase(
         "touches",
-        "The point touches a row that is not in W and would cross it: then the step has length 0, "
-        "and that row blocks.",
+        "The point touches a constraint that is not in W, and the step would violate it. Then "
+        "the step has length 0, and this constraint blocks.",
         (1, 0), [[0, 1], [1, 0]], [1, 0], [], (0.0, 1),
     ),
     _StepCase(
-        "beyond", "The row lies beyond the end of the step: length 1, and nothing blocks.",
+        "beyond", "The constraint is beyond the end of the step, so the length is 1 and nothing "
+        "blocks.",
         (1, 0), [[1, 0]], [1.5], [], (1.0, None),
     ),
     _StepCase(
         "slack_rounding",
-        "Slacks of 1e-13 and 0 are the same but for rounding: take np.round(slack, 9), and of "
-        "equal rows the first.",
+        "Slacks of 1e-13 and 0 are the same except for rounding. Use np.round(slack, 9), and of "
+        "equal constraints the first.",
         (1, 0), [[1, 0], [1, 0]], [1e-13, 0], [], (0.0, 0),
     ),
     _StepCase(
         "speed_rounding",
-        "A speed of 1e-7 is zero and rounding: such a row is not in the way. Let 1e-6 be the "
-        "limit.",
+        "A speed of 1e-7 is zero except for rounding, so this constraint does not block. Use "
+        "1e-6 as the limit.",
         (1, 0), [[1e-7, 1]], [0], [], (1.0, None),
     ),
 )  # fmt: skip
 
 
 def judge_step(answer: Any) -> Verdict:
-    """A function that returns the longest step of exercise C.2, tried on cases."""
+    """Judge a function that returns the longest step of exercise C.2, on test cases."""
 
     def one(way: _StepCase) -> Verdict | None:
         for origin in (
@@ -104,29 +104,31 @@ def judge_step(answer: Any) -> Verdict:
             if not isinstance(given, tuple) or len(given) != 2:
                 return Verdict(
                     False,
-                    "Return two things: the length, and the number of the row or None.",
+                    "Return two things: the length, and the index of the constraint or None.",
                     "not_two",
                 )
             length, row = given
             if not isinstance(length, int | float | np.number) or not np.isfinite(length):
-                told = (
-                    f"The length is {length!r}; it should be a number from 0 to 1. Was it "
-                    f"divided by a speed of zero?"
+                text = (
+                    f"The length is {length!r}, but it must be a number from 0 to 1. Did you "
+                    f"divide by a speed of zero?"
                 )
-                return Verdict(False, told, "no_length")
+                return Verdict(False, text, "no_length")
             if length < 0:
                 return Verdict(
                     False, f"A length is negative ({length:.2g}). {way.text}", "negative"
                 )
             if row is not None and not isinstance(row, int | np.integer):
                 return Verdict(
-                    False, f"The row is {row!r}; it should be its number in G, or None.", "no_row"
+                    False,
+                    f"The constraint is {row!r}, but it must be an index in G or None.",
+                    "no_row",
                 )
             right, blocks = way.answer
             if abs(length - right) > _CLOSE or row != blocks:
                 if row is not None and row in way.W:
                     return Verdict(
-                        False, f"Row {row} is in W and must not block. {way.text}", "held"
+                        False, f"Constraint {row} is in W and must not block. {way.text}", "held"
                     )
                 if np.any(origin):
                     return Verdict(
@@ -138,12 +140,12 @@ def judge_step(answer: Any) -> Verdict:
     return _tried(
         answer,
         [partial(one, way) for way in _STEP_CASES],
-        "As far as all rows hold, and no further.",
+        "The step goes as far as all constraints allow, and no further.",
     )
 
 
 def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: str) -> Verdict:
-    """Run cases of a learner's function; the first that has something to say decides."""
+    """Run test cases of a learner's function; the first verdict decides."""
     program = function_or_verdict(answer)
     if isinstance(program, Verdict):
         return program
@@ -165,9 +167,7 @@ def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: s
 
 @dataclass(frozen=True)
 class _Drop:
-    """Rows that are on and their prices, and what is said of a function that does not drop the
-    right one.
-    """
+    """Working set with its multipliers, and the comment on a function that drops another row."""
 
     hint: str  # its name
     text: str
@@ -179,36 +179,37 @@ class _Drop:
 _DROP_CASES = (
     _Drop(
         "pulls",
-        "One row pulls (its price is negative): that one has to go.",
+        "One constraint pulls (its multiplier is negative) and must be dropped.",
         [5, 3, 8],
         [2.0, -0.5, 1.0],
         3,
     ),
     _Drop(
         "pushes",
-        "No price is negative here: every row pushes, and none leaves.",
+        "No multiplier is negative here: every constraint pushes, and none must be dropped.",
         [4, 2],
         [1.0, 0.5],
         None,
     ),
-    _Drop("empty", "W may be empty: then there is nothing to drop.", [], [], None),
+    _Drop("empty", "W may be empty. Then there is nothing to drop.", [], [], None),
     _Drop(
         "most_negative",
-        "Two rows pull: drop the one with the most negative price.",
+        "Two constraints pull. Drop the one with the most negative multiplier.",
         [5, 3, 8],
         [-0.5, 1.0, -2.0],
         8,
     ),
     _Drop(
         "negative_alone",
-        "Only a negative price counts, however large another one is.",
+        "Only a negative multiplier counts, however large another one is.",
         [1, 6],
         [9.0, -0.1],
         6,
     ),
     _Drop(
         "rounding",
-        "-1e-14 is zero and rounding: such a row is not dropped. Say, below -1e-9.",
+        "-1e-14 is zero except for rounding, so this constraint is not dropped. Use -1e-9 as "
+        "the limit.",
         [1, 6],
         [3.0, -1e-14],
         None,
@@ -217,23 +218,27 @@ _DROP_CASES = (
 
 
 def judge_drop(answer: Any) -> Verdict:
-    """A function that returns the row to drop of exercise C.3, tried on cases."""
+    """Judge a function that returns the constraint to drop of exercise C.3, on test cases."""
 
     def one(drop: _Drop) -> Verdict | None:
         given = answer(list(drop.W), np.array(drop.prices))
         if given is not None and not isinstance(given, int | np.integer):
             return Verdict(
                 False,
-                f"The answer is {given!r}; it should be a row's number in G, or None.",
+                f"The answer is {given!r}, but it must be an index in G or None.",
                 "no_number",
             )
         if given is not None and given not in drop.W:
             return Verdict(
-                False, "Give the row's number in G, which stands in W, not its place in W.", "place"
+                False,
+                "Return the entry of W, which is an index in G, not its position in W.",
+                "place",
             )
         return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
 
     cases = [partial(one, drop) for drop in _DROP_CASES]
     return _tried(
-        answer, cases, "A row may push, never pull: that is the whole test of an optimum."
+        answer,
+        cases,
+        "A constraint may push, but never pull. That is the whole test for an optimum.",
     )

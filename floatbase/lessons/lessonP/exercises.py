@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.lessons.exercises import Example, Exercise, NumericJudge, Verdict, array_or_verdict
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
 from floatbase.lessons.lessonP.helpers import (
     BAG_MASS,
     HIDDEN_MASS,
@@ -19,21 +19,21 @@ from floatbase.lessons.lessonP.helpers import (
 )
 
 G = 9.81  # m/s²
-MAX_SAG, MIN_SAG = 10.0, 9.0  # mm that it may sink, and must: less is stiffer than was asked for
+MAX_SAG, MIN_SAG = 10.0, 9.0  # mm: largest and smallest sag; less is stiffer than requested
 ROUNDING = 0.05  # mm
-MAX_KP = 1e5  # 1/s², that a judge still tries on physics
-MISTAKE_TOLERANCE = 0.01  # of a mistake's value
-TIME_ON_TWO_FEET = 1.0  # s on two feet
-HEIGHT = 1e-4  # m: less counts as none
+MAX_KP = 1e5  # 1/s²: the largest kp that is simulated
+MISTAKE_TOLERANCE = 0.01  # fraction of a mistake's value
+TIME_ON_TWO_FEET = 1.0  # s: required time on two feet
+HEIGHT = 1e-4  # m: smaller changes of height count as zero
 
 
 def _load() -> float:
-    """The bag as a part of the robot's mass."""
+    """Return the bag as a fraction of the robot's mass."""
     return BAG_MASS / fb.load("go2").mass
 
 
 def _stiffness_slips() -> dict[str, float]:
-    """Name of a hint -> the kp that this kind of mistake leads to."""
+    """Return for each hint the kp of this mistake."""
     right, ratio, mass = _load() * G / (MAX_SAG / 1e3), _load(), fb.load("go2").mass
     return {
         "robot_too": right * (1.0 + ratio) / ratio,
@@ -47,24 +47,22 @@ def _stiffness_slips() -> dict[str, float]:
 
 
 _STIFFNESS = {
-    "robot_too": "That carries the robot and the bag; it knows its own weight. Only what it does "
-    "not know makes it sink.",
-    "robot_alone": "That would be for the robot's own weight. Only the bag is not known.",
-    "metres": "Metres: 10 mm are 0.01 m, and kp is for metres.",
-    "newtons": "Newtons: kp is an acceleration for each metre, 1/s²; divide by the mass that the "
-    "controller believes.",
-    "true_mass": "The controller plans forces for the mass that it believes, the smaller one: "
-    "divide by that.",
-    "damping": "That looks like kd = 2 √kp, which acts on velocities; at rest there are none.",
-    "no_g": "Without g that is no acceleration.",
+    "robot_too": "That carries the robot and the bag. But the controller knows the weight of "
+    "the robot. Only the unknown weight makes it sink.",
+    "robot_alone": "That would be for the weight of the robot. Only the bag is unknown.",
+    "metres": "Use metres: 10 mm is 0.01 m, and kp is per metre.",
+    "newtons": "This is in newtons. kp is an acceleration per metre, 1/s², so divide by the "
+    "mass that the controller assumes.",
+    "true_mass": "The controller plans forces for the mass that it assumes, the smaller one. "
+    "Divide by that mass.",
+    "damping": "That looks like kd = 2 √kp, which acts on velocities. At rest they are zero.",
+    "no_g": "Without g, that is not an acceleration.",
 }
 
 
-def _judge_stiffness(answer: Any) -> Verdict:
-    """Physics decides: go2 with the bag, and this kp."""
-    given = array_or_verdict(answer, ())
-    if isinstance(given, Verdict):
-        return given
+@array_judge(())
+def _judge_stiffness(given: Array) -> Verdict:
+    """Judge a kp by a simulation of go2 with the bag."""
     kp = float(given)
     if kp <= 0.0:
         return Verdict(False, "A spring that pulls back needs kp > 0.", "not_above_zero")
@@ -74,30 +72,30 @@ def _judge_stiffness(answer: Any) -> Verdict:
     if kp > MAX_KP:
         return Verdict(
             False,
-            "No motor follows that: the controller looks at the robot only every 4 ms.",
+            "No motor can follow that: the control period is 4 ms.",
             "too_stiff",
         )
     below = 1e3 * com_sag(kp)
     if not np.isfinite(below):
-        return Verdict(False, "So soft that the robot sinks to the ground.", "ground")
+        return Verdict(False, "This is so soft that the robot sinks to the ground.", "ground")
     if below > MAX_SAG + ROUNDING:
-        return Verdict(False, f"On physics it sinks by {below:.1f} mm: too soft.", "soft")
+        return Verdict(False, f"In simulation the robot sinks by {below:.1f} mm: too soft.", "soft")
     if below < MIN_SAG:
         return Verdict(
             False,
-            f"On physics it sinks by {below:.1f} mm only: softer would do, and is kinder to "
-            f"motors.",
+            f"In simulation the robot sinks by only {below:.1f} mm. A softer spring is enough and "
+            f"better for the motors.",
             "hard",
         )
     return Verdict(
         True,
-        f"On physics it sinks by {below:.1f} mm. (A kp does not weigh: the bag is still not "
-        f"known.)",
+        f"In simulation the robot sinks by {below:.1f} mm. (A kp does not weigh the bag, whose "
+        f"mass is still unknown.)",
     )
 
 
 def _corners() -> tuple[Array, dict[str, Array]]:
-    """The centre of mass and the feet, each seen from above, (2,) m."""
+    """Return the centre of mass and the feet from above, shape (2,) [m]."""
     state = fb.load("go2").standing()
     contacts = fb.Contacts.feet(state.robot)
     return state.com[:2], {
@@ -107,8 +105,9 @@ def _corners() -> tuple[Array, dict[str, Array]]:
 
 
 def _nearest(first: str = "FL_foot", second: str = "RR_foot") -> Array:
-    """The way from the centre of mass to the nearest point of a line through two feet, (3,) m:
-    least squares along the line.
+    """Return the shift of the centre of mass to the line through two feet, shape (3,) [m].
+
+    The nearest point is found by least squares along the line.
     """
     com, feet = _corners()
     line = feet[second] - feet[first]
@@ -143,33 +142,34 @@ _SHIFT = NumericJudge(
         "direction": lambda: np.append(_unit_line(), 0.0),
     },
     hints={
-        "zero": "Nothing is moved yet: the centre of mass is beside the diagonal, so the robot "
+        "zero": "Nothing has moved yet. The centre of mass is beside the diagonal, so the robot "
         "tips.",
-        "other_diagonal": "That is over the other diagonal, of FR and RL, which are to be lifted.",
-        "sign": "The other way round: from the centre of mass to the line, not from the line.",
-        "not_shortest": "That is over the diagonal, but it is not the shortest way: a plumb line "
-        "meets it at a right angle.",
-        "on_FL": "That is over a foot. Standing on one end of the diagonal is harder than on both.",
-        "on_RR": "That is over the foot RR. Standing on one end of the diagonal is harder than on "
-        "both.",
-        "metres": "Metres, please: that would be as many millimetres.",
-        "along": "That is the part of the way *along* the diagonal; the part across it is needed.",
-        "halfway": "Halfway. The centre of mass is not over the line yet.",
-        "direction": "That is a direction: a unit vector along the diagonal.",
+        "other_diagonal": "That is above the other diagonal, of FR and RL, which are to be lifted.",
+        "sign": "The direction is wrong: go from the centre of mass to the line, not from the "
+        "line.",
+        "not_shortest": "That is above the diagonal, but it is not the shortest shift. The "
+        "shortest line meets the diagonal at a right angle.",
+        "on_FL": "That is above the foot FL. Standing on one end of the diagonal is harder than "
+        "on both.",
+        "on_RR": "That is above the foot RR. Standing on one end of the diagonal is harder than "
+        "on both.",
+        "metres": "The answer must be in metres: this is in millimetres.",
+        "along": "That is the component of the shift *along* the diagonal. The component "
+        "perpendicular to it is needed.",
+        "halfway": "That is half-way. The centre of mass is not above the line yet.",
+        "direction": "That is only a direction: a unit vector along the diagonal.",
     },
     tolerance=0.02,
 )
 
 
-def _judge_shift(answer: Any) -> Verdict:
-    """Geometry, and then physics: how long it stands on two feet."""
-    given = array_or_verdict(answer, (3,))
-    if isinstance(given, Verdict):
-        return given
+@array_judge((3,))
+def _judge_shift(given: Array) -> Verdict:
+    """Judge a shift by geometry, then by how long the robot stands on two feet in simulation."""
     if abs(given[2]) > HEIGHT:
         return Verdict(
             False,
-            "Seen from above: the centre of mass keeps its height, so the third number is 0.",
+            "Seen from above, the centre of mass keeps its height, so the third number is 0.",
             "height",
         )
     verdict = _SHIFT(given)
@@ -178,12 +178,12 @@ def _judge_shift(answer: Any) -> Verdict:
     times = [time_on_two_feet(shift) for shift in (np.zeros(3), given)]
     if times[1] < TIME_ON_TWO_FEET:
         return Verdict(
-            False, f"On physics it stood on two feet for {times[1]:.1f} s only.", "short"
+            False, f"In simulation the robot stood on two feet for only {times[1]:.1f} s.", "short"
         )
     return Verdict(
         True,
-        f"On physics it stays up on FL and RR for {times[1]:.1f} s, and for {times[0]:.1f} s where "
-        f"it was.",
+        f"In simulation the robot stays up on FL and RR for {times[1]:.1f} s, and without the "
+        f"shift for {times[0]:.1f} s.",
     )
 
 
@@ -216,38 +216,38 @@ def _shifts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="P.1",
-        statement="The kp of the task for the centre of mass with which go2 sinks 10 mm under a "
-        "bag of 6 kg, 1/s².",
+        statement="The kp, 1/s², of the task for the centre of mass with which go2 sinks by 10 "
+        "mm under a bag of 6 kg.",
         stub="kp = 0.0  # 1/s²; replace by your expression",
         solution="kp = bag / go2.mass * 9.81 / 0.010",
         judge=_judge_stiffness,
         examples=_stiffnesses,
-        explanation="At rest m (kp s + g) = (m + bag) g. On physics it is 3 to 6 % less, since "
-        "legs have masses of their own.",
+        explanation="At rest, m (kp s + g) = (m + bag) g. In simulation the sag is 3 to 6 % "
+        "smaller, since the legs have masses of their own.",
     ),
     Exercise(
         name="P.2",
-        statement="The shortest horizontal shift of the centre of mass that brings it over the "
-        "diagonal FL - RR, (3,), m.",
+        statement="The shortest horizontal shift of the centre of mass that brings it above the "
+        "diagonal FL - RR, shape (3,), m.",
         stub="shift = np.zeros(3)  # m, world; replace by your expression",
         solution="line = feet['RR_foot'] - feet['FL_foot']\n"
         "across = np.array([-line[1], line[0], 0]) / np.linalg.norm(line[:2])\n"
         "shift = across * (across @ (feet['FL_foot'] - com))",
         judge=_judge_shift,
         examples=_shifts,
-        explanation="The part of (foot - com) across the line; what is along the line does not "
-        "matter.",
+        explanation="The shift is the component of (foot - com) perpendicular to the line. The "
+        "component along the line does not matter.",
     ),
     Exercise(
         name="P.3",
-        statement="The mass in the world of a record, as a multiple of what the controller "
-        "believes.",
+        statement="The actual mass of the robot in a record, as a multiple of the mass that the "
+        "controller assumes.",
         stub="factor = 1.0  # replace by what you read from dark",
         solution="factor = dark.measured[-1, 2::3].sum() / go2.weight",
         judge=NumericJudge(
             right=lambda: HIDDEN_MASS,
-            praise="Measured forces weigh, whatever anybody believes. (This is how a scale works, "
-            "and a good robot has four.)",
+            praise="Measured forces weigh the robot, whatever the controller assumes. (A scale "
+            "works like this, and a good robot has four.)",
             mistakes={
                 "believed": lambda: 1.0,
                 "first_row": lambda: _measured(0),
@@ -260,23 +260,24 @@ EXERCISES = (
                 "sinking": lambda: _by_sinking(100.0),
             },
             hints={
-                "believed": "That is what it believes.",
-                "first_row": "That is the first row, before the ground has answered: wait until it "
-                "is at rest.",
-                "planned": "That is planned. It plans for an acceleration that never comes; take "
-                "what was measured.",
-                "missing": "That is what is missing, as a part; the question is all of it.",
-                "inverse": "The other way round: believed for true.",
-                "kilograms": "That is a mass in kg; as a multiple of what is believed, please.",
-                "newtons": "Those are newtons; as a multiple of the weight that is believed, "
-                "please.",
-                "one_foot": "That is one foot's part on average: four feet carry.",
-                "sinking": "That is from how far it sank, with kp = 100. Who says that kp was 100? "
-                "Forces do not need it.",
+                "believed": "That is the mass that the controller assumes.",
+                "first_row": "That is the first row, before the contact forces have settled. "
+                "Wait until the robot is at rest.",
+                "planned": "That is the planned force. The plan is for an acceleration that "
+                "never happens. Use the measured force.",
+                "missing": "That is only the missing fraction. The question is about the total.",
+                "inverse": "That is the inverse: assumed over actual mass.",
+                "kilograms": "That is a mass in kg. The answer must be a multiple of the "
+                "assumed mass.",
+                "newtons": "That is in newtons. The answer must be a multiple of the assumed "
+                "weight.",
+                "one_foot": "That is the mean for one foot. Four feet carry the weight.",
+                "sinking": "That follows from how far the robot sank, with kp = 100. But "
+                "nothing says that kp was 100. The forces do not depend on it.",
             },
             tolerance=5e-3,
         ),
         examples=lambda: [(_measured(), "")],
-        explanation="At rest the ground carries the true weight, and nothing else.",
+        explanation="At rest, the ground carries the actual weight and nothing else.",
     ),
 )

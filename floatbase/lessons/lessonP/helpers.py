@@ -1,4 +1,4 @@
-"""Lesson P, Playground: runs on physics that its exercises are about."""
+"""Lesson P: the simulations behind its exercises."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from floatbase.dynamics import Contacts
 from floatbase.playground import Perturbation, PerturbedSimulation
 from floatbase.simulation import Rollout
 
-MU, PERIOD = 0.7, 4e-3  # friction; s between ticks
+MU, PERIOD = 0.7, 4e-3  # friction coefficient; s: control period
 BAG_MASS = 6.0  # kg, of exercise P.1
-# of exercise P.3: the mass in that world, as a multiple of what the controller believes
+# of exercise P.3: actual mass as a multiple of the mass that the controller assumes
 HIDDEN_MASS = 1.37
-_HIDDEN_KP = 250.0  # 1/s², which is nobody's default
-_SETTLING_TIME = 2.0  # s after which a robot that is heavier than it believes has come to rest
+_HIDDEN_KP = 250.0  # 1/s², which is not a default anywhere
+_SETTLING_TIME = 2.0  # s after which a robot that underestimates its mass is at rest
 _LEAN_TIME = 1.0  # s to shift the centre of mass, on four feet
 _LIFT_HEIGHT = 0.04  # m
 
 
 def _run_standing(sim: fb.Simulation, kp: float) -> Rollout:
-    """`_SETTLING_TIME` s of a controller that stands, with this kp of the centre of mass."""
+    """Simulate a standing controller with this kp of the centre of mass for `_SETTLING_TIME`."""
     state = sim.state
     _, level, posture = fb.standing_tasks(state)
     tasks = [fb.CoMTask(state.com, kp=kp), level, posture]
@@ -32,10 +32,19 @@ def _run_standing(sim: fb.Simulation, kp: float) -> Rollout:
 
 
 def com_sag(kp: float, bag: float = BAG_MASS) -> float:
-    """How far go2's centre of mass comes down, m, when all its parts together are `bag` kg heavier
-    than it believes.
+    """Return how far the centre of mass of go2 sinks if go2 is heavier than the controller assumes.
 
-    kp: 1/s², of the task for the centre of mass. It is infinite when the robot does not stand.
+    Parameters
+    ----------
+    kp : float
+        Gain of the task for the centre of mass [1/s²].
+    bag : float, optional
+        Additional mass, distributed over all links [kg].
+
+    Returns
+    -------
+    float
+        The distance [m]; infinite if the robot does not stand.
     """
     robot = fb.load("go2")
     sim = PerturbedSimulation(robot, MU, perturbation=Perturbation(mass=1.0 + bag / robot.mass))
@@ -46,7 +55,7 @@ def com_sag(kp: float, bag: float = BAG_MASS) -> float:
 
 @cache
 def unknown_mass_record() -> Rollout:
-    """Of exercise P.3: go2 in a world whose mass nobody tells."""
+    """Return the record of exercise P.3: go2 with a mass that the learner does not know."""
     return _run_standing(
         PerturbedSimulation(fb.load("go2"), MU, perturbation=Perturbation(mass=HIDDEN_MASS)),
         _HIDDEN_KP,
@@ -54,10 +63,19 @@ def unknown_mass_record() -> Rollout:
 
 
 def time_on_two_feet(shift: npt.ArrayLike) -> float:
-    """For how long go2 stays up, s and at most 3, on FL and RR after a second with its centre of
-    mass moved on four feet.
+    """Return how long go2 stays up on FL and RR.
 
-    shift: (3,) m, world.
+    Before that, it shifts its centre of mass on four feet for a second.
+
+    Parameters
+    ----------
+    shift : array_like, shape (3,)
+        The shift in the world frame [m].
+
+    Returns
+    -------
+    float
+        The time, at most 3 s [s].
     """
     robot = fb.load("go2")
     sim = fb.Simulation(robot, MU)

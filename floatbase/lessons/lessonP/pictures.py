@@ -1,6 +1,4 @@
-"""Lesson P, Playground: outcomes for what is believed and what is true, and how far a push moves a
-robot with slow motors.
-"""
+"""Lesson P: outcomes for assumed and actual values, and how far a push moves a slow robot."""
 
 from __future__ import annotations
 
@@ -15,28 +13,50 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 
 
 def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
-    """A table of squares: dark where a robot fell, with the time when it was down, light where it
-    stood.
+    """Plot outcomes as a table: dark squares where a robot fell, with the time of the fall.
 
-    records: (believed, true) -> record. name: of what is believed.
+    Parameters
+    ----------
+    records : mapping of tuple to Rollout
+        Records by (assumed value, actual value).
+    name : str
+        Name of the value.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
-    believed, true = (sorted({pair[i] for pair in records}) for i in (0, 1))
+    assumed, actual = (sorted({pair[i] for pair in records}) for i in (0, 1))
     _, axis = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
-    fell = np.array([[records[b, t].outcome != "completed" for t in true] for b in believed])
+    fell = np.array([[records[b, t].outcome != "completed" for t in actual] for b in assumed])
     axis.imshow(fell, cmap="Greys", vmin=0.0, vmax=2.0, origin="lower")
-    for i, b in enumerate(believed):
-        for j, t in enumerate(true):
+    for i, b in enumerate(assumed):
+        for j, t in enumerate(actual):
             words = f"{records[b, t].time[-1]:.1f} s" if fell[i, j] else "stands"
             axis.text(j, i, words, ha="center", va="center", fontsize="small")
-    axis.set_xticks(range(len(true)), [f"{x:g}" for x in true])
-    axis.set_yticks(range(len(believed)), [f"{x:g}" for x in believed])
-    axis.set(xlabel=f"{name}, true", ylabel=f"{name}, believed")
+    axis.set_xticks(range(len(actual)), [f"{x:g}" for x in actual])
+    axis.set_yticks(range(len(assumed)), [f"{x:g}" for x in assumed])
+    axis.set(xlabel=f"{name}, actual", ylabel=f"{name}, assumed")
     return axis
 
 
 def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) -> Axes:
-    """How far a push moves a robot, mm, for gains, 1/s²; a cross at the top is a fall, a dashed
-    line the border.
+    """Plot how far a push moves a robot for some gains; crosses at the top are falls.
+
+    Parameters
+    ----------
+    gains : sequence of float
+        The gains kp [1/s²].
+    moved : sequence of float
+        Displacement for each gain [mm]; not finite for a fall.
+    border : float
+        Gain that is marked with a dashed line [1/s²].
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     _, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
@@ -55,7 +75,7 @@ def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) ->
     axis.axvline(border, color=hex_code(GREYS[1]), linestyle="--", label="4 ω²")
     axis.set_xticks(x, [f"{gain:g}" for gain in x])
     axis.minorticks_off()
-    axis.set(xlabel="kp [1/s²]", ylabel="farthest aside [mm]", ylim=(0.0, 1.1 * top))
+    axis.set(xlabel="kp [1/s²]", ylabel="largest displacement [mm]", ylim=(0.0, 1.1 * top))
     axis.grid(alpha=0.25)
     axis.legend(fontsize="small", loc="lower left")
     return axis

@@ -1,4 +1,4 @@
-"""Lesson X, The crash investigation: `BlackBox`, what is left of a fall."""
+"""Lesson X: `BlackBox`, the record of a fall."""
 
 from __future__ import annotations
 
@@ -14,24 +14,30 @@ from floatbase.robots import Robot
 
 @dataclass(frozen=True, eq=False)
 class BlackBox(Value):
-    """The record of a robot that was to stand on four feet and twist. One row for each of n ticks;
-    read-only.
+    """Record of a robot that was to twist on four feet, with one row for each of n control steps.
 
-    name: of the case.
-    robot: its data sheet, which is right.
-    contacts: what the controller was told of the ground: feet, friction, normals.
+    The arrays are read-only. The joint torques were not measured.
 
-    What the sensors saw:
-    time: (n,) s, when each tick begins; they are equally long.
-    q, v: (n, nq) and (n, nv), before the tick.
-    measured: (n, k) N, world, forces of the ground at the feet, their mean during the tick.
-
-    What the controller had in mind:
-    tau: (n, d) N·m, the torques it ordered.
-    planned: (n, k) N, world, the forces it planned with them.
-    qdd: (n, nv) m/s² and rad/s², the acceleration it planned with them, as in v.
-
-    Nobody measured the torques of the joints.
+    Parameters
+    ----------
+    name : str
+        Name of the case.
+    robot : Robot
+        Data sheet of the robot, which is right.
+    contacts : Contacts
+        What the controller assumed about the ground: feet, friction, normals.
+    time : ndarray, shape (n,)
+        Start of each control step [s]; all have the same duration.
+    q, v : ndarray, shape (n, nq) and (n, nv)
+        Measured configuration and velocity before the control step.
+    measured : ndarray, shape (n, k)
+        Measured contact forces, their mean during the control step, in the world frame [N].
+    tau : ndarray, shape (n, d)
+        Torques that the controller commanded [N·m].
+    planned : ndarray, shape (n, k)
+        Contact forces that it planned with them, in the world frame [N].
+    qdd : ndarray, shape (n, nv)
+        Acceleration that it planned with them, as in v [m/s², rad/s²].
     """
 
     name: str
@@ -53,18 +59,24 @@ class BlackBox(Value):
         return int(self.time.size)
 
     def state(self, i: int | np.integer[Any]) -> fb.State:
-        """The state at row i."""
+        """Return the state in row i."""
         row = as_integer("row", i, -len(self), len(self) - 1)
         return fb.State(self.robot, self.q[row], self.v[row])
 
     def equations(self, i: int | np.integer[Any]) -> fb.EquationsOfMotion:
-        """(7) at row i by the data sheet, with the contacts as the controller was told them."""
+        """Return the equations of motion in row i, with the contacts that the controller assumed.
+
+        Notes
+        -----
+        [FBR]_, eq. (7).
+        """
         return fb.equations_of_motion(self.state(i), self.contacts)
 
     @property
     def fell(self) -> bool:
-        """Whether the robot lies at the end: its base tilted by 45° or more, or at half its height
-        or less.
+        """Whether the robot has fallen at the end.
+
+        It has fallen if its base is tilted by 45° or more, or is at half its height or less.
         """
         x, y = self.q[-1, 3:5]
         return bool(

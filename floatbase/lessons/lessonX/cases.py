@@ -1,6 +1,4 @@
-"""Lesson X, The crash investigation: robots that twist with one fault each, on the physics, until
-they fall.
-"""
+"""Lesson X: simulations of robots that twist with one fault each, until they fall."""
 
 from __future__ import annotations
 
@@ -22,15 +20,12 @@ from floatbase.objectives import Task
 from floatbase.playground import ModelMismatch
 from floatbase.simulation import Actuators, Rollout
 
-MU = 1.2  # friction that controllers are told: rubber on a rough mat
-KP_COM, KP_BASE, FACETS = (
-    6.0,
-    30.0,
-    8,
-)  # a gentle robot: what the equations get wrong, gains hardly mend
-PERIOD, SECONDS = 2e-3, 3.0  # s: of a tick, and of a record
-DRIFT_TIME = 0.5  # s, in which forgotten drift is measured: nothing has slid far yet
-LOOPS = 10  # of the twist: more than a record has
+MU = 1.2  # friction coefficient that controllers assume: rubber on a rough mat
+# low gains: they hardly correct what the equations get wrong
+KP_COM, KP_BASE, FACETS = 6.0, 30.0, 8
+PERIOD, SECONDS = 2e-3, 3.0  # s: control period, and duration of a record
+DRIFT_TIME = 0.5  # s, in which a forgotten drift is measured: nothing has slid far yet
+LOOPS = 10  # of the twist: more than fit into a record
 LARGEST_SEED, TRIES = 10**9, 4
 
 Fault: TypeAlias = Literal["friction", "normal", "mass", "drift", "slow motors", "swapped motors"]
@@ -39,12 +34,20 @@ FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors
 
 @dataclass(frozen=True)
 class Twist:
-    """What a robot was to do and where.
+    """Motion that a robot was to perform, and the slope it was on.
 
-    pitch, yaw: rad, half the widths of the ellipse that its base describes. rate: loops for each
-        second. direction: 1 or -1.
-    tilt: degrees of the ground. heading: rad, where it rises least: the horizontal direction of its
-        normal.
+    Parameters
+    ----------
+    pitch, yaw : float
+        Half the widths of the ellipse that its base follows [rad].
+    rate : float
+        Loops per second [1/s].
+    direction : {1, -1}
+        Direction of the motion.
+    tilt : float
+        Slope of the ground [°].
+    heading : float
+        Horizontal direction of the ground's normal [rad].
     """
 
     pitch: float = 0.22
@@ -56,22 +59,20 @@ class Twist:
 
     @staticmethod
     def random(rng: np.random.Generator) -> Twist:
-        """One by chance."""
+        """Return a random motion."""
         pitch, way = rng.uniform(0.2, 0.25), int(rng.choice([-1, 1]))
-        yaw, rate = (
-            0.44 + 0.6 * (0.25 - pitch),
-            rng.uniform(2.28, 2.32),
-        )  # about as fast as friction allows
+        # about as fast as friction allows
+        yaw, rate = 0.44 + 0.6 * (0.25 - pitch), rng.uniform(2.28, 2.32)
         return Twist(pitch, yaw, rate, way, rng.uniform(0.0, 4.0), rng.uniform(0.0, 2.0 * np.pi))
 
     @property
     def normal(self) -> Array:
-        """Of the ground, world."""
+        """Normal of the ground, shape (3,), world frame."""
         return tilted(np.array([0.0, 0.0, 1.0]), self.tilt, self.heading)
 
 
 def tilted(normal: Array, degrees: float, heading: float) -> Array:
-    """A unit vector turned by so many degrees towards a horizontal direction, rad."""
+    """Turn a unit vector by an angle [°] towards a horizontal direction [rad]."""
     aside = np.array([np.cos(heading), np.sin(heading), 0.0])
     aside -= (aside @ normal) * normal
     angle = np.deg2rad(degrees)
@@ -79,9 +80,7 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
 
 
 class TwistController:
-    """A controller that remembers the accelerations it planned, and lets feet give way where
-    nothing holds them.
-    """
+    """Controller that stores its planned accelerations and softens contacts it cannot hold."""
 
     def __init__(
         self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch
@@ -103,14 +102,21 @@ class TwistController:
         )
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:
+        """Return the command for configuration q and velocity v."""
         command = self._controller(q, v, t)
         self.planned.append(command.qdd)
         return command
 
 
 class SwappedMotors:
-    """Two motors whose cables were swapped: each does what the other is told. `first`, `second`:
-    their numbers.
+    """Actuators with the cables of two motors swapped, so that each gets the command of the other.
+
+    Parameters
+    ----------
+    d : int
+        Number of joints.
+    first, second : int
+        Indices of the two motors.
     """
 
     def __init__(self, d: int, first: int, second: int):
@@ -118,20 +124,26 @@ class SwappedMotors:
         self.order[[first, second]] = second, first
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
-        """The torques of the next dt s, (d,) N·m, for those desired."""
+        """Return the torques of the next dt, shape (d,) [N·m], for the desired torques."""
         return tau_desired[self.order]
 
 
 @dataclass(frozen=True)
 class InjectedFault:
-    """What was wrong; by default nothing.
+    """Fault of a robot or its controller; none by default.
 
-    kind: its name.
-    size: of "friction" the true coefficient, of "normal" degrees between the one told and the true
-        one, of "mass" the believed one as a multiple of the true one, of "slow motors" their time
-        constant, ms.
-    heading: rad, of "normal": to where the one told is turned.
-    joints: of "swapped motors", two names.
+    Parameters
+    ----------
+    kind : str or None
+        Name of the fault, one of `FAULTS`.
+    size : float
+        "friction": actual friction coefficient [-]. "normal": angle between the assumed and the
+        actual normal [°]. "mass": assumed mass as a multiple of the actual one [-]. "slow motors":
+        time constant [ms].
+    heading : float
+        "normal": direction in which the assumed normal is turned [rad].
+    joints : tuple of str
+        "swapped motors": names of the two joints.
     """
 
     kind: Fault | None = None
@@ -141,7 +153,7 @@ class InjectedFault:
 
     @staticmethod
     def random(fault: Fault, rng: np.random.Generator) -> InjectedFault:
-        """One of this kind by chance."""
+        """Return a random fault of this kind."""
         low, high = {
             "friction": (0.4, 0.7),
             "normal": (16.0, 22.0),
@@ -163,17 +175,32 @@ def record_box(
     pushes: tuple[fb.Push, ...] = (),
     seconds: float = SECONDS,
 ) -> BlackBox:
-    """The record of go2 that twists while something is wrong, until it falls or so many seconds are
-    over.
+    """Simulate go2 that twists with a fault, until it falls or the time [s] is over.
+
+    Parameters
+    ----------
+    name : str
+        Name of the box.
+    twist, injected_fault
+        The motion and the fault.
+    pushes : tuple of Push, optional
+        Pushes on the robot.
+    seconds : float, optional
+        Largest duration of the record [s].
+
+    Returns
+    -------
+    BlackBox
+        The record.
     """
     robot, fault = fb.load("go2"), injected_fault.kind
     mu = injected_fault.size if fault == "friction" else MU
-    told = (
+    assumed = (
         tilted(twist.normal, injected_fault.size, injected_fault.heading)
         if fault == "normal"
         else twist.normal
     )
-    contacts = fb.Contacts.points(robot, MU, normals=told)
+    contacts = fb.Contacts.points(robot, MU, normals=assumed)
     state = standing_on(robot, twist.normal)
     mismatch = ModelMismatch(
         mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift"
@@ -188,9 +215,7 @@ def record_box(
 
 
 def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) -> Actuators | None:
-    """What stands between orders and joints; None where nothing does. tau: (d,) N·m, with which the
-    robot stands at first.
-    """
+    """Return actuators with the fault or None; tau: first torques, shape (d,) [N·m]."""
     if injected_fault.kind == "slow motors":
         lag = FirstOrderLag(robot, 1e3 / (2.0 * np.pi * injected_fault.size))
         lag.reset(tau)
@@ -202,9 +227,7 @@ def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) ->
 
 
 def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
-    """A level robot above a tilted ground, with each foot on it straight below or above where it
-    stands usually.
-    """
+    """Return a level robot on tilted ground, each foot vertically above or below its place."""
     home, centres = robot.standing(), {}
     for foot in robot.feet:
         touch = np.array(home.point(foot.frame))
@@ -214,7 +237,7 @@ def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
 
 
 def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
-    """What a record leaves to an investigation. qdd: (n, nv), as the controller planned."""
+    """Return what a record leaves to an investigation; qdd: planned, shape (n, nv)."""
     return BlackBox(
         name, record.robot, record.contacts, record.time, record.q, record.v, record.measured,
         record.tau_desired,
@@ -224,10 +247,18 @@ def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
 
 @dataclass(frozen=True)
 class Case:
-    """One case as it was drawn: what the investigation does not know.
+    """Case as it was drawn at random, which the investigation does not know.
 
-    name: of the box. twists: by chance; the first that ends as it `falls` counts. injected_fault:
-        what was wrong. pushes: kicks.
+    Parameters
+    ----------
+    name : str
+        Name of the box.
+    twists : tuple of Twist
+        Random motions. The first whose end agrees with `falls` counts.
+    injected_fault : InjectedFault
+        The fault.
+    pushes : tuple of Push
+        Kicks.
     """
 
     name: str
@@ -237,12 +268,13 @@ class Case:
 
     @property
     def falls(self) -> bool:
-        """Whether the robot is to fall."""
+        """Whether the robot should fall."""
         return bool(self.injected_fault.kind or self.pushes)
 
     def record(self) -> BlackBox:
-        """What it leaves to the investigation. One forgotten drift in twenty is survived by good
-        luck, and is tried again.
+        """Return the black box of this case.
+
+        By luck, one robot in twenty survives a forgotten drift; then the next motion is tried.
         """
         for twist in self.twists:
             box = record_box(self.name, twist, self.injected_fault, self.pushes)
@@ -252,8 +284,17 @@ class Case:
 
 
 def random_cases(seed: int) -> tuple[Case, ...]:
-    """Six cases by chance, one of each fault, in an order by chance. The same for the same seed, a
-    whole number.
+    """Return six random cases, one of each fault, in random order.
+
+    Parameters
+    ----------
+    seed : int
+        Seed; the same seed gives the same cases.
+
+    Returns
+    -------
+    tuple of Case
+        The cases.
     """
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
@@ -264,7 +305,7 @@ def random_cases(seed: int) -> tuple[Case, ...]:
 
 
 def faultless_cases(seed: int) -> tuple[Case, ...]:
-    """Two cases by chance without a fault: in the second somebody kicks the robot over."""
+    """Return two random cases without a fault; in the second, a kick fells the robot."""
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 2])
     return Case("N", random_twists(rng), InjectedFault()), Case(
         "K", random_twists(rng), InjectedFault(), (random_kick(rng),)
@@ -272,12 +313,12 @@ def faultless_cases(seed: int) -> tuple[Case, ...]:
 
 
 def random_twists(rng: np.random.Generator) -> tuple[Twist, ...]:
-    """Some by chance."""
+    """Return some random motions."""
     return tuple(Twist.random(rng) for _ in range(TRIES))
 
 
 def random_kick(rng: np.random.Generator) -> fb.Push:
-    """A kick by chance, hard enough to fell go2."""
+    """Return a random kick, hard enough to fell go2."""
     angle, force = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(260.0, 320.0)
     return fb.Push(
         force * np.array([np.cos(angle), np.sin(angle), 0.0]), start=float(rng.uniform(0.4, 0.8))
@@ -286,18 +327,34 @@ def random_kick(rng: np.random.Generator) -> fb.Push:
 
 @lru_cache(maxsize=8)
 def black_boxes(seed: int) -> tuple[BlackBox, ...]:
-    """The black boxes of six falls, A to F, each with one fault of `FAULTS`; other seeds, other
-    boxes.
+    """Return the black boxes of six falls, A to F, each with one fault of `FAULTS`.
 
-    seed: a whole number.
+    Parameters
+    ----------
+    seed : int
+        Seed; other seeds give other boxes.
+
+    Returns
+    -------
+    tuple of BlackBox
+        The boxes.
     """
     return tuple(case.record() for case in random_cases(seed))
 
 
 @lru_cache(maxsize=8)
 def faultless_boxes(seed: int) -> tuple[BlackBox, ...]:
-    """The black boxes of two robots without a fault: N twists to the end, K is kicked over. seed: a
-    whole number.
+    """Return the black boxes of two robots without a fault: N twists to the end, K is kicked over.
+
+    Parameters
+    ----------
+    seed : int
+        Seed; other seeds give other boxes.
+
+    Returns
+    -------
+    tuple of BlackBox
+        The boxes.
     """
     return tuple(case.record() for case in faultless_cases(seed))
 
@@ -308,11 +365,26 @@ def crash_test(
     joints: tuple[str, str] = ("", ""),
     seconds: float = SECONDS,
 ) -> BlackBox:
-    """A crash of our own, whose fault we know, to try instruments on.
+    """Return the black box of a crash whose fault we know, to test diagnostic methods.
 
-    fault: one of `FAULTS`; None for a robot without.
-    size, joints: of the fault, see `InjectedFault`.
-    seconds: of the record, unless it ends in a fall before.
+    Parameters
+    ----------
+    fault : str, optional
+        One of `FAULTS`; None for a robot without a fault.
+    size, joints : optional
+        Size and joints of the fault, as for `InjectedFault`.
+    seconds : float, optional
+        Duration of the record, unless it ends in a fall before [s].
+
+    Returns
+    -------
+    BlackBox
+        The record.
+
+    Raises
+    ------
+    UnknownNameError
+        If the fault is unknown.
     """
     if fault is not None and fault not in FAULTS:
         raise unknown_name("fault", fault, FAULTS)
@@ -320,5 +392,5 @@ def crash_test(
 
 
 def case_zero() -> BlackBox:
-    """The case that the lesson solves."""
+    """Return the black box of the case that the lesson solves."""
     return record_box("0", Twist(), InjectedFault("slow motors", 45.0))

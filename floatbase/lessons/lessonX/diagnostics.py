@@ -1,4 +1,4 @@
-"""Lesson X, The crash investigation: what a record of sensors alone says of motors and ground."""
+"""Lesson X: what a record of sensors says about motors and ground."""
 
 from __future__ import annotations
 
@@ -10,21 +10,44 @@ import numpy.typing as npt
 from floatbase._validation import Array, cross
 from floatbase.lessons.lessonX.black_box import BlackBox
 
-_MIN_LOAD = 5.0  # N of a foot that bears on the ground
-# m/s of a contact point: the soft contacts of the physics let feet that hold creep by less
+_MIN_LOAD = 5.0  # N: smallest contact force of a foot that counts as loaded
+# m/s of a contact point; feet that do not slip creep more slowly, since contacts are soft
 _MIN_SLIP_SPEED = 0.3
 
 
 def accelerations(box: BlackBox) -> Array:
-    """The q̈ of each tick but the last, (n - 1, nv): by how much v has changed in it."""
+    """Return the acceleration q̈ in each control step except the last: the change of v over time.
+
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (n - 1, nv)
+        The acceleration, as in v [m/s², rad/s²].
+    """
     return np.asarray(np.diff(box.v, axis=0) / np.diff(box.time)[:, None])
 
 
 def required_forces(box: BlackBox) -> Array:
-    """(7) M q̈ + h - Jᵀ λ with q̈ and λ as they were, (n - 1, nv): what else must have acted.
+    """Return M q̈ + h - Jᵀ λ with the measured q̈ and λ: what else must have acted on the robot.
 
-    In the last d columns these are the torques of the motors, N·m. In the first six, N and N·m in
-    the base frame, it is zero as long as nobody touches the robot.
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (n - 1, nv)
+        The last d columns are the motor torques [N·m]. The first six, in the base frame [N, N·m],
+        are zero as long as nothing else touches the robot.
+
+    Notes
+    -----
+    [FBR]_, eq. (7).
     """
     found = []
     for i, qdd in enumerate(accelerations(box)):
@@ -34,9 +57,21 @@ def required_forces(box: BlackBox) -> Array:
 
 
 def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
-    """Orders, (n, d), after a first-order lag that begins with the first of them.
+    """Return commands after a first-order lag that starts with the first command.
 
-    period: s, of a row. ms: its time constant.
+    Parameters
+    ----------
+    orders : array_like, shape (n, d)
+        The commands.
+    period : float
+        Time between two rows [s].
+    ms : float
+        Time constant [ms].
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+        The lagged commands.
     """
     given = np.asarray(orders, dtype=np.float64)
     out, share = np.array(given), -np.expm1(-period / (1e-3 * ms)) if ms > 0 else 1.0
@@ -46,18 +81,41 @@ def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
 
 
 def foot_centres(box: BlackBox, i: int | np.integer[Any]) -> Array:
-    """The centres of the balls at the feet at row i, (4, 3) m: one radius above the ground,
-    whatever its normal.
+    """Return the centres of the spherical feet in row i.
+
+    They are one radius above the ground, whatever its normal.
+
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+    i : int
+        The row.
+
+    Returns
+    -------
+    ndarray, shape (4, 3)
+        The centres in the world frame [m].
     """
     state = box.state(i)
     return np.array([state.point(foot.frame, foot.centre) for foot in box.robot.feet])
 
 
 def ground_normal(box: BlackBox) -> Array:
-    """The normal of the plane in which the feet stand, (3,): the mean over the rows in the first
-    0.1 s where all four bear.
+    """Return the normal of the plane through the feet.
 
-    Where a foot lifts at once, of the first row.
+    It is the mean over the rows in the first 0.1 s in which all four feet are loaded. If there are
+    none, the first row counts.
+
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        The unit normal in the world frame.
     """
     rows = np.flatnonzero(box.time - box.time[0] < 0.1)
     bears = [
@@ -73,8 +131,21 @@ def ground_normal(box: BlackBox) -> Array:
 
 
 def sliding_friction_ratios(box: BlackBox, normal: npt.ArrayLike) -> Array:
-    """|λt| / λn of each foot in each row in which it bears and slides, (m,). normal: of the ground,
-    (3,).
+    """Return `|λt| / λn` of each foot in each row in which it is loaded and slides.
+
+    Every second row is examined.
+
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+    normal : array_like, shape (3,)
+        Normal of the ground in the world frame.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The ratios [-].
     """
     n, ratios = np.asarray(normal), []
     for i in range(0, len(box), 2):

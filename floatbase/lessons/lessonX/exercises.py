@@ -12,14 +12,8 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.lessons.exercises import (
-    Example,
-    Exercise,
-    NumericJudge,
-    ShapeJudge,
-    Verdict,
-    function_or_verdict,
-)
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, ShapeJudge, Verdict, function_or_verdict
 from floatbase.lessons.lessonX import investigation
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import (
@@ -35,16 +29,10 @@ from floatbase.lessons.lessonX.diagnostics import required_forces
 from floatbase.lessons.lessonX.verdicts import COUNTER_EVIDENCE, judge_line, mistaken
 
 KICK_SEED = 5  # seed of the box of exercise X.1
-_UNSEEN_SEEDS = (
-    20611,
-    20612,
-    20613,
-    102,
-    20615,
-    20616,
-)  # seeds from which the last exercise takes one fault each
-_FAULTLESS_SEED = 20617  # and of its two robots without
-_KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' own steps
+# seeds from which the last exercise takes one fault each
+_UNSEEN_SEEDS = (20611, 20612, 20613, 102, 20615, 20616)
+_FAULTLESS_SEED = 20617  # seed of its two robots without a fault
+_KICK_FORCE = 20.0  # N: a larger residual is a kick and not a jump of the simulation itself
 
 
 # X.1 ----------------------------------------------------------------------------------------------
@@ -52,15 +40,13 @@ _KICK_FORCE = 20.0  # N: a larger residual is a kick, and none of the physics' o
 
 @cache
 def kicked_box() -> BlackBox:
-    """The record of a robot without a fault that somebody kicked."""
+    """Return the record of a robot without a fault that was kicked."""
     return faultless_cases(KICK_SEED)[1].record()
 
 
 @cache
 def _residual() -> tuple[Array, Array]:
-    """Force on the base that (7) misses while somebody kicks, (m, 3) N, in base axes and in the
-    world's.
-    """
+    """Return the missing force on the base during the kick, (m, 3) [N], in base and world axes."""
     box = kicked_box()
     found = required_forces(box)[:, :3]
     rows = np.flatnonzero(np.linalg.norm(found, axis=1) > _KICK_FORCE)
@@ -69,18 +55,18 @@ def _residual() -> tuple[Array, Array]:
 
 
 def _turned(i: int | np.integer[Any], row: Array) -> Array:
-    """A force in the base's axes at row i, (3,) N, in the world's."""
+    """Turn a force in base axes at row i, shape (3,) [N], into world axes."""
     return np.asarray(kicked_box().state(i).frame_pose("base").rotation @ row)
 
 
 def _impulse() -> Array:
-    """As it was given."""
+    """Return the impulse of the kick."""
     (push,) = faultless_cases(KICK_SEED)[1].pushes
     return np.asarray(push.force * push.duration)
 
 
-def _momentum() -> Array:
-    """How the robot's momentum changed while it was kicked."""
+def _momentum_change() -> Array:
+    """Return the change of the robot's momentum during the kick."""
     box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
     first, last = (
         int(np.searchsorted(box.time, push.start + part * push.duration)) for part in (0.0, 1.0)
@@ -103,7 +89,7 @@ def _kicks() -> dict[str, Callable[[], Any]]:
             )
         ),
         "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
-        "momentum": _momentum,
+        "momentum": _momentum_change,
     }
 
 
@@ -111,51 +97,51 @@ def _kicks() -> dict[str, Callable[[], Any]]:
 
 
 def _judge_report(answer: Any) -> Verdict:
-    """A seed, and a line for each of its boxes."""
+    """Judge a seed and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
-        return Verdict(False, "There is no answer yet: the report is a list of lines.", "no_answer")
+        return Verdict(False, "There is no answer yet. The report is a list of lines.", "no_answer")
     if (
         not isinstance(answer, list | tuple)
         or not answer
         or not all(isinstance(line, str) for line in answer)
     ):
         return Verdict(
-            False, 'The report is a list of lines of text, such as "A: mass 0.93".', "no_lines"
+            False, 'The report must be a list of lines of text, such as "A: mass 0.93".', "no_lines"
         )
     seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
     if not seed or int(seed[1]) > LARGEST_SEED:
         return Verdict(
-            False, 'The first line says which boxes these are, as in "seed 7".', "no_seed"
+            False, 'The first line must give the seed of the boxes, as in "seed 7".', "no_seed"
         )
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
-    told = {name: line for name, line in lines.items() if line.strip(" ?.")}
-    return _report_of(int(seed[1]), told)
+    reports = {name: line for name, line in lines.items() if line.strip(" ?.")}
+    return _report_of(int(seed[1]), reports)
 
 
-def _report_of(seed: int, told: dict[str, str]) -> Verdict:
-    """told: name of a box -> what is said of it."""
+def _report_of(seed: int, reports: dict[str, str]) -> Verdict:
+    """Judge the lines about the boxes of a seed; reports: name of a box -> its line."""
     cases = {case.name: case for case in random_cases(seed)}
-    if unknown := sorted(set(told) - set(cases)):
+    if unknown := sorted(set(reports) - set(cases)):
         return Verdict(
             False,
-            f"There is no box {unknown[0]}: the boxes are A to F, each in a line of its own.",
+            f"There is no box {unknown[0]}. The boxes are A to F, each on its own line.",
             "no_such_box",
         )
-    if not told:
+    if not reports:
         return Verdict(
             False,
-            'Nothing is said yet. A line names a fault and its evidence, such as "A: mass 0.93".',
+            'There is no line yet. A line names a fault and its evidence, such as "A: mass 0.93".',
             "nothing_said",
         )
     boxes = {box.name: box for box in black_boxes(seed)}
     verdicts = {
-        name: judge_line(cases[name], boxes[name], line) for name, line in sorted(told.items())
+        name: judge_line(cases[name], boxes[name], line) for name, line in sorted(reports.items())
     }
     wrong = [f"{name}: {verdict.text}" for name, verdict in verdicts.items() if not verdict.right]
     solved = [name for name, verdict in verdicts.items() if verdict.right]
     left = [name for name in cases if name not in verdicts]
     if not wrong and not left:
-        return Verdict(True, "Six faults, each with evidence that holds. The insurance pays.")
+        return Verdict(True, "Six faults, each with solid evidence. The insurance pays.")
     parts = [
         f"Solved: {', '.join(solved)}." if solved else "",
         *wrong,
@@ -170,7 +156,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
 
 @cache
 def _unseen_case(i: int) -> tuple[Case, BlackBox]:
-    """One of the cases of the last exercise: six with a fault, then two without."""
+    """Return a case of the last exercise: six with a fault, then two without."""
     if i < len(FAULTS):
         case = next(
             case for case in random_cases(_UNSEEN_SEEDS[i]) if case.injected_fault.kind == FAULTS[i]
@@ -183,7 +169,7 @@ def _unseen_case(i: int) -> tuple[Case, BlackBox]:
 
 
 def _judge_program(answer: Any) -> Verdict:
-    """A function of a box, tried on boxes of each kind that nobody has seen."""
+    """Judge a function of a box on unseen boxes of each kind."""
     program = function_or_verdict(answer)
     if isinstance(program, Verdict):
         return program
@@ -192,39 +178,42 @@ def _judge_program(answer: Any) -> Verdict:
             return wrong
     return Verdict(
         True,
-        "Six faults found in boxes it had never seen, each with its evidence, and no innocent "
-        "accused.",
+        "Your program found six faults in unseen boxes, each with its evidence, and accused no "
+        "innocent robot.",
     )
 
 
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
-    """What is wrong with a program's word about a box; None where it is right."""
+    """Return what is wrong with a program's answer about a box, or None."""
     what = (
-        f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
+        f"a robot with {case.injected_fault.kind}"
+        if case.injected_fault.kind
+        else "a robot without a fault"
     )
     what += " that was kicked over" if case.pushes else ""
     try:
         line = program(box)
     except Exception as error:  # whatever a learner's function raises
         return Verdict(
-            False, f"Of {what}: your function stops with {type(error).__name__}: {error}", "stops"
+            False, f"With {what}, your function stops with {type(error).__name__}: {error}", "stops"
         )
     if not isinstance(line, str):
         said = (
-            f'Return a line of text, such as "mass 0.93" or "nothing"; this is '
-            f"{type(line).__name__}."
+            f'Return a line of text, such as "mass 0.93" or "nothing", not {type(line).__name__}.'
         )
         return Verdict(False, said, "no_text")
     verdict = judge_line(case, box, line)
     return (
         None
         if verdict.right
-        else Verdict(False, f'Of {what} your program says "{line}": {verdict.text}', verdict.hint)
+        else Verdict(
+            False, f'About {what}, your program says "{line}": {verdict.text}', verdict.hint
+        )
     )
 
 
 def _reports() -> list[Example]:
-    """On the boxes of seed 1."""
+    """Return examples with the boxes of seed 1."""
     boxes, found = (
         black_boxes(1),
         {box.name: investigation.investigate(box) for box in black_boxes(1)},
@@ -233,7 +222,7 @@ def _reports() -> list[Example]:
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
     def but(fault: str, line: str) -> list[str]:
-        """The report, which says something else of the box with a fault."""
+        """Return the report with another line about the box with a fault."""
         name = cases[fault].name
         return [f"{name}: {line}" if said.startswith(name) else said for said in report]
 
@@ -284,8 +273,8 @@ def _programs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="X.1",
-        statement="The impulse of a kick, (3,), N·s, world, from what (7) misses in the record of "
-        "a robot without a fault.",
+        statement="The impulse of a kick, shape (3,), N·s, world, from what is missing in (7) "
+        "in the record of a robot without a fault.",
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
         solution="missed = required_forces(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
@@ -295,32 +284,30 @@ EXERCISES = (
         judge=ShapeJudge(
             NumericJudge(
                 right=_impulse,
-                praise="Nobody recorded the kick, and you know how hard it was and where it came "
-                "from.",
+                praise="The kick was not recorded, and still you know how hard it was and where "
+                "it came from.",
                 mistakes=_kicks(),
                 hints={
-                    "zero": "There is nothing there yet: the first three columns of what (7) "
-                    "misses, summed up over time.",
-                    "base_axes": "Those are the base's axes, which turn: take each row into the "
-                    "world's by R before you sum "
-                    "up.",
-                    "no_duration": "A sum of forces is no impulse yet: each row lasts 2 ms.",
-                    "fall": "The blows of the fall are in it, too: take the time of the kick "
-                    "alone.",
-                    "force": "That is the force, N. How long did it last?",
-                    "momentum": "That is what the robot's momentum gained. The ground has its part "
-                    "in that.",
+                    "zero": "There is no answer yet. Take the first three columns of what is "
+                    "missing in (7), and sum over time.",
+                    "base_axes": "These are the axes of the base, which turn. Convert each row "
+                    "to the world's axes by R before you sum.",
+                    "no_duration": "A sum of forces is not an impulse yet. Each row lasts 2 ms.",
+                    "fall": "This includes the impacts of the fall. Use only the time of the kick.",
+                    "force": "That is the force, N. How long did it act?",
+                    "momentum": "That is the change of the robot's momentum. The ground "
+                    "contributed to it, too.",
                 },
                 tolerance=0.02,
             ),
             {
-                (): "Three numbers: an impulse has a direction.",
-                (6,): "The force alone, three numbers, without its moment.",
+                (): "The answer has three numbers: an impulse has a direction.",
+                (6,): "Only the force counts, three numbers, without its moment.",
             },
         ),
         examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
-        explanation="Who touches the robot is missing in (7). The first rows have no motor that "
-        "could have done it.",
+        explanation="Whatever touches the robot is missing in (7). No motor acts in the first "
+        "rows, so no motor can be the cause.",
         namespace=lambda: {"kicked": kicked_box(), "required_forces": required_forces},
     ),
     Exercise(
@@ -337,19 +324,19 @@ EXERCISES = (
         'report += [f"{box.name}: {detective(box)}" for box in black_boxes(seed)]',
         judge=_judge_report,
         examples=_reports,
-        explanation="The detective is the solution of X.3, which reveal shows there.",
+        explanation="The detective is the solution of X.3, which `reveal` shows there.",
         namespace=lambda: {"seed": 1, "black_boxes": black_boxes},
     ),
     Exercise(
         name="X.3",
-        statement="A program that sees only a box, and names its fault with the evidence, or "
-        "nothing.",
+        statement="A program that sees only a box and returns its fault with the evidence, or "
+        '"nothing".',
         stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as '
         "in your report",
         solution=inspect.getsource(investigation),
         judge=_judge_program,
         examples=_programs,
-        explanation="The plan first, then the motors, then the ground: each question has an answer "
-        "of its own.",
+        explanation="First check the plan, then the motors, then the ground. Each question has "
+        "its own answer.",
     ),
 )

@@ -1,6 +1,4 @@
-"""Lesson X, The crash investigation: films of black boxes, moments of them, orders beside the
-torques that were needed.
-"""
+"""Lesson X: recordings and instants of black boxes, and commanded and required torques."""
 
 from __future__ import annotations
 
@@ -20,12 +18,29 @@ from floatbase.simulation import Rollout
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
-WIDTH, HEIGHT, EDGE = 620, 240, 40  # pixels of a drawing, and of its edge
-_MIN_TOLERANCE = 1.0  # N: a smaller force is not worth a word
+WIDTH, HEIGHT, EDGE = 620, 240, 40  # px: size of a drawing, and width of its margin
+_MIN_TOLERANCE = 1.0  # N: smaller forces are shown as zero
 
 
 def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = None) -> Viewer:
-    """Play a box: measured and planned forces, cones as they were told. speed: 1 for real time."""
+    """Play a box with measured and planned forces, and with the cones that the controller assumed.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    box : BlackBox
+        The record.
+    speed : float, optional
+        Speed; 1 is real time [-].
+    title : str, optional
+        Text in the corner.
+
+    Returns
+    -------
+    Viewer
+        The viewer.
+    """
     places = np.array([box.contacts.positions(box.state(i)) for i in range(len(box))])
     record = Rollout(
         box.robot, box.contacts, box.time, box.q, box.v, np.full_like(box.tau, np.nan), box.tau,
@@ -36,27 +51,51 @@ def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None
 
 
 def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
-    """Draw one row of a box; what was planned, what was measured, and what (7) misses there, as
-    text.
+    """Draw one row of a box.
 
-    missed: (n - 1, nv), as of `required_forces`. time: s.
+    Parameters
+    ----------
+    view : Viewer
+        Viewer to draw on.
+    box : BlackBox
+        The record.
+    missed : ndarray, shape (n - 1, nv)
+        Result of `required_forces`.
+    time : float
+        Time of the row [s].
+
+    Returns
+    -------
+    str
+        Planned and measured forces, and what is missing in (7), as text.
     """
     i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
     view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
     gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
-    told = ", ".join(
+    gap_text = ", ".join(
         f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True)
     )
     left = float(np.linalg.norm(missed[i, :3]))
     return (
-        f"planned and measured forces differ by {told} N; (7) misses "
-        f"{left if left >= _MIN_TOLERANCE else 0:.0f} N on the base"
+        f"planned and measured forces differ by {gap_text} N; "
+        f"{left if left >= _MIN_TOLERANCE else 0:.0f} N is missing in (7) on the base"
     )
 
 
 def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
-    """The force on the base that (7) misses, and the weight for comparison. missed: (n - 1, nv), as
-    of `required_forces`.
+    """Plot the force on the base that is missing in (7), with the weight for comparison.
+
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+    missed : array_like, shape (n - 1, nv)
+        Result of `required_forces`.
+
+    Returns
+    -------
+    Figure
+        The figure.
     """
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
@@ -70,15 +109,30 @@ def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
 
 
 def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> str:
-    """Ordered and needed torque of a joint, as HTML, the order after a first-order lag; how well
-    the two fit.
+    """Draw the required torque of a joint and the command after a first-order lag.
 
-    got: (n - 1, d) N·m, the torques that the motion needed. joint: its number. ms: time constant of
-        the lag.
+    Parameters
+    ----------
+    box : BlackBox
+        The record.
+    got : ndarray, shape (n - 1, d)
+        Torques that the motion required [N·m].
+    joint : int
+        Index of the joint.
+    ms : float
+        Time constant of the lag [ms].
+
+    Returns
+    -------
+    str
+        The drawing and how well the torques agree, as HTML.
     """
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
-    told = box.tau[: len(got)]
-    orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
+    commanded = box.tau[: len(got)]
+    orders, both = (
+        lagged(commanded, period, ms),
+        np.concatenate([got[:, joint], commanded[:, joint], [0.0]]),
+    )
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
     drawn = frame.ticks()
     drawn += frame.curve(times, got[:, joint], stroke=hex_code(GREYS[2]), stroke_width=6)
@@ -86,8 +140,8 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
     off = float(np.median(np.abs(orders - got)))
     words = (
         f"{box.robot.joint_names[joint]}, from {frame.low:.0f} to {frame.high:.0f} N·m",
-        f"thick: needed; thin: ordered, {ms:.0f} ms late; all joints differ by {off:.2f} N·m in "
-        f"the median",
+        f"thick: required; thin: commanded, {ms:.0f} ms late; median difference of all joints: "
+        f"{off:.2f} N·m",
     )
     text = "".join(
         f"<div>{line}</div>" for line in words
@@ -97,7 +151,7 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
 
 @dataclass(frozen=True)
 class _PlotFrame:
-    """Where times, s, and torques, N·m, lie on a drawing."""
+    """Positions of times [s] and torques [N·m] on a drawing."""
 
     begin: float
     end: float
@@ -105,20 +159,23 @@ class _PlotFrame:
     high: float
 
     def across(self, times: npt.ArrayLike) -> Array:
+        """Return the horizontal positions of times [px]."""
         return np.asarray(
             EDGE + (WIDTH - 2 * EDGE) * (np.asarray(times) - self.begin) / (self.end - self.begin)
         )
 
     def up(self, torques: npt.ArrayLike) -> Array:
+        """Return the vertical positions of torques [px]."""
         return np.asarray(
             10 + (HEIGHT - 20) * (self.high - np.asarray(torques)) / (self.high - self.low)
         )
 
     def curve(self, times: Array, torques: Array, **style: str | float) -> str:
+        """Draw torques over time."""
         return svg.polyline(np.column_stack([self.across(times), self.up(torques)]), **style)
 
     def ticks(self) -> str:
-        """Lines at round torques, the one of no torque thicker, and at the tenths of a second."""
+        """Draw lines at round torques, thicker at zero, and at the tenths of a second."""
         drawn = svg.text((EDGE - 6, HEIGHT + 27), "N·m", 11, "end")
         for torque in np.asarray(MaxNLocator(5).tick_values(self.low, self.high)).tolist():
             if self.low <= torque <= self.high:

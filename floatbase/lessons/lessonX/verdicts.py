@@ -1,4 +1,4 @@
-"""Lesson X, The crash investigation: what is said of a diagnosis and of the evidence for it."""
+"""Judges of lesson X for a diagnosis and its evidence."""
 
 from __future__ import annotations
 
@@ -8,52 +8,50 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase.lessons.exercises import Verdict
+from floatbase.lessons.judges import Verdict
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import DRIFT_TIME, FAULTS, MU, Case
 from floatbase.lessons.lessonX.diagnostics import ground_normal
 
 NOTHING = "nothing"
 EVIDENCE = {
-    "friction": "the coefficient that the ground has",
-    "normal": "the angle between the ground's normal and the one that was told, in degrees",
-    "mass": "the mass believed over the true one",
+    "friction": "the friction coefficient of the ground",
+    "normal": "the angle between the ground's normal and the assumed one, in degrees",
+    "mass": "the assumed mass over the actual one",
     "drift": "the largest entry of b in the first half second, m/s²",
     "slow motors": "the time constant, ms",
     "swapped motors": "the names of two joints",
 }
 # what speaks against a fault in every box that has another
 COUNTER_EVIDENCE = {
-    "friction": "feet that slide get no less friction than the controller was told: |λt| / λn of "
-    "the measured forces.",
-    "normal": "the feet stand in a plane, and its normal is the one that was told.",
+    "friction": "feet that slide get at least the friction that the controller assumed: |λt| / "
+    "λn of the measured forces.",
+    "normal": "the feet are in a plane, and its normal is the assumed one.",
     "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) "
     "in every row.",
-    "drift": "A q̈ of the plan is b, which is not zero, while all feet hold.",
-    "slow motors": "no lag brings the orders much nearer to the torques that the motion needed.",
-    "swapped motors": "no exchange of two orders brings them nearer to the torques that the motion "
-    "needed.",
-    NOTHING: "a sound robot twists like that to the end, and the first six rows say that nobody "
-    "touched this one.",
+    "drift": "in the plan A q̈ equals b, which is not zero, while no foot slips.",
+    "slow motors": "no lag brings the commands much closer to the torques that the motion "
+    "required.",
+    "swapped motors": "no swap of two commands brings them closer to the torques that the "
+    "motion required.",
+    NOTHING: "a robot without a fault twists like that to the end, and the first six rows say "
+    "that nothing touched this one.",
 }
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 _JOINT = re.compile(r"\w+_joint")
-_EVIDENCE_TOLERANCES = {
-    "friction": 0.04,
-    "normal": 1.5,
-    "mass": 0.02,
-}  # how far evidence may be off
-_RELATIVE_TOLERANCE = 0.1  # of it, for the others
-_MIN_TOLERANCE = 3.0  # ms that a time constant may be off
+# absolute tolerances of evidence
+_EVIDENCE_TOLERANCES = {"friction": 0.04, "normal": 1.5, "mass": 0.02}
+_RELATIVE_TOLERANCE = 0.1  # of the other evidence
+_MIN_TOLERANCE = 3.0  # ms: smallest tolerance of a time constant
 _RIGHT = Verdict(True, "")
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """A number that is evidence. off: how far it may be. known: hint -> the number of this mistake,
-    and what is said of it.
+    """Number that is evidence.
 
-    otherwise: what is said of other numbers.
+    off: its tolerance. known: hint -> the number of this mistake, and the comment on it. otherwise:
+    comment on other numbers.
     """
 
     right: float
@@ -63,19 +61,45 @@ class _Evidence:
 
 
 def named_fault(line: str) -> str:
-    """The fault that a line names first, or "nothing"; "" where it names none."""
+    """Return the fault that a line names first, or "nothing"; "" if there is none.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+
+    Returns
+    -------
+    str
+        Name of the fault.
+    """
     words = line.casefold()
     found = [(words.find(name), name) for name in (*FAULTS, NOTHING) if name in words]
     return min(found)[1] if found else ""
 
 
 def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
-    """The comment on a line about a case, a fault and its evidence; none on a right one."""
+    """Judge a line about a case: a fault and its evidence.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    box : BlackBox
+        Its black box.
+    line : str
+        The line.
+
+    Returns
+    -------
+    Verdict
+        The comment; it is empty if the line is right.
+    """
     said, fault = named_fault(line), case.injected_fault.kind or NOTHING
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
     if said != fault and fault == NOTHING:
-        known = "this robot had no fault: it " + (
+        known = "this robot had no fault. It " + (
             "was kicked." if case.falls else "did not even fall."
         )
         return Verdict(False, known, "innocent")
@@ -88,13 +112,13 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
     number = _NUMBER.search(line.casefold().split(said, 1)[1])
     if number is None:
         return Verdict(
-            False, f"{said} it is. The evidence is missing: {EVIDENCE[said]}.", "no_evidence"
+            False, f"{said} is right, but the evidence is missing: {EVIDENCE[said]}.", "no_evidence"
         )
     return _judge_number(said, float(number[0]), _NUMBERS[said](case, box))
 
 
 def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
-    """Hint -> a line with the right fault and evidence that gets it."""
+    """Return for each hint a line with the right fault and the evidence of this mistake."""
     fault = str(case.injected_fault.kind)
     if fault not in _NUMBERS:
         return {}
@@ -112,51 +136,56 @@ def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
     unknown = sorted(given - set(box.robot.joint_names))
     if unknown:
         return Verdict(
-            False, f"there is no {unknown[0]}; box.robot.joint_names lists them.", "no_such_joint"
+            False,
+            f"there is no {unknown[0]}. box.robot.joint_names lists the joints.",
+            "no_such_joint",
         )
     if len(given) != 2:
-        told = (
-            f"swapped motors it is. The evidence is {EVIDENCE['swapped motors']}; there are "
-            f"{len(given)}."
+        text = (
+            f"swapped motors is right. The evidence must be {EVIDENCE['swapped motors']}, but "
+            f"there are {len(given)}."
         )
-        return Verdict(False, told, "not_two_joints")
+        return Verdict(False, text, "not_two_joints")
     if given & right:
         return (
             _RIGHT
             if given == right
-            else _wrong("swapped motors", "one_joint", "one of these two is right.")
+            else _wrong("swapped motors", "one_joint", "one of these two joints is right.")
         )
-    return _wrong("swapped motors", "no_joint", "neither of these two is one of them.")
+    return _wrong("swapped motors", "no_joint", "neither of these two joints is right.")
 
 
 def _friction(case: Case, box: BlackBox) -> _Evidence:
     mu = case.injected_fault.size
     known = {
-        "believed": (MU, "that is the friction that was told; which did the feet get?"),
-        "share": (mu / MU, "that is a share of what was told; give the coefficient."),
-        "difference": (MU - mu, "that is a difference; give the coefficient."),
+        "believed": (
+            MU,
+            "that is the friction that the controller assumed. Which friction did the feet get?",
+        ),
+        "share": (mu / MU, "that is a fraction of the assumed coefficient. Give the coefficient."),
+        "difference": (MU - mu, "that is a difference. Give the coefficient."),
         "angle": (
             float(np.rad2deg(np.arctan(mu))),
-            "that is the angle of the cone; give its tangent.",
+            "that is the angle of the cone. Give its tangent.",
         ),
     }
-    otherwise = "take feet that slide and bear, and forces along and across the ground."
+    otherwise = "use feet that slide under load, and forces along and perpendicular to the "
+    "ground."
     return _Evidence(mu, _EVIDENCE_TOLERANCES["friction"], known, otherwise)
 
 
 def _normal(case: Case, box: BlackBox) -> _Evidence:
-    ground, told = ground_normal(box), box.contacts.normals[0]
-    slope, believed = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, told))
+    ground, assumed = ground_normal(box), box.contacts.normals[0]
+    slope, assumed_slope = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, assumed))
     known = {
-        "radians": (float(np.deg2rad(case.injected_fault.size)), "in degrees, please."),
+        "radians": (float(np.deg2rad(case.injected_fault.size)), "the answer must be in degrees."),
         "slope": (
             slope,
-            "that is how steep the ground is; what counts is the angle to the normal that was "
-            "told.",
+            "that is the slope of the ground. The evidence is the angle to the assumed normal.",
         ),
         "believed": (
-            believed,
-            "that is how steep the ground was believed to be; what counts is the angle to its "
+            assumed_slope,
+            "that is the assumed slope of the ground. The evidence is the angle to the actual "
             "normal.",
         ),
     }
@@ -164,22 +193,25 @@ def _normal(case: Case, box: BlackBox) -> _Evidence:
         case.injected_fault.size,
         _EVIDENCE_TOLERANCES["normal"],
         known,
-        "four feet that bear span the plane, before they slide.",
+        "four loaded feet define the plane, before they slide.",
     )
 
 
 def _mass(case: Case, box: BlackBox) -> _Evidence:
     k, m = case.injected_fault.size, box.robot.mass
     known = {
-        "inverse": (1.0 / k, "that is the true mass over the believed one."),
-        "kilograms": (k * m, "that is the believed mass in kg; divide it by the data sheet's."),
-        "difference_kilograms": ((k - 1.0) * m, "that is a difference in kg; give the factor."),
-        "difference": (k - 1.0, "that is how much it is off; give the factor, near 1."),
+        "inverse": (1.0 / k, "that is the actual mass over the assumed one."),
+        "kilograms": (
+            k * m,
+            "that is the assumed mass in kg. Divide it by the mass in the data sheet.",
+        ),
+        "difference_kilograms": ((k - 1.0) * m, "that is a difference in kg. Give the factor."),
+        "difference": (k - 1.0, "that is the relative error. Give the factor, which is near 1."),
         "difference_percent": (
             100.0 * (k - 1.0),
-            "that is how much it is off, in percent; give the factor, near 1.",
+            "that is the relative error in percent. Give the factor, which is near 1.",
         ),
-        "percent": (100.0 * k, "that is in percent; give the factor, near 1."),
+        "percent": (100.0 * k, "that is in percent. Give the factor, which is near 1."),
     }
     return _Evidence(
         k, _EVIDENCE_TOLERANCES["mass"], known, "compare M q̈ + h with S τ + Jᵀ λ, both of the plan."
@@ -191,19 +223,22 @@ def _drift(case: Case, box: BlackBox) -> _Evidence:
     late = max(float(np.abs(box.equations(i).b).max()) for i in range(0, len(box), 5))
     right, of_feet = float(np.abs(b).max()), np.linalg.norm(b.reshape(len(b), -1, 3), axis=2)
     known = {
-        "planned": (0.0, "that is what the plan asked of the feet; what should it have asked?"),
+        "planned": (
+            0.0,
+            "that is what the plan required of the feet. What should it have required?",
+        ),
         "of_one_foot": (
             float(of_feet.max()),
-            "that is the length of a foot's three; give one entry.",
+            "that is the norm of the three entries of a foot. Give one entry.",
         ),
         "of_all_feet": (
             float(np.linalg.norm(b, axis=1).max()),
-            "that is the length of all of b; give its largest entry.",
+            "that is the norm of all of b. Give its largest entry.",
         ),
         "late": (
             late,
-            "that is of the whole record; in the fall everything is large. Take the first half "
-            "second.",
+            "that is for the whole record, and during the fall everything is large. Use the "
+            "first half second.",
         ),
     }
     otherwise = "b of box.equations(i), the largest entry while t < 0.5 s, without sign."
@@ -213,18 +248,18 @@ def _drift(case: Case, box: BlackBox) -> _Evidence:
 def _slow(case: Case, box: BlackBox) -> _Evidence:
     ms = case.injected_fault.size
     known = {
-        "seconds": (ms / 1e3, "in ms, please."),
+        "seconds": (ms / 1e3, "the answer must be in ms."),
         "bandwidth": (
             1e3 / (2.0 * np.pi * ms),
-            "that is the bandwidth in Hz; give the time constant in ms.",
+            "that is the bandwidth in Hz. Give the time constant in ms.",
         ),
-        "inverse": (1e3 / ms, "that is 1/T; give T in ms."),
+        "inverse": (1e3 / ms, "that is 1/T. Give T in ms."),
         "rows": (
             ms / (1e3 * float(box.time[1] - box.time[0])),
-            "that is in rows of the record; give ms.",
+            "that is in rows of the record. Give ms.",
         ),
     }
-    otherwise = "try time constants, and take the one whose lagged orders fit best."
+    otherwise = "try time constants, and take the one whose lagged commands fit best."
     return _Evidence(ms, max(_MIN_TOLERANCE, _RELATIVE_TOLERANCE * ms), known, otherwise)
 
 
@@ -238,8 +273,9 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
 
 
 def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
-    """Right for what is near enough, else the hint for the nearest of the numbers that a known
-    mistake leads to.
+    """Judge a number as evidence.
+
+    If it is wrong, the hint is that of the nearest known mistake.
     """
     if abs(x - evidence.right) <= evidence.off:
         return _RIGHT
@@ -252,4 +288,4 @@ def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
 
 
 def _wrong(fault: str, hint: str, text: str) -> Verdict:
-    return Verdict(False, f"{fault} it is. The evidence does not hold: {text}", hint)
+    return Verdict(False, f"{fault} is right, but the evidence is not: {text}", hint)

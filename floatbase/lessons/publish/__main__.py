@@ -1,11 +1,10 @@
-"""`python -m floatbase.lessons.publish`: run, map and publish the lessons, and prepare a learner's
-copy of them.
-"""
+"""Command line of the course: run, map and publish lessons, grade answers, copy lessons."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 from floatbase.errors import InputError
@@ -22,7 +21,7 @@ SOLUTIONS = Path("build/solutions")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command. arguments: those of the command line by default."""
+    """Run the command of the command line, or of `arguments`."""
     parser = argparse.ArgumentParser(
         prog="python -m floatbase.lessons.publish", description=__doc__
     )
@@ -30,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     stored = commands.add_parser("run", help="run lessons and store what they print")
     stored.add_argument(
-        "lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="all of the course by default"
+        "lessons", nargs="*", type=Path, metavar="NOTEBOOK", help="the whole course by default"
     )
     commands.add_parser(
         "map", help="write equations.md, conventions.md and the README's table of lessons"
@@ -41,16 +40,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         nargs="*",
         type=Path,
         metavar="NOTEBOOK",
-        help="those that it has; all by default",
+        help="lessons to include; all by default",
     )
     shown.add_argument(
-        "--stored", action="store_true", help="run none; show what the notebooks hold"
+        "--stored", action="store_true", help="run no lessons; use the stored outputs"
     )
     shown.add_argument(
         "--to", type=Path, metavar="FOLDER", help="where to write, build/site by default"
     )
     measured = commands.add_parser(
-        "push-recovery", help="measure the push roses of lessons, such as 05, anew"
+        "push-recovery", help="measure the push-recovery maps of lessons, such as 05, again"
     )
     measured.add_argument("lessons", nargs="+", metavar="LESSON")
     keys = commands.add_parser(
@@ -64,24 +63,29 @@ def main(arguments: Sequence[str] | None = None) -> None:
         help=f"where to write, {SOLUTIONS} by default",
     )
     graded = commands.add_parser(
-        "grade", help="judge the answers in files that learners wrote by hand_in(…)"
+        "grade", help="grade the files that learners wrote with hand_in(…)"
     )
     graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
     graded.add_argument(
-        "--table", type=Path, metavar="CSV", help="write a row for each learner and exercise, too"
+        "--table", type=Path, metavar="CSV", help="also write a row per learner and exercise"
+    )
+    graded.add_argument("--code", action="store_true", help="print the code that was handed in")
+    graded.add_argument(
+        "--latest", action="store_true", help="grade only the last file of each learner"
     )
     graded.add_argument(
-        "--code", action="store_true", help="print code that was handed in, to be read"
+        "--before",
+        type=datetime.fromisoformat,
+        metavar="TIME",
+        help="leave out files written after TIME, such as 2026-05-31T18:00",
     )
-    laid = commands.add_parser(
-        "workspace", help="bring the learner's copy of the course up to date"
-    )
+    laid = commands.add_parser("workspace", help="update the learner's copy of the course")
     laid.add_argument(
         "--to",
         type=Path,
         default=None,
         metavar="FOLDER",
-        help="where that is, notebooks/my by default",
+        help="folder of the copy, notebooks/my by default",
     )
 
     given = parser.parse_args(arguments)
@@ -97,7 +101,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
-            _grade(given.files, given.table, given.code)
+            unread = _grade(given.files, given.table, given.code, given.latest, given.before)
+            if unread:
+                parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
         else:
             for line in prepare_workspace(mine=given.to):
                 print(line)
@@ -131,16 +137,21 @@ def _solutions(folder: Path) -> None:
         print(path)
 
 
-def _grade(files: Sequence[Path], table: Path | None, code: bool) -> None:
+def _grade(
+    files: Sequence[Path], table: Path | None, code: bool, latest: bool, before: datetime | None
+) -> int:
     from floatbase.lessons.publish import grades
 
-    submissions = grades.grade_files(files)
+    submissions, unread = grades.grade_files(
+        files, latest=latest, before=before.astimezone() if before else None
+    )
     print(grades.overview(submissions))
     if code:
         print(grades.code_to_read(submissions))
     if table:
         grades.write_table(submissions, table)
         print(f"All marks: {table}")
+    return unread
 
 
 def _site(lessons: Sequence[Path] | None, folder: Path | None, stored: bool) -> None:

@@ -14,10 +14,18 @@ _END = "<!-- end of lessons -->\n"
 
 
 def lesson_table(folder: Path = NOTEBOOKS) -> str:
-    """The lessons as a table of Markdown: number, title, equations.
+    """Write the table of lessons as Markdown: number, title, equations.
 
-    folder: of the notebooks, whose names start with their number, as in
+    Parameters
+    ----------
+    folder : Path
+        Folder of the notebooks, whose names start with their number, as in
         02_equations_of_motion.ipynb.
+
+    Returns
+    -------
+    str
+        The table.
     """
     lines = ["| | lesson | equations |", "|---|---|---|"]
     for path in sorted(folder.glob("*.ipynb")):
@@ -27,13 +35,13 @@ def lesson_table(folder: Path = NOTEBOOKS) -> str:
 
 
 def readme_with_table(text: str) -> str:
-    """The text of the README with the present table between its two marks."""
+    """Replace the table of lessons in the text of the README."""
     before, rest = text.split(_BEGIN)
     return f"{before}{_BEGIN}\n{lesson_table()}\n{_END}{rest.split(_END)[1]}"
 
 
 def title_of(source: Path) -> str:
-    """The first heading of a lesson or of a text in Markdown."""
+    """Return the first heading of a lesson or of a Markdown file."""
     if source.suffix == ".ipynb":
         text = next(
             (cell.source for cell in read_notebook(source).cells if cell.cell_type == "markdown"),
@@ -46,9 +54,7 @@ def title_of(source: Path) -> str:
 
 
 def equations_taught(lesson: Path) -> set[str]:
-    """The equations and appendices of the course text that a lesson teaches, "(9)" or "App. A":
-    what its cells say as metadata.
-    """
+    """Return the equations that a lesson teaches, from the metadata of its cells."""
     return {
         equation
         for cell in read_notebook(lesson).cells
@@ -57,7 +63,7 @@ def equations_taught(lesson: Path) -> set[str]:
 
 
 def equation_ranges(lesson: Path) -> str:
-    """The equations that a lesson teaches, in short: "(8)-(13), (16), App. A"; none is ""."""
+    """Abbreviate the equations that a lesson teaches, as in "(8)-(13), (16), App. A"."""
     taught = equations_taught(lesson)
     numbers = sorted(
         int(equation.strip("()")) for equation in taught if not equation.startswith("App.")

@@ -1,6 +1,4 @@
-"""The page of conventions: the text of `floatbase.conventions`, and every tolerance with its
-reason.
-"""
+"""The page of conventions: the text of `floatbase.conventions`, and every threshold of the code."""
 
 from __future__ import annotations
 
@@ -16,14 +14,14 @@ _SKIPPED_PACKAGES = (
     "lessons",
     "viewer",
 )  # their numbers choose what is drawn, not what is answered
-# NAME = 1e-9  # the reason; or a tuple, a quotient, or a number made by float() or int(); the
-# reason may also be in comment lines above
-_VALUE = r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]*)"
+# NAME = 1e-9  # the reason; the value may be a tuple, a quotient, or a call of float() or int().
+# The reason may be in comment lines above.
+_VALUE = r"^_?([A-Z][A-Z0-9_]*)(?:: \w+)? = ((?:[-(\d]|float\(|int\()[^#\"\n]+)"
 _TOLERANCE = re.compile(rf"((?:^# [^\n]+\n)*){_VALUE}(?:  # ([^\n]+))?$", re.MULTILINE)
 
 
 def page() -> str:
-    """The page of conventions as Markdown."""
+    """Write the page as Markdown."""
     first, *rest = _with_symbol_table(conventions.__doc__ or "").split("\n", 1)
     rows = [
         f"| {package} | `{name}` | {value} | {reason} |"
@@ -38,8 +36,8 @@ def page() -> str:
             "",
             "Tolerances",
             "----------",
-            "Every number that decides a case, where it stands, and why it is what it is. Made "
-            "from the code by",
+            "Every threshold in the code: where it is and why it has that value. Generated from "
+            "the code by",
             "`python -m floatbase.lessons.publish map`; do not edit.",
             "",
             "| file | name | value | meaning and reason |",
@@ -51,9 +49,7 @@ def page() -> str:
 
 
 def _with_symbol_table(text: str) -> str:
-    """The text with its indented lines, which are symbols and their meaning, as a table of
-    Markdown.
-    """
+    """Turn the indented lines of the text, symbols and their meaning, into a table."""
     lines: list[str] = []
     symbol = re.compile(r"^    (\S.*?)\s{2,}(.+)$")
     for line in text.splitlines():
@@ -70,9 +66,7 @@ def _with_symbol_table(text: str) -> str:
 
 
 def tolerances() -> Iterator[tuple[str, str, str, str]]:
-    """File, name, value and reason of every numeric constant of the package, each as its source
-    states it.
-    """
+    """Yield file, name, value and reason of every numeric constant, as the source states them."""
     for path in sorted(_PACKAGE.rglob("*.py")):
         place = path.relative_to(_PACKAGE)
         if place.parts[0] not in _SKIPPED_PACKAGES:

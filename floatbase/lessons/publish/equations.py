@@ -1,9 +1,9 @@
-"""The map equation -> function -> test -> lesson, read from docstrings, tests and lessons; the
-formulas stand in `formulas`.
+"""The page of equations: each equation with its functions, tests and lessons.
 
-A public docstring that starts with equation numbers, as in "(9) ζ: τ -> λ", or with an appendix, as
-in "App. A: …", stands for them. Public is what a package exports. A test counts where it names that
-function, a lesson where the metadata of a cell says that it teaches the equation.
+A public docstring that cites the course text, as in "[FBR]_, eq. (9)." or "[FBR]_, App. A.",
+implements that equation. Public names are those that a package exports. A test counts if it names
+the function, a lesson if the metadata of one of its cells says that it teaches the equation.
+`formulas` has the equations themselves.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ from floatbase.lessons.publish.formulas import FORMULAS, NOTES, SECTIONS, Formul
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 TITLES = {formula.number: formula.title for formula in FORMULAS}
+_CITATION = re.compile(
+    r"\[FBR\]_,\s+(?:eqs?\.\s+)?((?:(?:\(\d+\)|App\. [ABC])(?:,?\s+(?:and\s+)?|-)?)+)"
+)
 _LEADING_NUMBERS = re.compile(r"\s*((?:\(\d+\))+|App\. [ABC])")
 _NUMBER = re.compile(r"\(\d+\)|App\. [ABC]")
 _TESTS = Path(floatbase.__file__).parents[1] / "tests"
@@ -31,11 +34,16 @@ _SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # packages that show an
 
 @dataclass(frozen=True)
 class Entry:
-    """One public thing that implements equations.
+    """A public name that implements equations.
 
-    path: as users import it, package and name, such as "dynamics.forces_from_torques". equations:
-        their numbers, such as "(9)".
-    tests: those that name it, as "file::test".
+    Parameters
+    ----------
+    path : str
+        Package and name, such as "dynamics.forces_from_torques".
+    equations : tuple of str
+        Numbers of the equations, such as "(9)".
+    tests : tuple of str
+        Tests that use the name, as "file::test".
     """
 
     path: str
@@ -44,37 +52,42 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Everything public whose docstring starts with an equation number or an appendix, with its
-    tests.
+    """List every public name whose docstring cites an equation or an appendix, with its tests.
 
-    A class is tested where it is named or where a function that returns it is; a member where both
-    it and its class are.
+    A test of a class names the class or a function that returns it. A test of a member names both
+    the member and its class.
     """
     named = _tests_by_name()
     found = []
     for path, docstring, makers in _public_objects():
-        start = _LEADING_NUMBERS.match(docstring)
-        if start:
+        cited = " ".join(_CITATION.findall(docstring))
+        if start := _LEADING_NUMBERS.match(docstring):
+            cited = start[1] + cited
+        if cited:
             tests = set().union(*(named.get(maker, set()) for maker in makers))
             if path.count(".") > 1:  # package.Class.member
                 tests &= named.get(path.rsplit(".", 1)[1], set())
-            found.append(Entry(path, tuple(_NUMBER.findall(start[1])), tuple(sorted(tests))))
+            found.append(
+                Entry(path, tuple(dict.fromkeys(_NUMBER.findall(cited))), tuple(sorted(tests)))
+            )
     return found
 
 
 def table() -> str:
-    """The map as a page of Markdown."""
+    """Write the page as Markdown."""
     found = entries()
     taught = {path.name: equations_taught(path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
     lines = [
-        "# The map: equation → function → test → lesson",
+        "# Equations",
         "",
-        "Every equation of the course text *Controlling Floating-Based Robots* that the course "
-        "follows, section by section, in",
-        "our own words. Made from docstrings, tests and lessons by `python -m "
-        "floatbase.lessons.publish map`; do not edit. A",
-        "function such as `dynamics.forces_from_torques` is imported by `from floatbase.dynamics "
-        "import forces_from_torques`.",
+        "Every equation of the course text *Controlling Floating-Based Robots*, by section, with "
+        "the functions that implement it,",
+        "the lessons that teach it, and the tests that use it. Import a function such as "
+        "`dynamics.forces_from_torques` with",
+        "`from floatbase.dynamics import forces_from_torques`.",
+        "",
+        "This page is generated from docstrings, tests and lessons by `python -m "
+        "floatbase.lessons.publish map`; do not edit it.",
     ]
     for section in SECTIONS:
         lines += ["", f"## {section.number} {section.title}", "", section.summary]
@@ -88,9 +101,7 @@ def table() -> str:
 
 
 def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
-    """An equation in lines of Markdown: formula, meaning, functions, lessons, tests. An appendix
-    has one, unnumbered.
-    """
+    """Write the lines of one equation: formula, meaning, functions, lessons, tests."""
     appendix = formula.number == formula.section
     tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
     tag = "" if appendix else f" \\tag{{{formula.number.strip('()')}}}"
@@ -104,9 +115,7 @@ def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) ->
 
 
 def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
-    """Path, docstring and the names that make it, of every public function, class, method and
-    property, each once.
-    """
+    """Yield path, docstring and the names of makers of every public name and member, once each."""
     own = list(_exported_objects())
     for package, name, value in own:
         makers = [name] + [maker for _, maker, made in own if _returns(made) == name]
@@ -119,9 +128,7 @@ def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
 
 
 def _exported_objects() -> Iterator[tuple[str, str, object]]:
-    """Package, name and value of every function and class that a package exports and defines
-    itself.
-    """
+    """Yield package, name and value of what each package exports and defines itself."""
     for found in pkgutil.iter_modules(floatbase.__path__):
         if found.name.startswith("_") or found.name in _SKIPPED_PACKAGES:
             continue
@@ -135,19 +142,17 @@ def _exported_objects() -> Iterator[tuple[str, str, object]]:
 
 
 def _is_protocol(value: type) -> bool:
-    """Whether a class only says what others must offer."""
+    """Whether a class is a protocol."""
     return bool(getattr(value, "_is_protocol", False))
 
 
 def _returns(value: object) -> str:
-    """Name of what a function returns, as its annotation says."""
+    """Return the annotated return type of a function, as text."""
     return str(getattr(value, "__annotations__", {}).get("return", ""))
 
 
 def _tests_by_name() -> dict[str, set[str]]:
-    """For every name that a test uses, directly or through a helper of its file, the tests that use
-    it.
-    """
+    """Map each name to the tests that use it, directly or through a helper of the same file."""
     found: dict[str, set[str]] = {}
     for path in sorted(_TESTS.rglob("test_*.py")):
         functions = {
@@ -168,6 +173,6 @@ def _tests_by_name() -> dict[str, set[str]]:
 
 
 def _identifiers(node: ast.AST) -> set[str]:
-    """All names and attributes below a node."""
+    """Return all names and attributes below a node."""
     names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
     return names | {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}

@@ -1,14 +1,19 @@
-"""What learners have handed in, judged again: a line for each of them, and a table of all marks. No
-code of theirs is run.
+"""Grade the files of `hand_in`: an overview of all learners, and a table of all results.
+
+No code of a learner is run.
 """
 
 from __future__ import annotations
 
 import csv
 import json
+import math
+import os
+import stat
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from textwrap import indent
 from typing import Any
@@ -23,19 +28,28 @@ from floatbase.lessons.submission import FILE_FORMAT
 
 _LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.1 MB
 _REQUIRED_KEYS = {"name": str, "exercises": dict, "predictions": dict}
-_INDENT = "    "  # of code, so that no line of it passes for a heading
+_INDENT = "    "  # of code, so that no line of it looks like a heading
 _NOT_TRIED, _TO_BE_READ = "·", "to be read"
 _COLUMNS = ("file", "name", "time", "exercise", "result", "tries", "feedback")
-_FORMULA_STARTS = tuple("=+-@\t\r\n＝＋－＠")  # a spreadsheet may run a text that begins so
+_FORMULA_STARTS = tuple(
+    "=+-@\t\r\n＝＋－＠"
+)  # a spreadsheet may evaluate text that begins with one of these
 
 
 @dataclass(frozen=True)
 class ExerciseResult:
-    """What came of one exercise of one learner.
+    """Result of one exercise of one learner.
 
-    exercise: its name. tries: how many. result: "right", "wrong", "to be read" for code that the
-        learner's own check judged,
-    or "·" where it was not tried. feedback: what the check says now, or the code to be read.
+    Parameters
+    ----------
+    exercise : str
+        Name of the exercise.
+    tries : int
+        Number of tries.
+    result : {"right", "wrong", "to be read", "·"}
+        "to be read" for code, which only the learner's own check has judged; "·" if not tried.
+    feedback : str
+        Feedback of the check, or the code to be read.
     """
 
     exercise: str
@@ -46,10 +60,20 @@ class ExerciseResult:
 
 @dataclass(frozen=True)
 class Submission:
-    """What a file of `hand_in` is worth. file: its name. name: the learner's. time: when it was
-    written.
+    """Grades of one file of `hand_in`.
 
-    results: of every exercise. predicted: how many predictions were made.
+    Parameters
+    ----------
+    file : str
+        Name of the file.
+    name : str
+        Name of the learner.
+    time : str
+        Time at which the file was written.
+    results : tuple of ExerciseResult
+        Result of every exercise.
+    predicted : int
+        Number of predictions.
     """
 
     file: str
@@ -60,10 +84,14 @@ class Submission:
 
 
 def grade_file(path: str | Path) -> Submission:
-    """Judge every answer of a file that `hand_in` wrote again: what it claims does not count, and
-    none of its code is run.
+    """Judge again every answer of a file that `hand_in` wrote.
 
-    Raises `InputError` where the file is none of `hand_in`.
+    The results that the file claims do not count, and none of its code is run.
+
+    Raises
+    ------
+    InputError
+        If `hand_in` did not write the file.
     """
     found = _read(Path(path))
     return Submission(
@@ -76,10 +104,13 @@ def grade_file(path: str | Path) -> Submission:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The content of a file of `hand_in`."""
+    """Read a file of `hand_in`."""
     try:
-        large = path.stat().st_size > _LARGEST_FILE
-        found = None if large else json.loads(path.read_bytes())
+        # a FIFO or a device in a shared folder must not stop the grading of the others
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            is_file = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+            data = file.read(_LARGEST_FILE + 1) if is_file else b""
+        found = None if len(data) > _LARGEST_FILE else json.loads(data)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError):
@@ -90,7 +121,8 @@ def _read(path: Path) -> dict[str, Any]:
         found = {}
     if found.get("form") != FILE_FORMAT:
         raise InputError(
-            f"{path} is not a file that hand_in(…) wrote, or it was cut short. Ask for it again."
+            f"{path} was not written by hand_in(…), or it is incomplete. Ask the learner to send "
+            f"it again."
         )
     return found
 
@@ -120,31 +152,73 @@ def _exercise_results(entries: dict[str, Any]) -> Iterator[ExerciseResult]:
 
 
 def _one_line(value: Any) -> str:
-    """As text on one short line, whatever it is."""
+    """Turn any value into text on one short line."""
     return "".join(letter if letter.isprintable() else " " for letter in str(value))[:80]
 
 
-def grade_files(files: Sequence[Path]) -> list[Submission]:
-    """Judge the files, in their order. One that `hand_in` did not write is told on the error stream
-    and left out.
+def grade_files(
+    files: Sequence[Path], *, latest: bool = False, before: datetime | None = None
+) -> tuple[list[Submission], int]:
+    """Judge files in their order, and report those that `hand_in` did not write.
 
-    Raises `InputError` where none is left.
+    Parameters
+    ----------
+    files : sequence of Path
+        The files.
+    latest : bool
+        Whether to keep only the last file of each name.
+    before : datetime, optional
+        Whether to leave out files that were written later, or that do not say when.
+
+    Returns
+    -------
+    submissions : list of Submission
+        The grades.
+    unread : int
+        Number of files that could not be read.
+
+    Raises
+    ------
+    InputError
+        If no file is left.
     """
-    submissions = []
-    for path in tqdm(files, desc="judging", unit="file", leave=False, disable=None):
+    submissions, unread = [], 0
+    for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
             submissions.append(grade_file(path))
         except InputError as error:
             print(error, file=sys.stderr)
+            unread += 1
+    if before:
+        times = [_time_of(one) for one in submissions]
+        submissions = [
+            one for one, time in zip(submissions, times, strict=True) if time and time <= before
+        ]
+    if latest:
+        last = {one.name: one for one in sorted(submissions, key=lambda one: _order(one))}
+        submissions = [one for one in submissions if last[one.name] is one]
     if not submissions:
-        raise InputError("No file is left to judge: give files that learners wrote by hand_in(…).")
-    return submissions
+        raise InputError(
+            "There is no file to grade. Name files that learners wrote with hand_in(…)."
+        )
+    return submissions, unread
+
+
+def _time_of(submission: Submission) -> datetime | None:
+    """Return when a file was written, or None if it does not say so."""
+    try:
+        return datetime.fromisoformat(submission.time).astimezone()
+    except ValueError:
+        return None
+
+
+def _order(submission: Submission) -> float:
+    time = _time_of(submission)
+    return time.timestamp() if time else -math.inf
 
 
 def overview(submissions: Sequence[Submission]) -> str:
-    """A line for each learner: exercises that are right, lesson by lesson, and all; how much code
-    there is to read.
-    """
+    """Write one line per learner: correct exercises per lesson and in total, and unread code."""
     lessons = sorted({mark.exercise.split(".")[0] for mark in submissions[0].results})
     names = [one.name for one in submissions]
     rows = [("", *lessons, "all", "to be read", "predictions")]
@@ -170,7 +244,7 @@ def overview(submissions: Sequence[Submission]) -> str:
 
 
 def code_to_read(submissions: Sequence[Submission]) -> str:
-    """All code that was handed in, indented: what a check cannot judge without running it."""
+    """Return all code that was handed in, indented."""
     found = [
         (one.name, mark)
         for one in submissions
@@ -184,13 +258,17 @@ def code_to_read(submissions: Sequence[Submission]) -> str:
 
 
 def _printable(code: str) -> str:
-    """Code without characters that would work the terminal."""
+    """Replace characters that would control the terminal."""
     return "".join(letter if letter.isprintable() or letter in "\n\t" else "?" for letter in code)
 
 
 def write_table(submissions: Sequence[Submission], path: Path) -> None:
-    """Write a row for each learner and exercise, as CSV. Raises `InputError` where the file cannot
-    be written.
+    """Write a row per learner and exercise as CSV.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
     rows = [
         (one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback)
@@ -207,5 +285,8 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
 
 
 def _csv_safe(value: object) -> object:
-    """A value that a spreadsheet takes for a text and not for a formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA_STARTS) else value
+    """Keep a spreadsheet from reading a value as a formula, also one that splits cells at ";"."""
+    if not isinstance(value, str):
+        return value
+    value = value.replace(";", ",")
+    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value

@@ -1,6 +1,4 @@
-"""The lessons as files: run them and store what they print, without pictures; put solutions in
-place of stubs.
-"""
+"""Run the lessons, store their printed output, and insert solutions."""
 
 from __future__ import annotations
 
@@ -17,14 +15,14 @@ from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 
 def read_notebook(path: Path) -> Any:
-    """A notebook."""
+    """Read a notebook."""
     import nbformat
 
     return nbformat.read(path, as_version=4)
 
 
 def with_solutions(notebook: Any) -> Any:
-    """The notebook with the solution in place of each exercise's stub. Changes it in place."""
+    """Replace each exercise's stub by its solution, in place."""
     known = all_exercises()
     for cell in notebook.cells:
         name = cell.metadata.get("exercise")
@@ -34,11 +32,10 @@ def with_solutions(notebook: Any) -> Any:
 
 
 def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
-    """Run all cells in a fresh kernel in `folder`, in place; an error in a cell is raised.
+    """Run all cells in a new kernel in `folder`, in place; an error in a cell is raised.
 
-    settings: more of the kernel's environment. FLOATBASE_HOME is a new folder, so that what the
-        notebook answers is not
-    counted as a learner's progress.
+    `settings` are further environment variables of the kernel. FLOATBASE_HOME is a new folder, so
+    that the notebook's answers do not count as a learner's progress.
     """
     from nbclient import NotebookClient
 
@@ -54,10 +51,19 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
 
 
 def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
-    """Write lessons with the solution of each exercise in its place, and why it is right below;
-    returns the files.
+    """Write lessons with a solution in place of each exercise, and an explanation below it.
 
-    folder: made if need be. sources: the lessons, all of the course by default.
+    Parameters
+    ----------
+    folder : Path
+        Where to write; it is created if it does not exist.
+    sources : sequence of Path
+        The lessons; the default is the whole course.
+
+    Returns
+    -------
+    list of Path
+        The files written.
     """
     import nbformat
     from nbformat.v4 import new_markdown_cell
@@ -78,9 +84,7 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
 
 
 def run_and_store(path: Path) -> None:
-    """Run a lesson and store its printed outputs; pictures are drawn anew by whoever opens it, so
-    they are not stored.
-    """
+    """Run a lesson and store its printed output. Pictures are drawn again by every reader."""
     import nbformat
 
     notebook = execute_notebook(read_notebook(path), path.parent)

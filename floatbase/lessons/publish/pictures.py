@@ -1,9 +1,8 @@
-"""Pictures, recordings and panels of a site: what outputs hold of them as HTML, and the files that
-a browser draws them from.
+"""Pictures, recordings and panels of the site: HTML, and the files that a browser draws them from.
 
-All share one copy of the viewer, and pictures of a robot one copy of its meshes. Every file but the
-viewer's is named after what it holds, so files of an earlier build still fit. They are scripts,
-which a browser also loads where there is no server.
+All pictures share one copy of the viewer, and the pictures of a robot share one copy of its meshes.
+The name of every other file is a digest of its contents, so files of an earlier build remain valid.
+The files are scripts, which a browser can also load from disk.
 """
 
 from __future__ import annotations
@@ -29,8 +28,12 @@ _NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
-    """The pictures of a site. folder: that of pictures.js in the built site; the files come into
-    `pictures` inside it.
+    """The pictures of a site.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of pictures.js in the built site. The files are written to `pictures` inside it.
     """
 
     def __init__(self, folder: Path):
@@ -38,9 +41,7 @@ class Pictures:
         self._placed: dict[str, tuple[dict[str, Any], list[bytes]]] = {}
 
     def place(self, data: Mapping[str, Any]) -> str | None:
-        """HTML for the mimebundle of an output that holds a picture, a recording or a panel; None
-        where it holds none.
-        """
+        """Return HTML for the mimebundle of an output, or None if it has no picture."""
         if static_export.MIME not in data:
             return None
         description = dict(data[static_export.MIME])
@@ -74,10 +75,10 @@ class Pictures:
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _shared_files(self) -> dict[str, list[bytes]]:
-        """Large commands that several pictures have, name of a file -> commands.
+        """Collect large commands that several pictures use: name of a file -> commands.
 
-        There is a file for all robots, and for each robot one of what its pictures usually have and
-        one of the rest.
+        One file is for all robots. Each robot has one file for what most of its pictures use, and
+        one for the rest.
         """
         pictures = [
             (set(description["names"]), set(commands))
@@ -108,14 +109,12 @@ class Pictures:
 
 
 def _file_name(begin: str, *parts: bytes) -> str:
-    """A name for a file with these contents."""
+    """Name a file after a digest of its contents."""
     return f"{begin}-{hashlib.sha256(protocol.frame(parts)).hexdigest()[:12]}"
 
 
 def _figure_html(name: str, description: dict[str, Any]) -> str:
-    """The figure as it is until its script comes: images of the first moment, its note, and
-    controls that do not move yet.
-    """
+    """Write the figure before its script loads: first images, note, and disabled controls."""
     scenes = "".join(
         f'<div class="floatbase-scene" '
         f'style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
@@ -154,9 +153,7 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
 
 
 def _control_html(control: dict[str, Any]) -> str:
-    """A control as the browser's own element. Its value is the number of a stop, its text what that
-    is called.
-    """
+    """Write a control as a plain HTML element. Its value is the index of a slider sample."""
     name, unit, first = html.escape(control["name"]), html.escape(control["unit"]), control["first"]
     named = f"{name} [{unit}]" if unit else name
     if control["kind"] == "switch":

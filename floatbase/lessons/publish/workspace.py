@@ -1,8 +1,6 @@
-"""The learner's own copy of the lessons: missing ones are copied, and the learner's work is never
-overwritten.
+"""Keep the learner's own copy of the lessons up to date without overwriting the learner's work.
 
-`make lab` prepares it before it opens the course there. Notebooks are read as the JSON that they
-are, which is quick.
+`make lab` calls this before it opens the course. It reads notebooks as JSON, which is fast.
 """
 
 from __future__ import annotations
@@ -18,9 +16,14 @@ from floatbase.errors import InputError
 
 NOTEBOOKS = Path(__file__).parents[3] / "notebooks"  # of the course
 MY_FOLDER = "my"
-_RECORD_FILE = ".from.json"  # file name -> digest of the course's text that the learner got last
-_NOT_A_NOTEBOOK = (ValueError, LookupError, TypeError, AttributeError)  # what such JSON raises
-# what JupyterLab writes when a notebook is only run and looked at: all else is the learner's
+_RECORD_FILE = ".from.json"  # file name -> digest of the text that the learner received last
+_NOT_A_NOTEBOOK = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+)  # exceptions that such JSON raises
+# what JupyterLab writes when a notebook is only run and viewed; all else is the learner's work
 _RUN_KEYS = {"kernelspec", "language_info", "orig_nbformat", "signature", "widgets"}
 _RUN_CELL_KEYS = {
     "collapsed", "execution", "jp-MarkdownHeadingCollapsed", "jupyter", "scrolled", "trusted",
@@ -28,22 +31,32 @@ _RUN_CELL_KEYS = {
 
 
 def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> list[str]:
-    """Copy lessons that the learner does not have; returns a line for each file that changed, or
-    could not be.
+    """Copy new lessons to the learner's folder, and update those that were not edited.
 
-    folder: of the course. mine: of the learner's copies, folder/my by default.
+    A lesson that the learner has not edited is replaced if the course has a newer text. An edited
+    lesson stays, and the newer text is saved beside it as NAME.new.ipynb, or NAME.new2.ipynb if the
+    learner has edited that file too, and so on. Outputs do not count as edits.
 
-    A lesson that the learner has not written in is replaced when the course has a newer text. One
-    that the learner has written in stays as it is; the course's newer text is put beside it as
-    NAME.new.ipynb, or NAME.new2.ipynb where the learner has written in the first, and so on.
-    Outputs do not count as writing.
+    Parameters
+    ----------
+    folder : Path
+        Lessons of the course.
+    mine : Path, optional
+        The learner's copies; the default is `folder`/my.
 
-    Raises `InputError` where there can be no such folder, and where the course is not: the package
-    alone, as a wheel has it, has no lessons.
+    Returns
+    -------
+    list of str
+        One line for each file that was changed or could not be changed.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be created, or if the course is not installed: a wheel has no lessons.
     """
     if not folder.is_dir():
         raise InputError(
-            f"there are no lessons in {folder}. Install floatbase from its repository, by `pip "
+            f"There are no lessons in {folder}. Install floatbase from its repository with `pip "
             f"install -e`."
         )
     mine = folder / MY_FOLDER if mine is None else mine
@@ -51,7 +64,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
         mine.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"{mine} cannot be made: {error.strerror}. It must be a folder that you may write to."
+            f"The folder {mine} cannot be created: {error.strerror}. Choose one that you can write "
+            f"to."
         ) from None
     record, messages = _read_record(mine / _RECORD_FILE), []
     for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
@@ -61,8 +75,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
             messages.append(_failure(source.name, error))
         except _NOT_A_NOTEBOOK:
             messages.append(
-                f"{source.name}: not brought up to date: the course's own is no notebook. `git "
-                f"status` may say why."
+                f"{source.name}: not updated, because the course's file is not a notebook. `git "
+                f"status` may show why."
             )
     try:
         _write(mine / _RECORD_FILE, json.dumps(record, indent=1).encode())
@@ -73,14 +87,15 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
 
 def _failure(name: str, error: OSError) -> str:
     return (
-        f"{name}: not brought up to date: {error.strerror}. Check that you may read and write "
+        f"{name}: not updated: {error.strerror}. Check that you can read and write "
         f"{error.filename}, then start again."
     )
 
 
 def _update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
-    """Put the course's present text under the first name that is free or that the learner has not
-    written in, unless the learner has got it; what happened, in a line or none.
+    """Save the course's text under the first name that is free or holds an unedited copy.
+
+    Returns a line that says what happened, or none if the learner already has this text.
     """
     present, last = _digest(copy.name, text), record.get(copy.name)
     beside = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
@@ -94,17 +109,17 @@ def _update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
         if found == present:
             record[copy.name] = present
             return []
-        if found == last and not target.is_symlink():  # a link may lead to anything of the learner
+        if found == last and not target.is_symlink():  # a link may point to any file of the learner
             break
         target = next(beside)
-        message = f"{copy.name}: yours is kept; the course's new text is in {target.name}"
+        message = f"{copy.name}: your copy is kept; the new text is in {target.name}"
     _write(target, text)
     record[copy.name] = present
     return [message]
 
 
 def _write(path: Path, text: bytes) -> None:
-    """All of a file or nothing: a full disk leaves what was there."""
+    """Write a whole file or nothing, so that a full disk leaves the former file."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.write_bytes(text)
@@ -114,7 +129,7 @@ def _write(path: Path, text: bytes) -> None:
 
 
 def _read_record(path: Path) -> dict[str, str]:
-    """Without it each lesson with another text than the course's counts as written in."""
+    """Read the record of digests. Without it, every other text counts as edited."""
     try:
         found = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
@@ -123,7 +138,7 @@ def _read_record(path: Path) -> dict[str, str]:
 
 
 def _course_text(source: Path) -> bytes:
-    """A lesson is copied without its outputs: they would answer what the learner is to predict."""
+    """Read a lesson without outputs, which would give predictions away."""
     if source.suffix != ".ipynb":
         return source.read_bytes()
     notebook = _without_outputs(json.loads(source.read_bytes()))
@@ -131,7 +146,7 @@ def _course_text(source: Path) -> bytes:
 
 
 def _without_outputs(notebook: Any) -> Any:
-    """The notebook as if it had never been run. Changes it in place."""
+    """Remove all outputs of a notebook, in place."""
     for cell in notebook["cells"]:
         if cell["cell_type"] == "code":
             cell["outputs"], cell["execution_count"] = [], None
@@ -140,7 +155,7 @@ def _without_outputs(notebook: Any) -> Any:
 
 
 def _digest(name: str, data: bytes) -> str:
-    """A digest of what is written in a file; of a notebook without what running it adds."""
+    """Compute a digest of a file; of a notebook without what running it adds."""
     if name.endswith(".ipynb"):
         try:
             data = json.dumps(_authored_content(json.loads(data)), sort_keys=True).encode()
@@ -150,7 +165,7 @@ def _digest(name: str, data: bytes) -> str:
 
 
 def _authored_content(notebook: Any) -> tuple[list[Any], dict[str, Any]]:
-    """Cells and metadata without outputs and empty cells: Shift+Enter in the last cell adds one."""
+    """Return cells and metadata without outputs and empty cells."""
     cells = []
     for cell in _without_outputs(notebook)["cells"]:
         if cell["source"] or cell.get("attachments"):

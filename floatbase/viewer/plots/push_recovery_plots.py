@@ -1,6 +1,4 @@
-"""Push roses and the compass of the reachable force, as polar plots and drawn on the ground below
-the robot.
-"""
+"""Push-recovery maps and maximum horizontal forces, as polar plots and in pictures."""
 
 from __future__ import annotations
 
@@ -16,15 +14,14 @@ from floatbase.errors import InputError
 from floatbase.friction import WrenchSet
 from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CALM, COM, LEGEND, LIMIT, MEASURED, RGB, WARNING
-from floatbase.viewer.scene.painter import round_1_2_5
 from floatbase.viewer.scene.shapes import Item, Picture, label, transform
 
 if TYPE_CHECKING:
     from floatbase.simulation import PushRecovery
 
-_FILL = 0.15  # opacity of what lies inside the measured curve
-_HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no gap to be seen
-_RING_SIDES = 72  # of a ring
+_FILL = 0.15  # opacity of the area inside the measured curve
+_HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no visible gap
+_RING_SIDES = 72  # number of sides of a ring
 
 _Curve: TypeAlias = tuple[
     str, Array, RGB, str
@@ -37,14 +34,30 @@ def plot(
     theory: bool = True,
     previous: PushRecovery | None = None,
 ) -> Axes:
-    """The largest pushes that were survived, N, over their directions, seen from above: x points
-    up, y to the left.
+    """Plot a push-recovery map: the largest push survived in each direction.
 
-    result: the record, as from `fb.push_recovery`.
-    axis: polar axes to plot on; None for a new figure.
-    theory: whether to draw the curves of the capture point and of a steady push too.
-    previous: another controller's rose in the same directions, to compare with; drawn in grey.
-    Raises `InputError` for axes that are not polar and for roses of different directions.
+    The map is seen from above: x points up and y to the left.
+
+    Parameters
+    ----------
+    result : PushRecovery
+        Map to plot, as from `fb.push_recovery`.
+    axis : Axes, optional
+        Polar axes to plot on. By default, a new figure.
+    theory : bool, optional
+        Whether to plot the capture-point bound and the static bound as well.
+    previous : PushRecovery, optional
+        Map of another controller for comparison, in the same directions; it is plotted in grey.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    InputError
+        If the axes are not polar, or if the two maps have different directions.
     """
     title = f"{result.state.robot.name}: pushes of {result.duration:g} s at {result.frame} [N]"
     return _plot(result.directions, _curves(result, theory, previous), title, axis)
@@ -56,15 +69,24 @@ def picture(
     theory: bool = True,
     previous: PushRecovery | None = None,
 ) -> Picture:
-    """The rose on level ground around the robot, with rings for its scale: items for `extra` of
-    `Viewer.show`.
+    """Draw a push-recovery map on level ground around the robot, with rings for its scale.
 
-        view.show(rose.state, rose.contacts, cones=False, extra=push_recovery_plots.picture(rose))
-
-    result: the record, as from `fb.push_recovery`.
-    scale: length of a drawn push, m/N; None makes its widest curve half as wide again as the
+    Parameters
+    ----------
+    result : PushRecovery
+        Map to draw, as from `fb.push_recovery`.
+    scale : float, optional
+        Length of a drawn push [m/N]. By default, the widest curve is half as wide again as the
         stance.
-    theory, previous: as for `plot`.
+    theory : bool, optional
+        Whether to draw the capture-point bound and the static bound as well.
+    previous : PushRecovery, optional
+        Map of another controller for comparison, in the same directions; it is drawn in grey.
+
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
     """
     middle = result.state.frame_pose(result.frame).translation
     return _picture(
@@ -79,18 +101,34 @@ def picture(
 def plot_horizontal_force_limits(
     wrenches: WrenchSet, axis: Axes | None = None, n: int = 72
 ) -> Axes:
-    """The horizontal forces that a stance can make at full weight without moment, N, over their
-    directions, seen from above.
+    """Plot the maximum horizontal force of a stance in each direction.
 
-    wrenches: of the stance, as from `floatbase.friction.wrench_set`.
-    axis: as for `plot`.
-    n: number of directions.
-    Raises `InputError` where a force has no end, `InfeasibleError` where the stance cannot carry
-    the weight.
+    The forces are those at full weight without moment. The plot is seen from above.
+
+    Parameters
+    ----------
+    wrenches : WrenchSet
+        Wrenches of the stance, as from `floatbase.friction.wrench_set`.
+    axis : Axes, optional
+        Polar axes to plot on. By default, a new figure.
+    n : int, optional
+        Number of directions.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    InputError
+        If the axes are not polar, or if a force is unbounded.
+    InfeasibleError
+        If the stance cannot carry the weight.
     """
     return _plot(
         *_horizontal_force_curve(wrenches, n),
-        "horizontal force at full weight without moment [N]",
+        "maximum horizontal force at full weight without moment [N]",
         axis,
     )
 
@@ -98,15 +136,28 @@ def plot_horizontal_force_limits(
 def horizontal_force_limits(
     wrenches: WrenchSet, scale: float | None = None, n: int = 72
 ) -> Picture:
-    """The compass of `plot_horizontal_force_limits` on level ground below the centre of mass, with
-    rings: items for `extra` of `Viewer.show`.
+    """Draw `plot_horizontal_force_limits` on level ground below the centre of mass, with rings.
 
-        wrenches = wrench_set(state, contacts)
-        view.show(state, contacts, extra=push_recovery_plots.horizontal_force_limits(wrenches))
+    Parameters
+    ----------
+    wrenches : WrenchSet
+        Wrenches of the stance, as from `floatbase.friction.wrench_set`.
+    scale : float, optional
+        Length of a drawn force [m/N]. By default, the curve is half as wide again as the stance.
+    n : int, optional
+        Number of directions.
 
-    wrenches, n: as for `plot_horizontal_force_limits`. scale: length of a drawn force, m/N; None
-        makes it half as wide
-    again as the stance.
+    Returns
+    -------
+    Picture
+        Items for `extra` of `Viewer.show`.
+
+    Raises
+    ------
+    InputError
+        If a force is unbounded.
+    InfeasibleError
+        If the stance cannot carry the weight.
     """
     return _picture(
         *_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale
@@ -114,12 +165,12 @@ def horizontal_force_limits(
 
 
 def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
-    """Curves over directions, rad, on polar axes."""
+    """Plot curves over directions [rad] on polar axes."""
     if axis is None:
         axis = plt.subplots(figsize=(6, 6.6), subplot_kw={"projection": "polar"})[1]
     if not isinstance(axis, PolarAxes):
         raise InputError(
-            'a rose needs polar axes: plt.subplots(subplot_kw={"projection": "polar"}).'
+            'axis must be polar axes, as from plt.subplots(subplot_kw={"projection": "polar"}).'
         )
     axis.set_theta_zero_location("N")
     for kind, values, colour, style in curves:
@@ -135,7 +186,7 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
     _, first, colour, _ = curves[0]
     axis.fill(directions, first, color=colour, alpha=_FILL)
     axis.set_rlim(0.0, 1.1 * max(values.max() for _, values, _, _ in curves))
-    axis.set_rlabel_position(34.0)  # beside the ticks, and beside the directions of 8 and 16
+    axis.set_rlabel_position(34.0)  # between the ticks, and between 8 or 16 directions
     axis.tick_params(axis="y", labelsize="small", labelcolor=LIMIT)
     axis.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
     axis.grid(alpha=0.35)
@@ -147,8 +198,9 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
 def _picture(
     directions: Array, curves: list[_Curve], middle: Array, feet: Array, scale: float | None
 ) -> Picture:
-    """Curves over directions, rad, around a point, shape (3,), on the ground below, where the feet,
-    shape (n, 3), m, stand.
+    """Draw curves over directions [rad] around a point, shape (3,), on the ground below it.
+
+    The ground is where the feet stand, shape (n, 3) [m].
     """
     centre = np.array([*middle[:2], feet[:, 2].mean() + _HEIGHT_ABOVE_GROUND])
     span = float(np.linalg.norm((feet - centre)[:, :2], axis=1).max())
@@ -160,7 +212,7 @@ def _picture(
         items[f"{kind}/line"] = _loop(
             centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2], tips, 0.015 * span, colour
         )
-    # a fan from the middle, for a rose is not convex; kind, tips and colour are those of the first
+    # a fan from the middle, as the area is not convex; kind, tips and colour are those of the first
     # curve
     inside = threejs.mesh(
         *geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]])),
@@ -170,7 +222,7 @@ def _picture(
     )
     items[f"{kind}/inside"] = Item(inside, transform(centre))
     circle = _unit_vectors(2.0 * np.pi * np.arange(_RING_SIDES) / _RING_SIDES)
-    step = round_1_2_5(largest / 3)
+    step = geometry.round_1_2_5(largest / 3)
     for force in step * np.arange(1, int(largest / step) + 1):
         items[f"{kind}/ring {force:g} N"] = _loop(
             centre, scale * force * circle, 0.006 * span, LIMIT
@@ -181,13 +233,13 @@ def _picture(
 
 
 def _curves(result: PushRecovery, theory: bool, previous: PushRecovery | None) -> list[_Curve]:
-    """The measured curve first."""
+    """Return the curves of a map, the measured one first."""
     curves = [("push_recovery", result.pushes, MEASURED, "o-")]
     if previous is not None:
         if not np.array_equal(previous.directions, result.directions):
             raise InputError(
-                f"roses of {len(result.directions)} and {len(previous.directions)} directions "
-                f"cannot be compared."
+                f"result has {len(result.directions)} directions and previous has "
+                f"{len(previous.directions)}. Both must have the same directions."
             )
         curves.append(("previous", previous.pushes, LIMIT, "o-"))
     if theory:
@@ -199,32 +251,36 @@ def _curves(result: PushRecovery, theory: bool, previous: PushRecovery | None) -
 
 
 def _horizontal_force_curve(wrenches: WrenchSet, n: int) -> tuple[Array, list[_Curve]]:
-    """Directions, rad, and the one curve."""
+    """Return the directions [rad] and the curve of the maximum horizontal force."""
     angles, forces = as_instance("wrenches", wrenches, WrenchSet).max_horizontal_forces(n)
     if not np.isfinite(forces).all():
         raise InputError(
-            "the forces of this stance have no end in some direction: give its wrench_set "
-            "max_normal_force."
+            "The horizontal force of this stance is unbounded in some direction. Pass "
+            "max_normal_force to wrench_set."
         )
     return angles, [("horizontal_force", forces, COM, "-")]
 
 
 def _unit_vectors(angles: Array | float) -> Array:
-    """Horizontal unit vectors, shape (…, 3), at angles from the x axis, rad."""
+    """Return horizontal unit vectors, shape (…, 3), at angles from the x axis [rad]."""
     return np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
 
 
 def _legend_text(kind: str) -> str:
+    """Return what the legend says about a kind of curve."""
     return next(text for key, _, text in LEGEND if key == kind)
 
 
 def _closed(values: Array) -> Array:
+    """Return values with the first one repeated at the end."""
     return np.append(values, values[0])
 
 
 def _loop(centre: Array, corners: Array, radius: float, colour: RGB) -> Item:
-    """A closed line. centre: (3,), m, world. corners: (n, 3), m, from there. radius: half its
-    width, m.
+    """Draw a closed line around `centre`, shape (3,), in the world frame [m].
+
+    `corners` are relative to the centre, shape (n, 3) [m]; `radius` is half the width of the line
+    [m].
     """
     ends = np.roll(corners, -1, axis=0)
     rods = [

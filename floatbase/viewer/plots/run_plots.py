@@ -1,4 +1,4 @@
-"""Plots of a rollout in the colours of the scene: CoM, forces, gait, friction, torques."""
+"""Plots of a rollout: centre of mass, forces, gait, friction, torques."""
 
 from __future__ import annotations
 
@@ -31,8 +31,10 @@ from floatbase.viewer.scene.colours import (
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-MIN_LOAD = 0.01  # of the weight: the direction of a smaller force says nothing about friction
-_INSIDE: dict[str, Any] = {"loc": "upper right"}  # where the legend is
+MIN_LOAD = (
+    0.01  # fraction of the weight: the direction of a smaller force says nothing about friction
+)
+_INSIDE: dict[str, Any] = {"loc": "upper right"}  # position of the legend
 _ABOVE: dict[str, Any] = {
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 1.0),
@@ -42,7 +44,18 @@ _ABOVE: dict[str, Any] = {
 
 
 def plot_run(rollout: Rollout) -> Figure:
-    """A figure of four plots: centre of mass, normal forces, friction used, torques."""
+    """Plot a rollout: centre of mass, normal forces, used friction, and torques.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+
+    Returns
+    -------
+    Figure
+        Figure with four plots.
+    """
     as_rollout(rollout)
     figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
     for plotted, axis in zip(
@@ -56,20 +69,44 @@ def plot_run(rollout: Rollout) -> Figure:
 
 
 def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """How far the centre of mass has moved since the start in x, y and z, mm. axis: to plot on;
-    None for a new figure.
+    """Plot the displacement of the centre of mass since the start in x, y and z [mm].
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axis : Axes, optional
+        Axes to plot on. By default, a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
     moved = 1000.0 * (rollout.com - rollout.com[0])
     for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
         axis.plot(rollout.time, column, color=colour, label=name)
-    return _finished(axis, rollout, "centre of mass moved [mm]")
+    return _finished(axis, rollout, "displacement of the CoM [mm]")
 
 
 def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Measured normal force at every contact point, N; behind it, as a wider line, the planned one.
-    axis: as for `plot_com`.
+    """Plot the measured normal force at each contact point [N].
+
+    A wider line behind it shows the planned force.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axis : Axes, optional
+        Axes to plot on. By default, a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
@@ -91,10 +128,27 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """The gait diagram: a bar for each foot while the controller's stance has it, and a line while
-    the ground carries it.
+    """Plot the gait diagram.
 
-    axis: as for `plot_com`. Raises `InputError` for a record without contacts.
+    Each foot has a bar while it is in the controller's stance, and a line while the ground carries
+    it.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axis : Axes, optional
+        Axes to plot on. By default, a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    InputError
+        If the record has no contacts.
     """
     names = _contact_names(rollout)
     axis = _axes_or_new(axis)
@@ -124,11 +178,26 @@ def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> list[Axes]:
-    """Normal force of each foot through time, N: measured, and behind it, as a wider line, planned.
-    One plot for each contact.
+    """Plot the normal force of each contact over time in its own axes [N].
 
-    axes: as many as the record has contacts; None for a new figure. Raises `InputError` for a
-        record without contacts, and for another number of axes.
+    The measured force is drawn over a wider line for the planned one.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axes : sequence of Axes, optional
+        One for each contact of the record. By default, a new figure.
+
+    Returns
+    -------
+    list of Axes
+        The axes.
+
+    Raises
+    ------
+    InputError
+        If the record has no contacts, or if the number of axes differs from that of contacts.
     """
     names = _contact_names(rollout)
     if axes is None:
@@ -149,7 +218,7 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
     ]
     if len(made) != len(names):
         raise InputError(
-            f"axes are {len(made)}; the record has {len(names)} contacts: {', '.join(names)}."
+            f"Got {len(made)} axes. The record has {len(names)} contacts: {', '.join(names)}."
         )
     planned, measured = (
         _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
@@ -167,11 +236,26 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
 
 
 def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """(28) ‖f_tangent‖ / (μ f_normal) at every contact point, planned and measured. Above 1 a force
-    is outside its cone.
+    """Plot the used fraction of friction at each contact point, planned and measured.
 
-    The curve of a point has gaps where it carries little; see `friction_used`. axis: as for
-    `plot_com`.
+    The fraction is ‖f_tangent‖ / (μ f_normal). Above 1, a force is outside its cone. The curve of a
+    point has gaps where the point carries little load, see `friction_used`.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axis : Axes, optional
+        Axes to plot on. By default, a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Notes
+    -----
+    [FBR]_, eq. (28).
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
@@ -189,11 +273,24 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
                 label="" if i else name,
             )
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
-    return _finished(axis, rollout, "friction used, of μ · normal force")
+    return _finished(axis, rollout, "friction / (μ · normal force)")
 
 
 def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Torque over its limit, for every joint that has one. axis: as for `plot_com`."""
+    """Plot each joint torque divided by its limit, for all joints with a limit.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        Record to plot.
+    axis : Axes, optional
+        Axes to plot on. By default, a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
     limited = np.isfinite(rollout.robot.torque_limits)
@@ -203,20 +300,35 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
         axis.axhline(
             limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
         )
-    return _finished(axis, rollout, "torques, of their limits")
+    return _finished(axis, rollout, "torque / limit")
 
 
 def friction_used(rollout: Rollout, forces: Array) -> Array:
-    """‖f_tangent‖ / (μ f_normal) at each contact point and time, shape (k/3, n); NaN where the
-    point carries little.
+    """Compute the used fraction of friction, ‖f_tangent‖ / (μ f_normal).
 
-    forces: (n, k), N, world, for n times and k/3 points.
+    Parameters
+    ----------
+    rollout : Rollout
+        Record with n times and k / 3 contact points.
+    forces : ndarray, shape (n, k)
+        Contact forces in the world frame [N], such as `rollout.measured`.
+
+    Returns
+    -------
+    ndarray, shape (k / 3, n)
+        Fraction at each contact point and time, dimensionless; NaN where the point carries little
+        load.
+
+    Raises
+    ------
+    InputError
+        If the forces have another shape than `rollout.measured`.
     """
     as_rollout(rollout)
-    found = numeric_copy(forces)  # NaN stands for none planned
+    found = numeric_copy(forces)  # NaN where no forces were planned
     if found is None or found.shape != rollout.measured.shape:
         raise InputError(
-            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured; got "
+            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured, not "
             f"{short_repr(forces)}."
         )
     f = np.reshape(found, (len(rollout.time), -1, 3))
@@ -230,24 +342,23 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
 
 
 def _normal(rollout: Rollout, forces: Array) -> Array:
-    """Normal force at each contact point and time, shape (k/3, n), N. forces: as for
-    `friction_used`.
-    """
+    """Return the normal force at each contact point and time, shape (k / 3, n) [N]."""
     f = np.reshape(forces, (len(rollout.time), -1, 3))
     return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
 
 
 def _contact_names(rollout: Rollout) -> tuple[str, ...]:
-    """The names of the record's contacts."""
+    """Return the names of the record's contacts; raise `InputError` if there are none."""
     names = as_rollout(rollout).contacts.names
     if not names:
-        raise InputError("the record has no contacts, so there is no gait to plot.")
+        raise InputError("The record has no contacts, so there is nothing to plot.")
     return names
 
 
 def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
-    """Normal force of each contact and time, shape (contacts, n), N; of a flat foot that of all its
-    corners.
+    """Return the normal force of each contact and time, shape (contacts, n) [N].
+
+    That of a flat foot is the sum over its corners.
     """
     points, starts = (
         _normal(rollout, forces),
@@ -263,7 +374,7 @@ def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
 
 
 def _stance_rows(rollout: Rollout) -> npt.NDArray[np.bool_]:
-    """Whether the controller's stance had each contact at each time, shape (contacts, n)."""
+    """Return whether the controller's stance had each contact at each time, shape (contacts, n)."""
     if not rollout.stances:
         return np.ones((len(rollout.contacts), len(rollout)), dtype=bool)
     has = {
@@ -274,13 +385,14 @@ def _stance_rows(rollout: Rollout) -> npt.NDArray[np.bool_]:
 
 
 def _intervals(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Begin and length, s, of each span in which something is there."""
+    """Return the start and length [s] of each interval in which a condition holds."""
     changes = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     ends = np.append(times, times[-1:])
     return [(float(times[a]), float(ends[b] - times[a])) for a, b in changes.reshape(-1, 2)]
 
 
 def _axes_or_new(axis: Axes | None) -> Axes:
+    """Return the given axes, or those of a new figure."""
     return (
         plt.subplots(figsize=(8, 3), layout="constrained")[1]
         if axis is None
@@ -291,7 +403,7 @@ def _axes_or_new(axis: Axes | None) -> Axes:
 def _finished(
     axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE
 ) -> Axes:
-    """Add labels, a band for each push, and a legend; {} for none."""
+    """Add labels, a band for each push, and a legend unless `legend` is empty."""
     for i, push in enumerate(rollout.pushes):
         axis.axvspan(
             push.start,

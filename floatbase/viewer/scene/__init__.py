@@ -1,5 +1,3 @@
-"""What is drawn: shapes, meshes, markers, colours; the scene that holds it, and the commands that
-it is made of.
-"""
+"""Scene: shapes, meshes, markers and colours, and the commands that draw them."""
 
 __all__: list[str] = []  # its modules are imported by name

@@ -1,10 +1,10 @@
-"""The colours of all 3-D pictures and plots, RGB from 0 to 1, safe for the colour-blind (Okabe and
-Ito).
+"""Colours of all 3-D pictures and plots, RGB from 0 to 1, safe for colour-blind readers.
 
-Measured forces are dark blue, planned forces light blue. A friction cone is green when its force is
-inside, orange when the force reaches a facet or the surface, vermilion when it is outside, and a
-faint grey when there is no force. What is neither a force nor a cone, as a curve, a place or an
-entry of a matrix, is grey: greys differ in lightness, which everybody sees.
+They are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces light
+blue. A friction cone is green when its force is inside, orange when the force reaches a facet or
+the surface, vermilion when it is outside, and a faint grey when there is no force. Everything that
+is neither a force nor a cone is grey, such as a curve, a position or a matrix entry, because all
+readers can tell greys apart by their lightness.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ RGBA = tuple[float, float, float, float]
 
 
 def _rgb(code: str) -> RGB:
+    """Convert "#rrggbb" to RGB from 0 to 1."""
     red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue
 
@@ -26,7 +27,9 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb("#222222")  # and the ZMP, and prices; on a dark background they are light, as text is
+PUSH = _rgb(
+    "#222222"
+)  # also the ZMP and multipliers; on a dark background they are light, like text
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
@@ -35,15 +38,15 @@ GREYS = (
     _rgb("#2B3440"),
     _rgb("#6F7885"),
     _rgb("#959EAA"),
-)  # dark, middle, light; the middle one shows on any background
+)  # dark, middle, light; the middle one is visible on any background
 
 X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")
 Z_AXIS = _rgb("#0072B2")
 
-GHOST_NAME = "desired posture"  # in the legend, unless `show` gets another name
+GHOST_NAME = "desired posture"  # in the legend, unless `show` is given another name
 
-# the legend, in this order: first part of the item's path, colour, meaning
+# entries of the legend, in order: first part of the item's path, colour, meaning
 LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("measured", MEASURED, "measured force"),
     ("planned", PLANNED, "planned force"),
@@ -52,24 +55,24 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("push", PUSH, "push"),
     ("cone", CALM, "friction cone: force inside"),
     ("cone", WARNING, "friction cone: surface reached"),
-    ("cone", ALARM, "friction cone: outside (rim)"),
+    ("cone", ALARM, "friction cone: force outside (rim)"),
     ("idle cone", IDLE, "friction cone: no force"),
-    ("multiplier", PUSH, "price of a limit: its multiplier"),
-    ("support", SUPPORT, "support region"),
+    ("multiplier", PUSH, "multiplier (shadow price)"),
+    ("support", SUPPORT, "support polygon"),
     ("dcm", COM, "capture point"),
     ("zmp", PUSH, "planned ZMP"),
     ("foothold", GREYS[1], "planned foothold"),
     ("swing", GREYS[1], "swing path"),
     ("push_recovery", MEASURED, "largest push survived"),
-    ("previous", LIMIT, "largest push survived before"),
-    ("capture_point_bound", CALM, "theory: capture point"),
-    ("static_bound", WARNING, "theory: steady push"),
-    ("horizontal_force", COM, "reachable horizontal force"),
+    ("previous", LIMIT, "largest push survived, previous run"),
+    ("capture_point_bound", CALM, "capture-point bound (theory)"),
+    ("static_bound", WARNING, "static bound (theory)"),
+    ("horizontal_force", COM, "maximum horizontal force"),
     ("ghost", GHOST, GHOST_NAME),
 )
 
-# how the legend marks what is not a patch of its colour: first part of the item's path -> a class
-# of the page's style
+# symbols in the legend other than a patch of colour: first part of the item's path -> class of the
+# page's style
 LEGEND_SYMBOLS = {
     "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
     "cone": "cone", "idle cone": "cone",
@@ -87,7 +90,7 @@ BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
     "dark": (_rgb("#1E2227"), _rgb("#282C32"), _rgb("#4B525A"), _rgb("#F2F2F2")),
 }
 
-# colour -> its shade on a dark background, for those that would hide there
+# colour -> its shade on a dark background, for colours with too little contrast there
 DARK_SHADES = {
     MEASURED: _rgb("#1C80C0"),
     PLANNED: _rgb("#8CCBF2"),
@@ -98,10 +101,34 @@ DARK_SHADES = {
 
 
 def hex_code(colour: RGB) -> str:
-    """The colour as "#rrggbb"."""
+    """Convert a colour to "#rrggbb".
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB, from 0 to 1.
+
+    Returns
+    -------
+    str
+        The colour as "#rrggbb".
+    """
     return "#" + "".join(f"{round(255 * part):02X}" for part in colour)
 
 
 def with_alpha(colour: RGB, alpha: float) -> RGBA:
-    """The colour with an opacity: 0 is invisible, 1 hides what is behind."""
+    """Add an opacity to a colour.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB, from 0 to 1.
+    alpha : float
+        Opacity [-]: 0 is invisible, 1 is opaque.
+
+    Returns
+    -------
+    tuple of float
+        RGBA, from 0 to 1.
+    """
     return (*colour, alpha)

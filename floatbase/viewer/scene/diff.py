@@ -1,6 +1,4 @@
-"""The canvas: it is given whole pictures, and sends the window only what changes from one to the
-next.
-"""
+"""Renderer that sends only the differences between successive pictures."""
 
 from __future__ import annotations
 
@@ -12,10 +10,15 @@ ROOT = "/meshcat/"
 
 
 class DiffRenderer:
-    """Draws whole pictures (path -> item) into a window. What the next picture does not contain is
-    removed.
+    """Draws whole pictures into a window by sending only what changes.
 
-    picture: what the window shows now.
+    Items that the next picture does not contain are removed. `picture` is what the window shows
+    now.
+
+    Parameters
+    ----------
+    window : Window
+        Window to draw into.
     """
 
     def __init__(self, window: Window):
@@ -25,10 +28,19 @@ class DiffRenderer:
         self._settings: dict[protocol.Key, bytes] = {}
 
     def draw(self, picture: Picture, *settings: protocol.Update) -> int:
-        """Show this picture and nothing else. Returns how many commands that took; all go into one
-        frame.
+        """Show this picture and nothing else.
 
-        settings: of the page, as for `set`, that go into the same frame.
+        Parameters
+        ----------
+        picture : Picture
+            Items to draw, path -> item.
+        *settings : Update
+            Settings of the page, as for `set`, sent in the same frame.
+
+        Returns
+        -------
+        int
+            Number of commands sent; all go into one frame.
         """
         picture = with_normal_paths(picture)
         updates = [protocol.delete(ROOT)] if self._interrupted else []
@@ -45,7 +57,7 @@ class DiffRenderer:
         new_settings = self._unsent(settings)
         updates += new_settings
         if updates:
-            # stays so when an interrupt comes before the end: the next picture is drawn anew
+            # remains True if an interrupt comes before the end; the next picture is then drawn anew
             self._interrupted = True
             self.window.put(updates)
         self.picture = picture
@@ -54,34 +66,43 @@ class DiffRenderer:
         return len(updates)
 
     def set(self, *updates: protocol.Update) -> None:
-        """Send settings of the page (background, camera, title and the like), except those that
-        were sent already.
+        """Send those settings of the page that have changed, such as background, camera or title.
+
+        Parameters
+        ----------
+        *updates : Update
+            Settings to send.
         """
         new_settings = self._unsent(updates)
         if new_settings:
             self.force_set(*new_settings)
 
     def force_set(self, *updates: protocol.Update) -> None:
-        """Send settings of the page, also those that were sent already: the reader may have changed
-        them in the page.
+        """Send settings of the page even if unchanged, because the user may have altered them.
+
+        Parameters
+        ----------
+        *updates : Update
+            Settings to send.
         """
         self.window.put(updates)
         self._settings.update(updates)
 
     def _unsent(self, updates: tuple[protocol.Update, ...]) -> list[protocol.Update]:
-        """Those settings that were not sent already."""
+        """Return the settings that differ from those already sent."""
         return [(key, command) for key, command in updates if self._settings.get(key) != command]
 
 
 def _can_become(old: Item, new: Item | None) -> bool:
-    """Whether the item at a path can become `new`. One that loses its colour is drawn anew: no
-    command takes it back.
+    """Return whether the item at a path can change into `new`.
+
+    An item that loses its colour is drawn anew, because no command removes a colour.
     """
     return new is not None and (old.colour is None or new.colour is not None)
 
 
 def _changes(path: str, old: Item | None, new: Item) -> list[protocol.Update]:
-    """The commands that change the item at a path from `old`, None if there is none, to `new`."""
+    """Return the commands that change the item at a path from `old` (None if absent) to `new`."""
     updates = []
     is_new = old is None or old.shape is not new.shape
     if is_new:

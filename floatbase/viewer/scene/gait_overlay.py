@@ -1,6 +1,4 @@
-"""What a walk plans, as marks in the picture: footholds, swing paths, capture point and zero-moment
-point (ZMP).
-"""
+"""Gait overlay: planned footholds, swing paths, capture point and zero-moment point of a walk."""
 
 from __future__ import annotations
 
@@ -12,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import rotation_z
 from floatbase._validation import Array, as_instance, as_number, short_repr
 from floatbase.behaviours import LIPM, StepPlan, Swing, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
@@ -22,24 +21,31 @@ from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
 from floatbase.viewer.scene.shapes import Item, Picture, transform
 from floatbase.viewer.scene.threejs import Shape
 
-COLOUR = GREYS[
-    1
-]  # of all that is neither a force nor the centre of mass; it shows on any background
-# of the robot's size, above the ground: no flicker with its lines and the support region
+COLOUR = GREYS[1]  # of all marks except the centre of mass; it is visible on any background
+# fraction of the robot's size, above the ground: avoids flicker with its lines and the support
+# polygon
 _HEIGHT_ABOVE_GROUND = 0.005
 _RING_RADIUS, _DIAMOND_SIZE = (
     0.07,
     0.05,
-)  # radius of the capture point's mark and half the height of the ZMP's, of the robot's size
-_OUTLINE_WIDTH = 0.012  # of a foothold's outline, of the robot's size
-_MIN_LENGTH = 1e-6  # m: a path of no length still has a matrix
+)  # radius of the capture point's mark, half the height of the ZMP's: fractions of the robot's size
+_OUTLINE_WIDTH = 0.012  # of a foothold's outline, as a fraction of the robot's size
+_MIN_LENGTH = 1e-6  # m: avoids a singular matrix for a path of zero length
 _SEGMENTS = 24  # of a swing path
 
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """How marks are drawn. size: of the robot, m. ground: where they lie. colour: RGB of the ZMP,
-    which shows on the page.
+    """Style of the marks of a gait.
+
+    Parameters
+    ----------
+    size : float
+        Size of the robot [m].
+    ground : Plane or Planes
+        Ground on which the marks lie.
+    colour : tuple of float
+        RGB of the zero-moment point, in contrast to the page's background.
     """
 
     size: float
@@ -48,11 +54,24 @@ class Style:
 
 
 def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
-    """What a `Walk` plans now: its footholds and swing paths, the capture point where it is, and
-    the planned ZMP.
+    """Draw what a walk currently plans.
 
-    walk: the behaviour, after a tick; nothing is drawn before its first one. state: of the robot,
-        then. style: of the marks.
+    The picture shows footholds, swing paths, the capture point at its current position, and the
+    planned zero-moment point.
+
+    Parameters
+    ----------
+    walk : Walk
+        Behaviour. Nothing is drawn before its first control step.
+    state : State
+        Current state of the robot.
+    style : Style
+        Style of the marks.
+
+    Returns
+    -------
+    Picture
+        The marks, path -> item.
     """
     if as_instance("walk", walk, Walk).plan is None:
         return {}
@@ -67,10 +86,25 @@ def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
 
 
 def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Picture:
-    """The same of a stored step, as it was planned when its stance began; the capture point is
-    where it is at time t.
+    """Draw a stored step as it was planned when its stance began.
 
-    step: an entry of `walk.history`. t: s. state: of the robot, then. style: of the marks.
+    The capture point is drawn where it is at time t.
+
+    Parameters
+    ----------
+    step : StepPlan
+        An entry of `walk.history`.
+    t : float
+        Time [s].
+    state : State
+        State of the robot at that time.
+    style : Style
+        Style of the marks.
+
+    Returns
+    -------
+    Picture
+        The marks, path -> item.
     """
     marks = _capture_point_and_zmp(
         as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, style
@@ -79,24 +113,46 @@ def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Pictur
 
 
 def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
-    """Of the steps of a walk, in the order of time, the one in which time t, s, lies; None before
-    the first.
+    """Find the step of a walk that contains a time.
+
+    Parameters
+    ----------
+    steps : sequence of StepPlan
+        Steps in the order of time.
+    t : float
+        Time [s].
+
+    Returns
+    -------
+    StepPlan or None
+        The step, or None before the first one.
     """
     i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
     return steps[i - 1] if i else None
 
 
 def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
-    """The steps as a list, after checking that they are some."""
+    """Check a collection of steps.
+
+    Parameters
+    ----------
+    steps : iterable of StepPlan
+        Steps, as `walk.history`.
+
+    Returns
+    -------
+    list of StepPlan
+        The steps.
+    """
     if not isinstance(steps, Iterable):
         raise InputError(
-            f"steps must be those of a Walk, as walk.history, not {short_repr(steps)}."
+            f"steps must be the steps of a Walk, such as walk.history, not {short_repr(steps)}."
         )
     return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 
 
 def _capture_point_and_zmp(plan: LIPM, t: float, state: State, style: Style) -> Picture:
-    """Capture point and ZMP. t: s."""
+    """Draw the capture point and the planned zero-moment point at time t [s]."""
     dcm, zmp = (
         capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega),
         plan.zmp(t),
@@ -114,9 +170,9 @@ def _footholds_and_swings(
     state: State,
     size: float,
 ) -> Picture:
-    """An outline at each foothold, and the paths to those of the feet in the air.
+    """Draw an outline at each foothold, and the paths of the feet in the air.
 
-    yaw_changes: rad, by which the robot turns until a foot lands.
+    `yaw_changes` holds the rotation of the robot until each foot lands [rad].
     """
     picture: Picture = {}
     forward_x, forward_y, _ = state.frame_pose("base").rotation[:, 0]
@@ -124,7 +180,7 @@ def _footholds_and_swings(
     for name, place in footholds.items():
         foot, path = _foot(state.robot, name), name.replace("/", "_")
         rotation, offset = (
-            _rotation_about_z(yaw + yaw_changes.get(name, 0.0)),
+            rotation_z(yaw + yaw_changes.get(name, 0.0)),
             _offset_to_ground(foot, state.robot.standing()),
         )
         picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
@@ -134,6 +190,7 @@ def _footholds_and_swings(
 
 
 def _foot(robot: Robot, name: str) -> Foot:
+    """Return a foot of the robot by its frame."""
     feet = {foot.frame: foot for foot in robot.feet}
     if name not in feet:
         raise unknown_name(f"foot of {robot.name}", name, feet)
@@ -141,8 +198,10 @@ def _foot(robot: Robot, name: str) -> Foot:
 
 
 def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
-    """Where a foot is to stand. at: (3,), m, world, below its middle. rotation: (3, 3), of the
-    robot on the ground.
+    """Draw where a foot will stand.
+
+    `at` is the point below its centre, shape (3,), in the world frame [m]; `rotation` is the
+    heading of the robot, shape (3, 3).
     """
     at = at + [0.0, 0.0, _HEIGHT_ABOVE_GROUND * size]
     if foot.corners is None:
@@ -156,7 +215,7 @@ def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
 
 
 def _offset_to_ground(foot: Foot, standing: State) -> Array:
-    """From the frame of a foot to the ground below its middle, as the robot stands: (3,), m."""
+    """Return the vector from a foot's frame to the ground below its centre, when standing [m]."""
     pose = standing.frame_pose(foot.frame)
     offset = np.array(pose.rotation @ foot.middle)
     offset[2] = -pose.translation[2]
@@ -164,9 +223,9 @@ def _offset_to_ground(foot: Foot, standing: State) -> Array:
 
 
 def _swing_path(swing: Swing, offset: Array) -> Item:
-    """The path of a swing as a line, moved by an offset, (3,), m.
+    """Draw the path of a swing, displaced by an offset, shape (3,) [m].
 
-    It is one curve, stretched; so a path that is aimed elsewhere at every tick costs a matrix, and
+    One unit curve is stretched, so a path with a new target at each control step costs a matrix but
     no new shape.
     """
     step_vector = swing.end - swing.start
@@ -181,14 +240,9 @@ def _swing_path(swing: Swing, offset: Array) -> Item:
     )
 
 
-def _rotation_about_z(yaw: float) -> Array:
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 @lru_cache(maxsize=8)
 def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
-    """A flat ring around z, of radius 1. inner: its inner radius."""
+    """Return a flat ring around z of radius 1 with the given inner radius."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36),
         colour,
@@ -199,7 +253,7 @@ def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
 
 @lru_cache(maxsize=8)
 def _diamond(colour: RGB) -> Shape:
-    """An octahedron that stands on its tip, which looks like a diamond from all around."""
+    """Return an octahedron standing on its tip, which looks like a diamond from all sides."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4),
         colour,
@@ -210,7 +264,7 @@ def _diamond(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=32)
 def _foot_outline(corners: tuple[tuple[float, float], ...], width: float) -> Shape:
-    """A flat band around corners, m."""
+    """Return a flat band around corners [m]."""
     inner = np.array(sorted(corners, key=lambda corner: np.arctan2(corner[1], corner[0])))
     outer = inner * (1.0 + np.sqrt(2.0) * width / np.linalg.norm(inner, axis=1, keepdims=True))
     n = len(inner)
@@ -222,7 +276,7 @@ def _foot_outline(corners: tuple[tuple[float, float], ...], width: float) -> Sha
 
 @lru_cache(maxsize=1)
 def _unit_swing_path() -> Shape:
-    """A swing from the origin to 1 along x, 1 high."""
+    """Return a swing of height 1 from the origin to 1 along x."""
     swing = Swing(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.0, 1.0, 1.0)
     points = np.array([swing(u)[0] for u in np.linspace(0.0, 1.0, _SEGMENTS + 1)])
     return threejs.lines(np.repeat(points, 2, axis=0)[1:-1], COLOUR)

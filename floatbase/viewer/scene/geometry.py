@@ -1,5 +1,7 @@
-"""Triangle meshes of simple shapes. A mesh is vertices, shape (n, 3), and faces, shape (m, 3):
-indices of the vertices.
+"""Triangle meshes of simple shapes.
+
+A mesh consists of vertices, shape (n, 3), and faces, shape (m, 3), which are indices of the
+vertices.
 """
 
 from __future__ import annotations
@@ -16,7 +18,18 @@ Mesh = tuple[Vertices, Faces]
 
 
 def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
-    """Several meshes as one."""
+    """Merge several meshes into one.
+
+    Parameters
+    ----------
+    meshes : sequence of tuple
+        Vertices, shape (n, 3), and faces, shape (m, 3), of each mesh.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces of the merged mesh.
+    """
     starts = np.cumsum([0] + [len(np.asarray(vertices)) for vertices, _ in meshes])
     faces = [np.asarray(part) + start for (_, part), start in zip(meshes, starts, strict=False)]
     vertices = [np.asarray(part) for part, _ in meshes]
@@ -24,11 +37,21 @@ def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
 
 
 def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
-    """A surface of revolution around the z axis.
+    """Make a surface of revolution around the z axis.
 
-    profile: (radius, height) of its corners; listed upwards, the surface faces outwards. sides:
-        number of sides of a circle.
     Each piece of the profile has its own vertices, so that its edges look sharp.
+
+    Parameters
+    ----------
+    profile : sequence of tuple
+        Radius and height of each corner. A profile listed upwards faces outwards.
+    sides : int, optional
+        Number of sides of a circle.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
     """
     angles = 2.0 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
@@ -40,8 +63,9 @@ def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 2
 
 
 def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
-    """Faces between two circles. low, high: whether the lower and the upper circle have a radius
-    above 0.
+    """Return the faces between two circles.
+
+    `low` and `high` tell whether the lower and the upper circle have a radius above 0.
     """
     i = np.arange(sides)
     j = (i + 1) % sides
@@ -51,7 +75,20 @@ def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
 
 
 def sphere(radius: float, sides: int = 20) -> Mesh:
-    """A ball around the origin. sides: number of sides of its equator."""
+    """Make a sphere around the origin.
+
+    Parameters
+    ----------
+    radius : float
+        Radius [m].
+    sides : int, optional
+        Number of sides of its equator.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
+    """
     heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
     angles = 2.0 * np.pi * np.arange(sides) / sides
     rings = [
@@ -67,11 +104,21 @@ def sphere(radius: float, sides: int = 20) -> Mesh:
 
 
 def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 14) -> Mesh:
-    """A closed cylinder.
+    """Make a closed cylinder.
 
-    start, end: (3,), centres of its ends.
-    radius: in the same unit.
-    sides: number of sides of a circle.
+    Parameters
+    ----------
+    start, end : array_like, shape (3,)
+        Centres of its ends [m].
+    radius : float
+        Radius [m].
+    sides : int, optional
+        Number of sides of a circle.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
@@ -82,7 +129,18 @@ def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int
 
 
 def rotation_with_z_axis(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """A rotation, shape (3, 3), whose z axis is the unit vector `direction`."""
+    """Return a rotation whose z axis is a given direction.
+
+    Parameters
+    ----------
+    direction : array_like, shape (3,)
+        Unit vector.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        The rotation.
+    """
     x, y, z = np.asarray(direction, dtype=float)
     # Duff et al., Building an orthonormal basis, revisited (2017)
     sign = 1.0 if z >= 0 else -1.0
@@ -94,8 +152,17 @@ def rotation_with_z_axis(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def convex_polygon(corners: npt.ArrayLike) -> Mesh:
-    """A flat convex polygon. corners: (n, 3); it faces the side from which they run
-    counter-clockwise.
+    """Make a flat convex polygon.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n, 3)
+        Corners [m]. The polygon faces the side from which they run counter-clockwise.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
     """
     points = np.asarray(corners, dtype=np.float32)
     i = np.arange(1, len(points) - 1)
@@ -103,8 +170,17 @@ def convex_polygon(corners: npt.ArrayLike) -> Mesh:
 
 
 def pyramid(rays: npt.ArrayLike) -> Mesh:
-    """The sides of a pyramid with its tip at the origin. rays: (n, 3), its edges. Each side has its
-    own vertices.
+    """Make the sides of a pyramid with its tip at the origin; each side has its own vertices.
+
+    Parameters
+    ----------
+    rays : array_like, shape (n, 3)
+        Edges of the pyramid [m].
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
     """
     ends = np.asarray(rays, dtype=np.float32)
     return merged(
@@ -116,12 +192,23 @@ def pyramid(rays: npt.ArrayLike) -> Mesh:
 
 
 def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:
-    """A part of a torus around the z axis.
+    """Make a part of a torus around the z axis.
 
-    radius: of the ring.
-    tube: radius of the tube.
-    start, end: angles where the part begins and ends, rad.
-    sides: number of pieces along the ring.
+    Parameters
+    ----------
+    radius : float
+        Radius of the ring [m].
+    tube : float
+        Radius of the tube [m].
+    start, end : float
+        Angles where the part begins and ends [rad].
+    sides : int, optional
+        Number of pieces along the ring.
+
+    Returns
+    -------
+    tuple of ndarray
+        Vertices and faces.
     """
     around = np.linspace(start, end, sides + 1)
     across = 2.0 * np.pi * np.arange(10) / 10
@@ -132,3 +219,20 @@ def torus_arc(radius: float, tube: float, start: float, end: float, sides: int =
     ]
     bands = [_band(10, True, True)[:, ::-1] + k * 10 for k in range(sides)]
     return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)
+
+
+def round_1_2_5(value: float) -> float:
+    """Round to 1, 2 or 5 times a power of ten.
+
+    Parameters
+    ----------
+    value : float
+        Positive number [-].
+
+    Returns
+    -------
+    float
+        The round number whose ratio to `value` is nearest to 1.
+    """
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)

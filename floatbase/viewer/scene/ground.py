@@ -1,4 +1,4 @@
-"""The ground in the picture: level, given planes, or the slope on which the contacts stand."""
+"""Ground in pictures: level ground, given planes, or the slope on which the contacts stand."""
 
 from __future__ import annotations
 
@@ -13,34 +13,65 @@ from floatbase.viewer.scene import threejs
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.shapes import Item, grid_lines, ground_grid, transform
 
-# least vertical part of a normal of the ground: contacts with less stand on walls
+# smallest vertical component of a normal of the ground: with less, a contact is on a wall
 MIN_VERTICAL = 0.2
-# m that the grid jumps at once to stay below a robot: a whole number of its squares, so that nobody
-# sees it
+# m by which the grid jumps to stay below a robot: a whole number of its squares, so that jumps are
+# invisible
 GRID_JUMP = 2.5
-# m; the height of the ground is rounded to this, so that it does not tremble with the feet
+# m; the height of the ground is rounded to this, so that it does not shake with the feet
 HEIGHT_STEP = 0.01
 
 
 class Plane(NamedTuple):
-    """The points p with normal · p = offset. normal: (3,), unit, world, upwards. offset: m."""
+    """The points p with normal · p = offset.
+
+    Parameters
+    ----------
+    normal : tuple of float
+        Unit normal in the world frame, pointing upwards, three numbers.
+    offset : float
+        Distance from the origin along the normal [m].
+    """
 
     normal: tuple[float, float, float]
     offset: float = 0.0
 
     @property
     def planes(self) -> tuple[Plane, ...]:
-        """This plane alone, as `Planes` has several."""
+        """Tuple of this plane alone, as `Planes.planes` has several."""
         return (self,)
 
     def height(self, point: Array) -> float:
-        """z of the plane, m, below or above a point, shape (3,), m."""
+        """Return the height of the plane below or above a point.
+
+        Parameters
+        ----------
+        point : ndarray, shape (3,)
+            Point in the world frame [m].
+
+        Returns
+        -------
+        float
+            z coordinate of the plane [m].
+        """
         x, y, z = self.normal
         return (self.offset - x * float(point[0]) - y * float(point[1])) / z
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """The lines of the plane's grid, which reach at least 3 m around a point, shape (3,), m;
-        None for the origin.
+        """Draw the grid of the plane.
+
+        Parameters
+        ----------
+        colour : tuple of float
+            RGB of the lines.
+        around : ndarray, shape (3,), optional
+            Point around which the grid extends at least 3 m, in the world frame [m]. By default,
+            the origin.
+
+        Returns
+        -------
+        Item
+            The lines.
         """
         i, j = (
             (0, 0)
@@ -51,19 +82,47 @@ class Plane(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Several planes that all are solid below, as the two sides of a valley: what is seen of each
-    lies above the others.
+    """Several planes that are solid below, such as the two sides of a valley.
+
+    At each point, the highest plane is the visible ground.
+
+    Parameters
+    ----------
+    planes : tuple of Plane
+        The planes.
     """
 
     planes: tuple[Plane, ...]
 
     def height(self, point: Array) -> float:
-        """z of the ground, m, below or above a point, shape (3,), m."""
+        """Return the height of the ground below or above a point.
+
+        Parameters
+        ----------
+        point : ndarray, shape (3,)
+            Point in the world frame [m].
+
+        Returns
+        -------
+        float
+            z coordinate of the ground [m].
+        """
         return max(plane.height(point) for plane in self.planes)
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """The lines of all planes' grids around the origin, each as far as it is seen. around: does
-        not count.
+        """Draw the visible parts of all grids, around the origin.
+
+        Parameters
+        ----------
+        colour : tuple of float
+            RGB of the lines.
+        around : ndarray, shape (3,), optional
+            Ignored.
+
+        Returns
+        -------
+        Item
+            The lines.
         """
         return _visible_lines(self, colour)
 
@@ -72,17 +131,41 @@ LEVEL = Plane((0.0, 0.0, 1.0))
 
 
 def displacement(ground: Plane | Planes, start: Array, end: Array) -> Array:
-    """The way between two places, shapes (3,), m, up or down with the ground between them."""
+    """Return the displacement between two positions that follows the ground up or down.
+
+    Parameters
+    ----------
+    ground : Plane or Planes
+        The ground.
+    start, end : ndarray, shape (3,)
+        Positions in the world frame [m].
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Horizontal displacement and change of the ground's height [m].
+    """
     x, y = (end - start)[:2]
     return np.array([x, y, ground.height(end) - ground.height(start)])
 
 
 def plane_under(normals: Array, positions: Array) -> Plane:
-    """The slope on which contact points stand. normals: (n, 3), unit, world. positions: (n, 3), m,
-    world.
+    """Return the slope on which contact points stand.
 
-    It is level, through the origin, when there are no points, when their normals differ, when they
-    do not lie in one plane, and when they stand on a wall.
+    The result is level ground through the origin if there are no points, if the normals differ, if
+    the points do not lie in one plane, or if they stand on a wall.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (n, 3)
+        Unit normals in the world frame.
+    positions : ndarray, shape (n, 3)
+        Contact points in the world frame [m].
+
+    Returns
+    -------
+    Plane
+        The slope.
     """
     if not len(normals) or np.ptp(normals, axis=0).max() > 1e-6 or normals[0, 2] < MIN_VERTICAL:
         return LEVEL
@@ -95,13 +178,13 @@ def plane_under(normals: Array, positions: Array) -> Plane:
 
 @lru_cache(maxsize=64)
 def _tangents(plane: Plane) -> Array:
-    """The two directions of the plane's grid, shape (2, 3)."""
+    """Return the two directions of the plane's grid, shape (2, 3)."""
     return tangents(plane.normal)
 
 
 @lru_cache(maxsize=64)
 def _lines(plane: Plane, colour: RGB, i: int, j: int) -> Item:
-    """i, j: how many jumps along its two tangents the grid has made."""
+    """Return the grid after `i` and `j` jumps along its two tangents."""
     pose = _pose(plane)
     pose[:3, 3] += GRID_JUMP * (i * pose[:3, 0] + j * pose[:3, 1])
     return Item(ground_grid(colour).shape, pose)
@@ -109,6 +192,7 @@ def _lines(plane: Plane, colour: RGB, i: int, j: int) -> Item:
 
 @lru_cache(maxsize=16)
 def _visible_lines(ground: Planes, colour: RGB) -> Item:
+    """Return the parts of all grids that lie above the other planes."""
     seen: list[Array] = []
     for plane in ground.planes:
         pose = _pose(plane)
@@ -121,20 +205,22 @@ def _visible_lines(ground: Planes, colour: RGB) -> Item:
 
 
 def _parts_above(plane: Plane, ends: Array) -> Array:
-    """The parts of lines above a plane. ends: shape (n, 2, 3), m, world; so is the answer, with
-    fewer lines or as many.
+    """Return the parts of lines that lie above a plane.
+
+    `ends` has shape (n, 2, 3), in the world frame [m]. The result has the same form, with at most n
+    lines.
     """
     clear = ends @ np.array(plane.normal) - plane.offset
     seen = clear.max(axis=1) > 0.0
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
     fraction = low / np.where(
         low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0
-    )  # part of the line, at each end
+    )  # fraction of the line, at each end
     return np.asarray(lines + fraction[:, :, None] * (lines[:, ::-1] - lines))
 
 
 def _pose(plane: Plane) -> Array:
-    """Where the plane's grid stands, (4, 4)."""
+    """Return the pose of the plane's grid, shape (4, 4)."""
     t1, t2 = _tangents(plane)
     normal = np.array(plane.normal)
     return transform(plane.offset * normal, np.stack([t1, t2, normal], axis=1))

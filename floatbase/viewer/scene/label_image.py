@@ -1,4 +1,4 @@
-"""Text as a picture, for the labels in a scene."""
+"""Text rendered as images, for the labels in a scene."""
 
 from __future__ import annotations
 
@@ -13,17 +13,28 @@ from PIL import Image, ImageDraw, ImageFont
 
 from floatbase.viewer.scene.colours import RGB
 
-FONT_SIZE = 28  # height of a letter, pixels
-_SUBSCRIPT_SCALE = 0.68  # size of a subscript, over that of the text
+FONT_SIZE = 28  # pixels, height of a letter
+_SUBSCRIPT_SCALE = 0.68  # size of a subscript, as a fraction of that of the text
 
 
 def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
-    """Grey and alpha of a line of text, shape (height, width, 2), 0-255.
+    """Render a line of text.
 
-    text: the text; braces make a subscript: "f{c}". plate: whether a plate lies behind it. colour:
-        RGB.
+    Parameters
+    ----------
+    text : str
+        The text. Braces make a subscript: "f{c}".
+    plate : bool
+        Whether a plate lies behind the text.
+    colour : tuple of float
+        RGB of the text.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 2)
+        Grey value and opacity of each pixel, 0 to 255.
     """
-    # re.split with a group returns text and subscripts in turn
+    # re.split with a group returns text and subscripts alternately
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
     widths = [font(is_subscript).getlength(part) for part, is_subscript in parts]
     margin = FONT_SIZE // 3
@@ -45,8 +56,20 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
 
 @cache
 def font(is_subscript: bool = False) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """matplotlib's DejaVu Sans, which has Greek letters and mathematical signs; without it,
-    Pillow's font.
+    """Load the font of the labels.
+
+    It is matplotlib's DejaVu Sans, which has Greek letters and mathematical symbols. Without
+    matplotlib, it is Pillow's default font.
+
+    Parameters
+    ----------
+    is_subscript : bool, optional
+        Whether to return the smaller font of subscripts.
+
+    Returns
+    -------
+    ImageFont
+        The font.
     """
     size = FONT_SIZE * (_SUBSCRIPT_SCALE if is_subscript else 1.0)
     spec = find_spec("matplotlib")

@@ -1,24 +1,59 @@
-"""The legend of a picture: what its colours mean."""
+"""Legend of a picture: the meaning of its colours."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
-from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene import protocol, shapes
 from floatbase.viewer.scene.colours import LEGEND, LEGEND_SYMBOLS, RGB, hex_code
+from floatbase.viewer.scene.shapes import Picture
 
 Entry = tuple[str, RGB, str]  # kind of items, colour, meaning
 
 
-@lru_cache(maxsize=64)  # most pictures show what the one before did
+def kinds(picture: Picture) -> set[str]:
+    """Find which kinds of `LEGEND` a picture shows.
+
+    The kind of an item is the first part of its path. A cone without a force is an "idle cone".
+
+    Parameters
+    ----------
+    picture : Picture
+        The picture.
+
+    Returns
+    -------
+    set of str
+        The kinds.
+    """
+    idle = shapes.cone_colour("idle")
+    return {
+        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
+        for path, item in picture.items()
+    }
+
+
+@lru_cache(maxsize=64)  # most pictures show the same kinds as the previous one
 def command(
     shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tuple[Entry, ...] = ()
 ) -> protocol.Update:
-    """The command for the legend of these kinds of items.
+    """Make the command for a legend.
 
-    shown: the kinds. ghost_name: what the ghost is called.
-    text: colour of what is drawn as texts are.
-    user_entries: lines beside those of `LEGEND`.
+    Parameters
+    ----------
+    shown : frozenset of str
+        Kinds of items in the picture.
+    ghost_name : str
+        Name of the ghost in the legend.
+    text : tuple of float
+        RGB of items that have the colour of text.
+    user_entries : tuple, optional
+        Kind, colour and meaning of user-defined entries, listed after those of `LEGEND`.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     colours = dict.fromkeys(("push", "multiplier", "zmp"), text)
     items = [

@@ -1,4 +1,4 @@
-"""Marks in the picture: wrenches, pushes, support regions, prices of friction, frames."""
+"""Markers: wrenches, pushes, support polygons, constraint multipliers and frames."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ _CONE_CONSTRAINTS = (
     "friction",
     "normal force",
     "largest normal force",
-)  # kinds of the rows whose prices are shown
-_LEAST_SHOWN = 1e-3  # part of the dearest row's price below which a label would only hide others
-OUTLINE = 0.6  # width of the outline of a push, over the radius of its shaft
+)  # kinds of the constraints whose multipliers are shown
+# fraction of the largest multiplier: labels of smaller ones would only hide others
+_LEAST_SHOWN = 1e-3
+OUTLINE = 0.6  # width of the outline of a push, as a fraction of the radius of its shaft
 
 
 def wrench(
@@ -45,15 +46,29 @@ def wrench(
     size: float,
     colour: RGB = COM,
 ) -> Picture:
-    """A force as a straight arrow, and a moment as a curled arrow around its axis, drawn over the
-    robot, in which it would hide. Either may be zero, and is left out.
+    """Draw a force as a straight arrow and a moment as a curled arrow around its axis.
 
-    position: (3,), m, world, where both begin.
-    force: (3,), m, world: the force times the picture's scale (m/N).
-    moment: (3,), m, world: the moment times the scale, over `size`. So the radius of the curled
-        arrow is the length of a force that has this moment at a lever of `size` m.
-    size: size of the robot, m.
-    colour: RGB of both.
+    The moment is drawn on top of the robot, which would hide it. A zero force or moment is left
+    out.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Point of application in the world frame [m].
+    force : array_like, shape (3,)
+        Force times the picture's scale, in the world frame [m].
+    moment : array_like, shape (3,)
+        Moment times the scale, divided by `size`, in the world frame [m]. The radius of the curled
+        arrow is the length of a force that has this moment at a lever arm of `size`.
+    size : float
+        Size of the robot [m].
+    colour : tuple of float, optional
+        RGB of both arrows.
+
+    Returns
+    -------
+    Picture
+        The arrows.
     """
     picture: Picture = {}
     if np.linalg.norm(force) > 1e-6:
@@ -66,12 +81,23 @@ def wrench(
 def curled_arrow(
     position: npt.ArrayLike, moment: npt.ArrayLike, colour: RGB = COM, on_top: bool = False
 ) -> Item:
-    """An arrow that turns around an axis by the right-hand rule.
+    """Draw an arrow that turns around an axis by the right-hand rule.
 
-    position: (3,), m, world, its centre.
-    moment: (3,), m, world: along the axis, as long as the radius.
-    colour: RGB.
-    on_top: whether it is drawn over what is in front of it.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Centre in the world frame [m].
+    moment : array_like, shape (3,)
+        Vector along the axis, in the world frame. Its length is the radius [m].
+    colour : tuple of float, optional
+        RGB.
+    on_top : bool, optional
+        Whether the arrow is drawn on top of objects in front of it.
+
+    Returns
+    -------
+    Item
+        The arrow.
     """
     moment, radius = vector_and_length("a curled arrow", moment)
     return Item(
@@ -87,13 +113,25 @@ def push(
     colour: RGB = PUSH,
     outline: RGB = (1.0, 1.0, 1.0),
 ) -> Item:
-    """A push: an arrow that ends where the push acts. It is drawn over the robot, with an outline
-    that sets it off.
+    """Draw a push as an outlined arrow on top of the robot.
 
-    position: (3,), m, world, where the push acts.
-    vector: (3,), m, world, from the arrow's start to its end.
-    size: size of the robot, m, from which the arrow has its width.
-    colour, outline: RGB of the arrow and of its outline.
+    The arrow ends where the push acts.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Point where the push acts, in the world frame [m].
+    vector : array_like, shape (3,)
+        Vector from the tail to the tip of the arrow, in the world frame [m].
+    size : float
+        Size of the robot, which determines the width [m].
+    colour, outline : tuple of float, optional
+        RGB of the arrow and of its outline.
+
+    Returns
+    -------
+    Item
+        The arrow.
     """
     vector, length = vector_and_length("an arrow", vector)
     width = arrow_width(length, size)
@@ -107,11 +145,23 @@ def push(
 def support_region(
     positions: npt.ArrayLike, height_above_ground: float, ground: Plane | Planes = LEVEL
 ) -> Picture:
-    """The convex hull of contact points, seen from above; nothing for fewer than three points, or
-    for points on a line.
+    """Draw the support polygon: the convex hull of the contact points, seen from above.
 
-    positions: (n, 3), m, world. height_above_ground: m, how far above the ground it is drawn.
-        ground: where its corners lie.
+    Nothing is drawn for fewer than three points, or for points on a line.
+
+    Parameters
+    ----------
+    positions : array_like, shape (n, 3)
+        Contact points in the world frame [m].
+    height_above_ground : float
+        Distance of the polygon from the ground [m].
+    ground : Plane or Planes, optional
+        Ground on which the corners lie.
+
+    Returns
+    -------
+    Picture
+        The polygon.
     """
     points = np.asarray(positions, dtype=np.float64)[:, :2]
     try:
@@ -127,16 +177,34 @@ def support_region(
 def multiplier_labels(
     positions: npt.ArrayLike, contacts: Contacts, solution: Solution, height: float, size: float
 ) -> Picture:
-    """The multiplier of each active friction and normal-force row, two significant digits, at the
-    middle of its facet.
+    """Label the facets of active friction constraints with their multipliers.
 
-    A normal-force row has no facet: its label stands on the cone's axis, at the top. Prices below a
-    thousandth of the dearest one shown get no label.
-    positions: (n, 3), m, world, of the n contact points.
-    contacts: the contacts that the problem was made for.
-    solution: of a `QP` with a block of forces; its rows say where their facets are.
-    height: of the drawn cones, m. size: size of the robot, m, from which letters have their height.
-    Raises `InputError` where the problem has no forces at these contacts.
+    Multipliers have two significant digits. The label of a normal-force limit, which has no facet,
+    is on the cone's axis at the top. Multipliers below a thousandth of the largest one have no
+    label.
+
+    Parameters
+    ----------
+    positions : array_like, shape (n, 3)
+        Contact points in the world frame [m].
+    contacts : Contacts
+        Contacts of the problem, with n points.
+    solution : Solution
+        Solution of a `QP` with a block of forces.
+    height : float
+        Height of the drawn cones [m].
+    size : float
+        Size of the robot, which determines the height of the letters [m].
+
+    Returns
+    -------
+    Picture
+        The labels.
+
+    Raises
+    ------
+    InputError
+        If the problem has no forces at these contacts.
     """
     qp, found = solution.qp, solution.multipliers
     forces = qp.blocks.get("forces", slice(0, 0))
@@ -152,7 +220,7 @@ def multiplier_labels(
         contacts.point_names
     ):
         raise InputError(
-            "the solution is not one of these contacts: give contacts and solution of the same "
+            "The solution is not for these contacts. Give contacts and solution of the same "
             "command."
         )
     picture: Picture = {}
@@ -172,7 +240,7 @@ def multiplier_labels(
         )
         at = (
             np.asarray(positions)[i] + height / 1.5 * to_facet
-        )  # the centroid of a triangle with its tip in the point
+        )  # the centroid of a triangle with its tip at the point
         picture[f"/{name.replace('/', '_')}"] = label(
             at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size
         )
@@ -180,10 +248,21 @@ def multiplier_labels(
 
 
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
-    """The axes of a frame as three rods, x vermilion, y green, z blue, drawn over the robot.
+    """Draw the axes of a frame on top of the robot: x vermilion, y green, z blue.
 
-    pose: (4, 4), homogeneous, world. length: of the rods, m. name: a label; without one there is
-        none.
+    Parameters
+    ----------
+    pose : array_like, shape (4, 4)
+        Homogeneous transform of the frame in the world.
+    length : float
+        Length of the axes [m].
+    name : str, optional
+        Text of a label; "" for none.
+
+    Returns
+    -------
+    Picture
+        The axes and the label.
     """
     matrix = np.array(as_array("pose of a frame", pose, (4, 4)))
     matrix[:3, :3] *= as_positive("length of a frame's axes", length, "m")
@@ -195,8 +274,9 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
 @lru_cache(maxsize=64)
 def _unit_curled_arrow(colour: RGB, on_top: bool) -> Shape:
-    """Three quarters of a ring of radius 1 around z, with a head at its end and two before: one is
-    seen from anywhere.
+    """Return three quarters of a ring of radius 1 around z with three heads.
+
+    One of the heads is visible from any side.
     """
     end = 1.5 * np.pi - 0.3
     ring = geometry.torus_arc(1.0, 0.055, 0.0, end)
@@ -205,7 +285,7 @@ def _unit_curled_arrow(colour: RGB, on_top: bool) -> Shape:
 
 
 def _arrow_head(angle: float) -> geometry.Mesh:
-    """A head of an arrow on the ring of radius 1 around z, along it."""
+    """Return the head of an arrow along the ring of radius 1 around z."""
     head, faces = geometry.surface_of_revolution([(0.0, 0.0), (0.17, 0.0), (0.0, 0.42)])
     at = np.array([np.cos(angle), np.sin(angle), 0.0])
     return head @ geometry.rotation_with_z_axis([-at[1], at[0], 0.0]).T + at, faces
@@ -213,9 +293,10 @@ def _arrow_head(angle: float) -> geometry.Mesh:
 
 @lru_cache(maxsize=64)
 def _outlined_arrow(colour: RGB, outline: RGB, slenderness: int) -> Shape:
-    """The unit arrow, drawn over a wider one. slenderness: its length over the radius of its shaft.
+    """Return the unit arrow, drawn over a wider one.
 
-    A mesh on top is painted in the order of its faces, so the outline comes first.
+    `slenderness` is its length divided by the radius of its shaft. The faces of a mesh on top are
+    drawn in order, so the outline comes first.
     """
     (_, _), (shaft, _), (_, neck), (head, _), (_, tip) = ARROW
     opening = head / (slenderness * (tip - neck))  # of the head, as it is drawn
@@ -241,7 +322,7 @@ def _outlined_arrow(colour: RGB, outline: RGB, slenderness: int) -> Shape:
 
 @lru_cache(maxsize=1)
 def _axes() -> Shape:
-    """Three rods of length 1."""
+    """Return three rods of length 1."""
     rods = [geometry.cylinder(np.zeros(3), axis, 0.035) for axis in np.eye(3)]
     colours = [
         np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))

@@ -1,5 +1,7 @@
-"""Meshes of robots: the light ones in `assets/`, else those of the URDF, else balls and rods along
-the kinematic tree.
+"""Meshes of robots.
+
+They are the light meshes in `assets/` if there are any, otherwise those of the URDF, otherwise
+balls and rods along the kinematic tree.
 """
 
 from __future__ import annotations
@@ -23,12 +25,18 @@ from floatbase.viewer.scene.colours import ROBOT
 
 @dataclass(frozen=True, eq=False)
 class JointMesh:
-    """The mesh that one joint moves.
+    """Mesh that moves with one joint.
 
-    joint: Pinocchio's number of the joint.
-    vertices: (n, 3), m, in the joint's frame.
-    faces: (m, 3), indices of the vertices.
-    colours: (n, 3), RGB of each vertex, 0-255.
+    Parameters
+    ----------
+    joint : int
+        Index of the joint in the Pinocchio model.
+    vertices : ndarray, shape (n, 3)
+        Vertices in the joint's frame [m].
+    faces : ndarray, shape (m, 3)
+        Indices of the vertices of each triangle.
+    colours : ndarray, shape (n, 3)
+        RGB of each vertex, 0 to 255.
     """
 
     joint: int
@@ -38,8 +46,18 @@ class JointMesh:
 
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
-    """The meshes of a robot, one for each joint that moves something visible. Fixed parts belong to
-    joint 0, the world.
+    """Find the meshes of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    list of JointMesh
+        One mesh for each joint that moves something visible. Fixed parts belong to joint 0, the
+        world.
     """
     asset = _mesh_file(robot.urdf, robot.joint_names)
     if asset is not None:
@@ -52,18 +70,29 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
         ImportError,
         ValueError,
         OSError,
-    ):  # no trimesh, or files that it or Pinocchio cannot read
+    ):  # no trimesh, or files that trimesh or Pinocchio cannot read
         meshes = []
     return meshes or _from_tree(robot)
 
 
 def appearance_digest(urdf: str, moving: Collection[str]) -> str:
-    """What light meshes are made from, as a digest of a URDF's text: the visuals of its links, and
-    how these are welded.
+    """Compute a digest of everything in a URDF that light meshes are made from.
 
-    moving: names of the joints that move in the robot of the light meshes. Where these are plays no
-        part, nor do bolts: a robot
-    looks the same with joints locked, and without its link "world".
+    This is the visuals of the links, and how links are welded together. Positions of moving joints
+    and joints to the link "world" do not count, because a robot looks the same with joints locked
+    and without that link.
+
+    Parameters
+    ----------
+    urdf : str
+        Text of the URDF.
+    moving : collection of str
+        Names of the joints that move in the robot of the light meshes.
+
+    Returns
+    -------
+    str
+        The digest.
     """
     root, visuals = ElementTree.fromstring(urdf), ElementTree.Element("looks")
     visuals.extend(root.findall("material"))
@@ -89,9 +118,7 @@ def appearance_digest(urdf: str, moving: Collection[str]) -> str:
 
 @lru_cache(maxsize=32)
 def _mesh_file(urdf: str, joints: tuple[str, ...]) -> Path | None:
-    """The file of light meshes that were made from such a URDF, with at least these joints that
-    move; None without one.
-    """
+    """Find the light meshes made from such a URDF with at least these moving joints, or None."""
     for asset in sorted((assets_root() / "meshes").glob("*.npz")):
         with np.load(asset) as file:
             moving = set(file["moving"].tolist())
@@ -105,8 +132,9 @@ Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[n
 
 @lru_cache(maxsize=8)
 def _mesh_parts(asset: Path) -> list[Part]:
-    """Joint name, vertices, faces and colours of each part in a file. assets/build_meshes.py
-    describes the file.
+    """Return joint name, vertices, faces and colours of each part in a file.
+
+    assets/build_meshes.py describes the file.
     """
     parts = []
     with np.load(asset) as file:
@@ -127,11 +155,10 @@ def _joint_meshes(
     faces: npt.NDArray[np.uint32],
     colours: npt.NDArray[np.uint8],
 ) -> list[JointMesh]:
-    """One part as the mesh of its joint, or of the joint above if the joint was locked; none if the
-    model lacks the joint.
+    """Return one part as the mesh of its joint, or of the parent joint if the joint is locked.
 
-    Parts of the world and of the base move with the base of a floating robot, and stand still on a
-    fixed one.
+    A part whose joint is not in the model gives nothing. Parts of the world and of the base move
+    with a floating base and are fixed otherwise.
     """
     model = robot.model
     if joint in ("universe", "root_joint"):
@@ -146,7 +173,7 @@ def _joint_meshes(
 
 
 def _merged_by_joint(meshes: list[JointMesh]) -> list[JointMesh]:
-    """The meshes of each joint merged into one."""
+    """Merge the meshes of each joint into one."""
     together = []
     for joint in dict.fromkeys(mesh.joint for mesh in meshes):
         own = [mesh for mesh in meshes if mesh.joint == joint]
@@ -158,7 +185,7 @@ def _merged_by_joint(meshes: list[JointMesh]) -> list[JointMesh]:
 
 
 def _from_urdf(robot: Robot) -> list[JointMesh]:
-    """The visuals of the URDF, merged for each joint. Raises `ImportError` without trimesh."""
+    """Return the URDF's visuals, merged for each joint; raise `ImportError` without trimesh."""
     from floatbase.viewer.scene.visuals import urdf_visuals
 
     pieces = urdf_visuals(robot)
@@ -176,7 +203,7 @@ def _from_urdf(robot: Robot) -> list[JointMesh]:
 
 
 def _from_tree(robot: Robot) -> list[JointMesh]:
-    """A ball at every joint and a rod to each of its children."""
+    """Return a ball at each joint and a rod to each of its children."""
     model = robot.model
     lengths = [
         float(np.linalg.norm(placement.translation))
@@ -202,6 +229,6 @@ def _from_tree(robot: Robot) -> list[JointMesh]:
 
 
 def _feet(robot: Robot, joint: int) -> list[Any]:
-    """The frames of the feet that a joint carries."""
+    """Return the frames of the feet that a joint carries."""
     frames = [robot.model.frames[robot.frame_id(foot.frame)] for foot in robot.feet]
     return [frame for frame in frames if frame.parentJoint == joint]

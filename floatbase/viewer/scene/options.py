@@ -1,4 +1,4 @@
-"""What a picture shows beside the robot, its contacts and their forces."""
+"""Options of a picture: what it shows beside the robot, its contacts and their forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from floatbase.viewer.scene.shapes import Item
 
 
 class PictureKeywords(TypedDict, total=False):
-    """The fields of `PictureOptions` as arguments by name."""
+    """Fields of `PictureOptions` as keyword arguments."""
 
     com: bool
     cones: bool
@@ -34,21 +34,39 @@ class PictureKeywords(TypedDict, total=False):
 class PictureOptions:
     """What a picture shows beside the robot, its contacts and their forces.
 
-    com: whether to draw the centre of mass and its projection on the ground.
-    cones: whether to draw the friction cones.
-    arrows: whether to draw the forces; where not, they still colour the cones.
-    support: whether to draw the convex hull of the contact points.
-    wrench: shape (6,), force (N) and moment (N·m) at the centre of mass, world. The moment is a
-        ring around its axis; its radius is that of a force which has this moment at a lever of half
-        the diagonal of the robot's bounding box.
-    push: name of a frame, and the force that acts at its origin, shape (3,), N, world.
-    ghost: another state of the robot, drawn translucent.
-    frames: names of frames whose axes to draw.
-    labels: whether to write the names of the contact points.
-    extra: path -> item, more items from `floatbase.viewer.shapes` or `floatbase.viewer.markers`.
-    swing_feet: names of contacts that do not touch the ground just now: they have no patch and no
-        cone, and do not count for the support region.
-    Raises `InputError` for a value of another kind, and for NaN.
+    Parameters
+    ----------
+    com : bool
+        Whether to draw the centre of mass and its projection on the ground.
+    cones : bool
+        Whether to draw the friction cones.
+    arrows : bool
+        Whether to draw the forces. They colour the cones in any case.
+    support : bool
+        Whether to draw the support polygon, the convex hull of the contact points.
+    wrench : array_like, shape (6,), or None
+        Force [N] and moment [N·m] at the centre of mass, in the world frame. The moment is drawn as
+        a ring around its axis. Its radius is the length of a force that has this moment at a lever
+        arm of half the diagonal of the robot's bounding box.
+    push : tuple or None
+        Name of a frame, and the force that acts at its origin, shape (3,), in the world frame [N].
+    ghost : State or None
+        Another state of the robot, drawn translucent.
+    frames : sequence of str
+        Names of frames whose axes are drawn.
+    labels : bool
+        Whether to label the contact points.
+    extra : dict or None
+        Further items, path -> item, as from `floatbase.viewer.shapes` or
+        `floatbase.viewer.markers`.
+    swing_feet : frozenset of str
+        Names of contacts that are in the air. They have no patch and no cone, and are not part of
+        the support polygon.
+
+    Raises
+    ------
+    InputError
+        If a value has the wrong type or contains NaN.
     """
 
     com: bool = True
@@ -71,7 +89,7 @@ class PictureOptions:
         if self.push is not None:
             if not isinstance(self.push, tuple | list) or len(self.push) != 2:
                 raise InputError(
-                    f'push must be a frame and a force, as ("base", [0.0, 30.0, 0.0]), not '
+                    f'push must be a frame and a force, such as ("base", [0.0, 30.0, 0.0]), not '
                     f"{short_repr(self.push)}."
                 )
             as_array("force of the push", self.push[1], (3,), "N")
@@ -83,6 +101,6 @@ class PictureOptions:
             isinstance(item, Item) for item in (self.extra or {}).values()
         ):
             raise InputError(
-                f"extra must be a picture, path -> item, as shapes and markers make them, not "
+                f"extra must be a picture, path -> item, as made by shapes and markers, not "
                 f"{short_repr(self.extra)}."
             )

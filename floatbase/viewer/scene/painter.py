@@ -1,12 +1,8 @@
-"""The painter: makes a picture of a robot from its state, contacts and forces. It has no effect on
-any page.
-"""
+"""Painter: makes a picture of a robot from its state, contacts and forces."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, Unpack
 
 import numpy as np
@@ -15,60 +11,51 @@ from scipy.spatial.distance import pdist
 
 from floatbase._validation import (
     Array,
-    as_array,
     as_instance,
     cached_property,
-    numeric_copy,
-    short_repr,
 )
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
-from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.robots import Robot, State
-from floatbase.viewer.scene import markers, shapes, threejs
-from floatbase.viewer.scene.colours import GHOST, MEASURED, PLANNED, RGB
+from floatbase.viewer.scene import geometry, markers, shapes, threejs
+from floatbase.viewer.scene.colours import GHOST, RGB
+from floatbase.viewer.scene.cone_picture import ConeShape, cone_picture
+from floatbase.viewer.scene.contact_forces import Forces, as_point_forces
 from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
-from floatbase.viewer.scene.shapes import Item, Picture
+from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
 
-# radius of a cone at a corner of a flat foot, over the distance to the next corner: they do not
-# meet
+# radius of a cone at a corner of a flat foot, as a fraction of the distance to the next corner: the
+# cones do not meet
 CORNER_RADIUS = 0.48
-MIN_FORCE = 1e-3  # of the robot's weight: a smaller force is neither drawn nor judged
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces of the ground on the robot at n contact points, measured and planned: shape (n, 3)
-    each, N, world, or None.
-    """
-
-    measured: Array | None
-    planned: Array | None
-
-    @property
-    def kinds(self) -> list[tuple[str, Array | None, RGB]]:
-        """Name, forces and colour of the measured and of the planned forces."""
-        return [("measured", self.measured, MEASURED), ("planned", self.planned, PLANNED)]
-
-    @property
-    def cone_forces(self) -> Array | None:
-        """The forces that colour the cones: the measured ones if there are any."""
-        return self.planned if self.measured is None else self.measured
+MIN_FORCE = 1e-3  # fraction of the robot's weight: a smaller force is neither drawn nor judged
 
 
 @dataclass(frozen=True, eq=False)
 class Painter:
-    """Draws a robot.
+    """Makes pictures of a robot, without drawing them on a page.
 
-    robot: the robot.
-    requested_scale: length of a drawn force, m/N; None for one that fits the robot.
-    facets: number of facets of the friction polyhedra; None draws round cones.
-    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
-    ground: the ground; None for the plane that the contacts stand on.
-    line_colour, text_colour, background_colour: of the ground's lines, of text, and of the
-        background.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    requested_scale : float or None
+        Length of a drawn force [m/N]; None for a length that suits the robot.
+    facets : int or None
+        Number of facets of the friction polyhedra; None draws round cones.
+    inner_approximation : bool
+        Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
+    facet_rotation : float
+        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
+    ground : Plane, Planes or None
+        Ground; None for the plane on which the contacts stand.
+    line_colour : tuple of float
+        RGB of the lines on the ground.
+    text_colour : tuple of float
+        RGB of text.
+    background_colour : tuple of float
+        RGB of the background.
     """
 
     robot: Robot
@@ -89,15 +76,39 @@ class Painter:
         planned: npt.ArrayLike | None = None,
         **options: Unpack[PictureKeywords],
     ) -> Picture:
-        """The picture, path -> item, of everything that the arguments ask for.
+        """Make the picture of a state.
 
-        state, contacts, forces, planned: as for `Viewer.show`. options: see `PictureOptions`.
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        contacts : Contacts, optional
+            Contacts to draw.
+        forces : array_like, shape (3 n,) or (n, 3), optional
+            Measured forces at the n contact points, in the world frame [N].
+        planned : array_like, shape (3 n,) or (n, 3), optional
+            Planned forces at the n contact points, in the world frame [N].
+        **options
+            Fields of `PictureOptions`.
+
+        Returns
+        -------
+        Picture
+            Items to draw, path -> item.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot, or if the forces do not match the contacts.
         """
         chosen = PictureOptions(**options)
         self._check_state(state)
         if contacts is not None:
             as_instance("contacts", contacts, Contacts)
-        both = Forces(_forces("forces", forces, contacts), _forces("planned", planned, contacts))
+        both = Forces(
+            as_point_forces("forces", forces, contacts),
+            as_point_forces("planned", planned, contacts),
+        )
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
         picture = {"ground": ground.lines(self.line_colour, state.com)} | self._robot(
@@ -143,8 +154,19 @@ class Painter:
         return picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
-        """A painter with other facets or another ground. It shares what this one has computed for
-        the robot.
+        """Return a painter with other facets or another ground.
+
+        It shares what this one has computed for the robot.
+
+        Parameters
+        ----------
+        **changes
+            Fields of `Painter` to replace.
+
+        Returns
+        -------
+        Painter
+            The new painter.
         """
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
@@ -153,22 +175,28 @@ class Painter:
         return other
 
     def ground_only(self) -> Picture:
-        """A picture of the ground alone."""
+        """Make a picture of the ground alone.
+
+        Returns
+        -------
+        Picture
+            The ground.
+        """
         return {"ground": self.drawn_ground.lines(self.line_colour)}
 
     @property
     def drawn_ground(self) -> Plane | Planes:
-        """The ground that was given, or level ground."""
+        """Given ground, or level ground if none was given."""
         return self.ground or LEVEL
 
     @cached_property
     def standing(self) -> State:
-        """The robot's standing state."""
+        """Standing state of the robot."""
         return self.robot.standing()
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of the standing robot's bounding box, m, world."""
+        """Lowest and highest corner of the standing robot's bounding box, world frame [m]."""
         poses = self.standing.joint_transforms
         points = [
             mesh.vertices @ poses[mesh.joint][:3, :3].T + poses[mesh.joint][:3, 3]
@@ -179,10 +207,9 @@ class Painter:
 
     @cached_property
     def feet_box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of a box around the standing robot's feet and their cones, m,
-        world.
+        """Lowest and highest corner of a box around the standing robot's feet, world frame [m].
 
-        A robot without feet has the box of the whole robot.
+        The box includes the cones. For a robot without feet, it is the box of the whole robot.
         """
         feet = [(foot, self.standing.frame_pose(foot.frame)) for foot in self.robot.feet]
         points = [
@@ -201,26 +228,40 @@ class Painter:
 
     @cached_property
     def size(self) -> float:
-        """Size of the standing robot, m: half the diagonal of its bounding box."""
+        """Size of the standing robot: half the diagonal of its bounding box [m]."""
         low, high = self.box
         return 0.5 * float(np.linalg.norm(high - low))
 
     @cached_property
     def scale(self) -> float:
-        """Length of a drawn force, m/N: as requested, else 1, 2 or 5 times a power of ten that
-        makes the weight about twice as long as the centre of mass is high.
+        """Length of a drawn force [m/N].
+
+        Unless it was requested, it is 1, 2 or 5 times a power of ten, such that the weight is drawn
+        about twice as long as the height of the centre of mass.
         """
         if self.requested_scale is not None:
             return self.requested_scale
-        return round_1_2_5(
+        return geometry.round_1_2_5(
             2.0
             * max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size)
             / self.robot.weight
         )
 
     def cone_height(self, contacts: Contacts) -> float:
-        """Height of the friction cones, m: that of 1.5 times the normal force at rest, but not so
-        high that the cones hide the robot, or that cones at the corners of one foot meet.
+        """Return the height of the friction cones.
+
+        It is that of 1.5 times the normal force at rest. It is reduced where the cones would hide
+        the robot, or where cones at the corners of one foot would meet.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts of the robot.
+
+        Returns
+        -------
+        float
+            Height [m].
         """
         height = min(
             self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size
@@ -236,16 +277,19 @@ class Painter:
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
+        """Meshes of the robot."""
         return robot_meshes(self.robot)
 
     @cached_property
     def _shapes(self) -> list[threejs.Shape]:
+        """Shape of each mesh."""
         return [
             threejs.mesh(mesh.vertices, mesh.faces, colours=mesh.colours) for mesh in self._meshes
         ]
 
     @cached_property
     def _ghost_shapes(self) -> list[threejs.Shape]:
+        """Translucent shape of each mesh."""
         return [
             threejs.mesh(mesh.vertices, mesh.faces, GHOST, opacity=0.3, hide_back=True)
             for mesh in self._meshes
@@ -253,12 +297,13 @@ class Painter:
 
     @cached_property
     def _paths(self) -> list[tuple[int, str]]:
-        """For every mesh, the number of its joint, and the joint's name as part of a path."""
+        """Joint index and joint name, as part of a path, of each mesh."""
         return [
             (mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes
         ]
 
     def _robot(self, state: State, root: str, shapes_of_joints: list[threejs.Shape]) -> Picture:
+        """Draw the robot below the path `root`."""
         poses = state.joint_transforms
         return {
             f"{root}/{name}": Item(shape, poses[joint])
@@ -274,9 +319,10 @@ class Painter:
         stands: list[bool],
         arrows: bool,
     ) -> Picture:
-        """Forces at every point, and patches and cones at the points that stand on the ground."""
+        """Draw forces at all points, and patches and cones at those on the ground."""
         picture: Picture = {}
         height = self.cone_height(contacts)
+        shape = ConeShape(self.facets, self.inner_approximation, self.facet_rotation)
         rows = zip(contacts.point_names, positions, contacts.normals, contacts.mus, strict=True)
         for i, (name, position, normal, mu) in enumerate(rows):
             at = path_part(name)
@@ -284,9 +330,10 @@ class Painter:
                 picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
             if cones and stands[i]:
                 force = None if forces.cone_forces is None else forces.cone_forces[i]
-                picture |= prefixed(
-                    f"cone/{at}", self._cone(position, normal, float(mu), height, force)
-                )
+                if force is not None and self._is_negligible(force):
+                    force = None
+                cone = cone_picture(shape, position, normal, float(mu), height, force)
+                picture |= prefixed(f"cone/{at}", cone)
             for kind, vectors, colour in forces.kinds if arrows else ():
                 if vectors is not None and not self._is_negligible(vectors[i]):
                     vector = self.scale * vectors[i]
@@ -295,53 +342,19 @@ class Painter:
                     )
         return picture
 
-    def _cone(
-        self, position: Array, normal: Array, mu: float, height: float, force: Array | None
-    ) -> Picture:
-        """A cone or polyhedron in the colour that the force gives it; without a force it is grey
-        and faint.
-        """
-        judged_force = None if force is None or self._is_negligible(force) else force
-        if self.facets is None:
-            status = (
-                "idle"
-                if judged_force is None
-                else _friction_cone(tuple(normal.tolist()), mu).status(judged_force)
-            )
-            made = {"/surface": shapes.friction_cone(position, normal, mu, height, status)}
-            return made | self._outside_rim(
-                position, _polyhedron(tuple(normal.tolist()), mu, 4, True, 0.0), height, status
-            )
-        polyhedron = _polyhedron(
-            tuple(normal.tolist()), mu, self.facets, self.inner_approximation, self.facet_rotation
-        )
-        status = "idle" if judged_force is None else polyhedron.status(judged_force)
-        status = (
-            "inside" if status == "active" else status
-        )  # an active facet has a colour of its own
-        active = () if judged_force is None else polyhedron.active_facets(judged_force)
-        made = shapes.friction_polyhedron(position, polyhedron, height, status, active)
-        return made | self._outside_rim(position, polyhedron, height, status)
-
-    def _outside_rim(
-        self, position: Array, polyhedron: FrictionPolyhedron, height: float, status: str
-    ) -> Picture:
-        """What tells a force outside its cone from others by more than a hue."""
-        if status != "outside":
-            return {}
-        return {"/rim": shapes.cone_rim(position, polyhedron, height, is_round=self.facets is None)}
-
     def _is_negligible(self, force: Array) -> bool:
-        """Whether a force is too small to be drawn or judged."""
+        """Return whether a force is too small to be drawn or judged."""
         return float(force @ force) < self._negligible_force
 
     @cached_property
     def _negligible_force(self) -> float:
+        """Square of the largest negligible force [N²]."""
         return (MIN_FORCE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """The name of every contact, beside it and away from the robot; of a flat foot also the
-        numbers of its corners.
+        """Draw the name of each contact, on the side away from the robot.
+
+        The corners of a flat foot are numbered as well.
         """
         picture: Picture = {}
         for contact in contacts.friction_contacts:
@@ -363,12 +376,14 @@ class Painter:
         return picture
 
     def _wrench(self, state: State, six: Array) -> Picture:
+        """Draw a wrench at the centre of mass."""
         drawn = markers.wrench(
             state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size
         )
         return prefixed("wrench", drawn)
 
     def _push(self, state: State, frame: str, force: Array) -> Picture:
+        """Draw a push at a frame, unless it is negligible."""
         if self._is_negligible(force):
             return {}
         at = state.frame_pose(frame).translation
@@ -380,24 +395,27 @@ class Painter:
 
     @cached_property
     def _patch_radius(self) -> float:
+        """Radius of the contact patches [m]."""
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 
     def _scale_bar(self, ground: Plane | Planes) -> Picture:
+        """Draw the scale bar; it is computed once for each ground."""
         if ground not in self._scale_bars:
             self._scale_bars[ground] = self._scale_bar_on(ground)
         return self._scale_bars[ground]
 
     @cached_property
     def _scale_bars(self) -> dict[Plane | Planes, Picture]:
+        """Scale bars by ground."""
         return {}
 
     def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
-        """A bar as long as a force of about a quarter of the weight is drawn, on the ground at the
-        left of the feet.
+        """Draw a bar on the ground that shows the length of about a quarter of the weight.
 
-        It starts behind a tall robot, because the picture of one shows little ground in front.
+        The bar is to the left of the feet. It starts behind a tall robot, because its picture shows
+        little ground in front.
         """
-        force = round_1_2_5(self.robot.weight / 4)
+        force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
         start = min(low[0], 0.5 * (low[0] + high[0] - length) - 0.5 * self.size)
@@ -406,91 +424,33 @@ class Painter:
         return prefixed("scale", shapes.scale_bar(at, force, length, self.size, self.text_colour))
 
     def _ground(self, contacts: Contacts | None, positions: Array) -> Plane | Planes:
+        """Return the ground to draw."""
         if self.ground is not None or contacts is None:
             return self.drawn_ground
         return plane_under(contacts.normals, positions)
 
     def _check_state(self, state: Any) -> None:
+        """Check that a state belongs to this robot."""
         self.check_robot("state", as_instance("state", state, State).robot)
 
     def check_robot(self, what: str, robot: Robot) -> None:
-        """Raise `InputError` where `what` belongs to a robot of another name or, as with joints
-        locked, with other joints.
+        """Check that something belongs to this robot.
+
+        Parameters
+        ----------
+        what : str
+            Name of the thing that is checked, for the message.
+        robot : Robot
+            Robot to which it belongs.
+
+        Raises
+        ------
+        InputError
+            If the robot has another name or, as with joints locked, other joints.
         """
         identities = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
         if identities[0] != identities[1]:
             raise InputError(
-                f"this viewer shows {self.robot}, but the {what} is one of {robot}; make a Viewer "
+                f"This viewer shows {self.robot}, but the {what} belongs to {robot}. Make a Viewer "
                 f"for that robot."
             )
-
-
-def legend_kinds(picture: Picture) -> set[str]:
-    """What a picture shows, in the words of `LEGEND`: the first part of each path; a cone without a
-    force is an "idle cone".
-    """
-    idle = shapes.cone_colour("idle")
-    return {
-        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
-        for path, item in picture.items()
-    }
-
-
-@lru_cache(maxsize=256)
-def _friction_cone(normal: tuple[float, ...], mu: float) -> FrictionCone:
-    """A cone, once: a ground has few."""
-    return FrictionCone(np.array(normal), mu)
-
-
-@lru_cache(maxsize=256)
-def _polyhedron(
-    normal: tuple[float, ...],
-    mu: float,
-    facets: int,
-    inner_approximation: bool,
-    facet_rotation: float,
-) -> FrictionPolyhedron:
-    """The polyhedron with these values. There are few different ones, so each is made once."""
-    return FrictionPolyhedron(np.array(normal), mu, facets, inner_approximation, facet_rotation)
-
-
-def round_1_2_5(value: float) -> float:
-    """1, 2 or 5 times a power of ten, whichever has the ratio to `value` nearest to 1."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)
-
-
-def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
-    """The same items, each path prefixed by `path`."""
-    return {path + name: item for name, item in items.items()}
-
-
-def path_part(name: str) -> str:
-    """The name as one part of a path: without slashes."""
-    return name.replace("/", "_")
-
-
-def _forces(name: str, value: npt.ArrayLike | None, contacts: Contacts | None) -> Array | None:
-    """Forces as an array of shape (n, 3) for the n contact points. Raises `InputError` for any
-    other number of forces.
-    """
-    if value is None:
-        return None
-    if contacts is None:
-        raise InputError(
-            f"{name} were given without contacts, so it is not known where they act; pass "
-            f"contacts=… too."
-        )
-    array = numeric_copy(value)
-    n = contacts.n_points
-    if array is None:
-        raise InputError(
-            f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}."
-        )
-    if array.shape not in ((3 * n,), (n, 3)):
-        raise InputError(
-            f"{name} has shape {array.shape}; {n} contact points "
-            f"({', '.join(contacts.point_names)}) need shape "
-            f"({3 * n},) or ({n}, 3)."
-        )
-    return as_array(name, array.reshape(n, 3), (n, 3), "N")

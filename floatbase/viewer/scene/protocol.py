@@ -1,8 +1,8 @@
-"""Meshcat's commands as bytes, as they are sent to the page.
+"""Commands for the page, encoded as bytes.
 
-Every command has a key: path, type, property. Of two commands with the same key only the later one
-matters, so a scene is a dict from key to the newest command. Drawing something again does not make
-it grow.
+They are the commands of meshcat and some of our own. Each command has a key: path, type, property.
+Of two commands with the same key only the later one counts, so a scene is a dict from key to the
+newest command. It does not grow when something is drawn again.
 """
 
 from __future__ import annotations
@@ -31,19 +31,33 @@ TYPES = (
 )  # fmt: skip
 
 ANIMATION: Key = ("/", "set_animation", "")
-_MAX_CONTROL_VALUE = 1e18  # of what a slider may report: MessagePack's whole numbers end at 1.8e19
+_MAX_CONTROL_VALUE = 1e18  # of a slider: MessagePack's integers end at 1.8e19
 _FLOAT32 = np.dtype(
     [("code", "u1"), ("value", ">f4")]
 )  # MessagePack: the byte 0xca, then a big-endian float
 
 
 def encode(command: Mapping[str, Any]) -> Update:
-    """Key and bytes of a meshcat command that is given as plain data. Raises `ViewerError` for an
-    unknown type of command.
+    """Encode a command.
+
+    Parameters
+    ----------
+    command : dict
+        Command as plain data.
+
+    Returns
+    -------
+    Update
+        Key and bytes of the command.
+
+    Raises
+    ------
+    ViewerError
+        If the type of the command is unknown.
     """
     kind = command.get("type")
     if kind not in TYPES:
-        raise ViewerError(f"unknown viewer command {kind!r}; known: {', '.join(TYPES)}.")
+        raise ViewerError(f"Unknown viewer command {kind!r}. Known commands: {', '.join(TYPES)}.")
     path = normal_path(command.get("path", ""))
     return (path, kind, str(command.get("property", command.get("name", "")))), umsgpack.packb(
         dict(command)
@@ -51,9 +65,21 @@ def encode(command: Mapping[str, Any]) -> Update:
 
 
 def set_transform(path: str, matrix: Array) -> Update:
-    """Place the object at `path` by a homogeneous matrix, shape (4, 4), relative to its parent.
+    """Place an object by a homogeneous transform.
 
     Most commands are of this type, so it is packed by hand.
+
+    Parameters
+    ----------
+    path : str
+        Path of the object.
+    matrix : ndarray, shape (4, 4)
+        Transform relative to its parent.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     key, head = _transform_head(path)
     numbers = np.empty(16, _FLOAT32)
@@ -62,22 +88,48 @@ def set_transform(path: str, matrix: Array) -> Update:
     return key, head + numbers.tobytes()
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _transform_head(path: str) -> tuple[Key, bytes]:
-    """Key of the transforms at a path, and how their bytes begin."""
+    """Return the key of the transforms at a path, and the first part of their bytes."""
     path = normal_path(path)
     head = b"\x83\xa4type\xadset_transform\xa4path" + _text(path) + b"\xa6matrix\xdc\x00\x10"
     return (path, "set_transform", ""), head
 
 
 def set_property(path: str, name: str, value: Any) -> Update:
-    """Set a property of the object at `path`, for example `visible`, `scale` or `color`."""
+    """Set a property of an object.
+
+    Parameters
+    ----------
+    path : str
+        Path of the object.
+    name : str
+        Name of the property, such as `visible`, `scale` or `color`.
+    value
+        New value.
+
+    Returns
+    -------
+    Update
+        The command.
+    """
     return encode({"type": "set_property", "path": path, "property": name, "value": value})
 
 
 def set_object(path: str, packed: bytes) -> Update:
-    """Put an object at `path`. packed: the object as three.js reads it, in MessagePack (see
-    `threejs.Shape`).
+    """Put an object at a path.
+
+    Parameters
+    ----------
+    path : str
+        Path of the object.
+    packed : bytes
+        Object for three.js in MessagePack, see `threejs.Shape`.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     path = normal_path(path)
     return (path, "set_object", ""), b"\x83\xa4type\xaaset_object\xa4path" + _text(
@@ -86,34 +138,70 @@ def set_object(path: str, packed: bytes) -> Update:
 
 
 def _text(text: str) -> bytes:
-    """A text of at most 64 KB in MessagePack."""
+    """Encode a text of at most 64 KB in MessagePack."""
     data = text.encode()
     return b"\xda" + struct.pack(">H", len(data)) + data
 
 
 def delete(path: str) -> Update:
-    """Remove `path` and everything below it."""
+    """Remove a path and everything below it.
+
+    Parameters
+    ----------
+    path : str
+        Path to remove.
+
+    Returns
+    -------
+    Update
+        The command.
+    """
     return encode({"type": "delete", "path": path})
 
 
 def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> Update:
-    """Look from `position` at `target`, both shape (3,), m, world. angle: vertical field of view,
-    degrees.
+    """Point the camera at a target.
 
-    The command is ours, because meshcat's camera node cannot move the point that the mouse turns
-    around.
+    It is a command of our own, because meshcat's camera node cannot move the point around which the
+    mouse rotates the view.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Position of the camera in the world frame [m].
+    target : array_like, shape (3,)
+        Point to look at, in the world frame [m].
+    angle : float
+        Vertical field of view [degrees].
+
+    Returns
+    -------
+    Update
+        The command.
     """
     eye, at = (_to_threejs(point) for point in (position, target))
     return encode({"type": "set_camera", "position": eye, "target": at, "fov": angle})
 
 
 def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bool) -> Update:
-    """Let the camera go with the object at the path `node`, at the same height over the ground; ""
-    for none.
+    """Let the camera follow an object at a constant height above the ground.
 
-    start: (3,), m, world, where the object was when the camera was set.
-    begin: (3,), m, how far that is from where it is at home; the scale goes there, too.
-    smooth: whether the camera is a little behind, so that it does not shake with the object.
+    Parameters
+    ----------
+    node : str
+        Path of the object; "" for none.
+    start : array_like, shape (3,)
+        Position of the object when the camera was set, in the world frame [m].
+    begin : array_like, shape (3,)
+        Displacement of that position from the standing position [m]. The scale bar is displaced by
+        it, too.
+    smooth : bool
+        Whether the camera lags a little, so that it does not shake with the object.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     at, moved = _to_threejs(start), _to_threejs(begin)
     return encode(
@@ -129,15 +217,35 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
 
 
 def set_ground(planes: Iterable[tuple[npt.ArrayLike, float]]) -> Update:
-    """The ground, for the height of a camera that follows. planes: normals, (3,), unit, world,
-    upwards; and offsets, m.
+    """Define the ground above which a following camera keeps its height.
+
+    Parameters
+    ----------
+    planes : iterable of tuple
+        Unit normal, shape (3,), in the world frame, pointing upwards, and offset [m] of each plane.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     in_threejs = [{"normal": _to_threejs(normal), "offset": offset} for normal, offset in planes]
     return encode({"type": "set_ground", "path": "", "planes": in_threejs})
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
-    """The views that the page offers, each as position, target and angle of `set_camera`."""
+    """Define the views that the page offers.
+
+    Parameters
+    ----------
+    views : dict
+        Name -> position, target and angle, as for `set_camera`.
+
+    Returns
+    -------
+    Update
+        The command.
+    """
     named = {
         name: {"position": _to_threejs(eye), "target": _to_threejs(at), "fov": fov}
         for name, (eye, at, fov) in views.items()
@@ -146,12 +254,31 @@ def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -
 
 
 def page_command(kind: str, **values: Any) -> Update:
-    """A command of the page's that belongs to no object, as set_title, set_legend and set_theme."""
+    """Make a command that concerns the page and no object, such as set_title or set_legend.
+
+    Parameters
+    ----------
+    kind : str
+        Type of the command.
+    **values
+        Contents of the command.
+
+    Returns
+    -------
+    Update
+        The command.
+    """
     return encode({"type": kind, "path": "", **values})
 
 
 def no_animation() -> Update:
-    """The command that ends an animation: everything returns to where it was before."""
+    """End an animation: all objects return to where they were before it.
+
+    Returns
+    -------
+    Update
+        The command.
+    """
     return encode(
         {"type": "set_animation", "path": "", "animations": [], "options": {"play": False}}
     )
@@ -160,29 +287,60 @@ def no_animation() -> Update:
 def end_animation() -> list[Update]:
     """End the animation before the next picture is drawn.
 
-    A busy page may receive this, the next picture and the next animation in one frame. So
-    `no_animation` stands twice: under the animation's key, which the next animation takes over, and
-    under a key of its own, so that the old animation ends before the picture is drawn. Ended later,
-    it would undo the picture.
+    A busy page may receive this, the next picture and the next animation in one frame. The command
+    therefore occurs twice. One has the key of the animation, which the next animation overwrites.
+    The other has its own key, so that the old animation ends before the picture is drawn and cannot
+    undo it.
+
+    Returns
+    -------
+    list of Update
+        The commands.
     """
     key, command = no_animation()
     return [(key, command), ((key[0], key[1], "end"), command)]
 
 
 def set_control(name: str, **kind: Any) -> Update:
-    """A control in the page's panel that reports to the window, see panel.js: a slider with value,
-    min, max and step, a choice of texts with the number of the chosen one, a check box with a truth
-    value, else a button.
+    """Add a control to the page's panel.
+
+    The control is a slider if it has value, min, max and step; a menu if it has choices and the
+    index of the chosen one; a check box if its value is a bool; otherwise a button. See panel.js.
+
+    Parameters
+    ----------
+    name : str
+        Name of the control.
+    **kind
+        Properties of the control.
+
+    Returns
+    -------
+    Update
+        The command.
     """
     return encode({"type": "set_control", "name": name, **kind})
 
 
 def checked_control_value(command: dict[str, Any], value: Any) -> Any:
-    """The value that a page reports for a control, within the control's range: a number, a truth
-    value, or None of a button.
+    """Check the value that a page reports for a control, and limit it to the control's range.
 
-    command: of the control, decoded. Raises `ViewerError` for a value that no such control has: a
-        page of ours sends none.
+    Parameters
+    ----------
+    command : dict
+        Command of the control, decoded.
+    value
+        Reported value.
+
+    Returns
+    -------
+    float, int, bool or None
+        The value; None for a button.
+
+    Raises
+    ------
+    ViewerError
+        If such a control cannot have this value. The viewer's own page never sends one.
     """
     if "value" not in command:
         return None
@@ -192,7 +350,7 @@ def checked_control_value(command: dict[str, Any], value: Any) -> Any:
         or not isinstance(value, int | float)
         or not abs(value) < _MAX_CONTROL_VALUE
     ):
-        raise ViewerError(f"the control {command['name']!r} cannot be {value!r}.")
+        raise ViewerError(f"The control {command['name']!r} cannot have the value {value!r}.")
     if "choices" in command:
         return min(max(round(value), 0), len(command["choices"]) - 1)
     return (
@@ -203,20 +361,40 @@ def checked_control_value(command: dict[str, Any], value: Any) -> Any:
 
 
 def _to_threejs(point: npt.ArrayLike) -> list[float]:
-    """A point of ours, z up, in the coordinates of three.js, y up."""
+    """Convert a point from z up to the coordinates of three.js, y up."""
     x, y, z = (float(c) for c in np.asarray(point))
     return [x, z, -y]
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def normal_path(path: str) -> str:
-    """The path with one leading slash and no empty parts."""
+    """Return the path with one leading slash and no empty parts.
+
+    Parameters
+    ----------
+    path : str
+        Path of an object.
+
+    Returns
+    -------
+    str
+        The normalized path.
+    """
     return "/" + "/".join(part for part in path.split("/") if part)
 
 
 def frame(commands: Iterable[bytes]) -> bytes:
-    """Several commands as one message, each after its length (4 bytes, little-endian). The page
-    draws them together.
+    """Pack several commands into one message, which the page draws at once.
+
+    Parameters
+    ----------
+    commands : iterable of bytes
+        Encoded commands.
+
+    Returns
+    -------
+    bytes
+        Each command after its length (4 bytes, little-endian).
     """
     return b"".join(
         part for command in commands for part in (struct.pack("<I", len(command)), command)
@@ -224,7 +402,18 @@ def frame(commands: Iterable[bytes]) -> bytes:
 
 
 def unframe(data: bytes) -> list[bytes]:
-    """The commands in a frame: the inverse of `frame`."""
+    """Unpack the commands of a message, the inverse of `frame`.
+
+    Parameters
+    ----------
+    data : bytes
+        Message.
+
+    Returns
+    -------
+    list of bytes
+        Encoded commands.
+    """
     commands, at = [], 0
     while at < len(data):
         (length,) = struct.unpack_from("<I", data, at)

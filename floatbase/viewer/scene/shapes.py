@@ -1,8 +1,8 @@
 """Force arrows, friction cones, contact patches, the centre of mass, the ground, labels.
 
-Each function returns items. An item is a shape of unit size, and a matrix that scales and places
-it. So a force that changes costs one matrix, and the matrix tells how long an arrow is and how wide
-a cone opens.
+Each function returns items. An item is a shape of unit size and a matrix that scales and places it.
+A changed force therefore costs one matrix, and the matrix gives the length of an arrow and the
+opening of a cone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from floatbase.viewer.scene.colours import (
 )
 from floatbase.viewer.scene.threejs import Shape
 
-# width of an arrow's shaft over its length, where the length is `ARROW_LENGTH`
+# width of an arrow's shaft divided by its length, for an arrow of length `ARROW_LENGTH`
 ARROW_SLENDERNESS = 0.085
 ARROW_LENGTH = 0.2  # m
 
@@ -38,8 +38,14 @@ ARROW_LENGTH = 0.2  # m
 class Item(NamedTuple):
     """One object in a picture.
 
-    shape: what it looks like. matrix: (4, 4), its pose and scale in the world. colour: RGBA if it
-        may change, else None.
+    Parameters
+    ----------
+    shape : Shape
+        What the object looks like.
+    matrix : ndarray, shape (4, 4)
+        Pose and scale in the world frame.
+    colour : tuple of float or None
+        RGBA if the colour may change, else None.
     """
 
     shape: Shape
@@ -54,33 +60,95 @@ Picture = dict[str, Item]
 
 
 def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
-    """The picture with every path in one spelling: parts with a slash between them, as "com/ball"
-    is for "/com//ball".
+    """Return the picture with normalized paths: "com/ball" instead of "/com//ball".
 
-    Raises `InputError` for a path without a name, because its matrix would move the whole picture.
+    Parameters
+    ----------
+    picture : dict
+        Items, path -> item.
+
+    Returns
+    -------
+    Picture
+        The same items.
+
+    Raises
+    ------
+    InputError
+        If a path has no name, because its matrix would move the whole picture.
     """
     return {_normal_path(path): item for path, item in picture.items()}
 
 
-@lru_cache(maxsize=4096)  # a picture has some fifty paths, the same ones every time
+@lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _normal_path(path: str) -> str:
+    """Return a path without empty parts; raise `InputError` if nothing remains."""
     normal = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
     if not normal:
         raise InputError(
-            f"the path {path!r} in a picture has no name; give it one, as prefixed('a name', "
-            f"items) does."
+            f"The path {path!r} in a picture has no name. Give it one, as in "
+            f"prefixed('name', items)."
         )
     return normal
+
+
+def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
+    """Put items below a path.
+
+    Parameters
+    ----------
+    path : str
+        Prefix of each path.
+    items : dict
+        Items, path -> item.
+
+    Returns
+    -------
+    Picture
+        The same items with longer paths.
+    """
+    return {path + name: item for name, item in items.items()}
+
+
+def path_part(name: str) -> str:
+    """Return a name as one part of a path, without slashes.
+
+    Parameters
+    ----------
+    name : str
+        Name that may contain slashes.
+
+    Returns
+    -------
+    str
+        Name with underscores instead.
+    """
+    return name.replace("/", "_")
 
 
 def transform(
     position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0
 ) -> Array:
-    """The matrix, (4, 4), that scales a shape, then turns it, then places it.
+    """Return the matrix that scales a shape, then rotates it, then places it.
 
-    position: (3,), m, world. rotation: (3, 3); None for the identity. scale: one number, or (3,)
-        along the shape's own axes.
-    Raises `InputError` for a position of another shape, and for numbers that are not finite.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Position in the world frame [m].
+    rotation : array_like, shape (3, 3), optional
+        Rotation. By default, the identity.
+    scale : float or array_like, shape (3,), optional
+        Scale along the shape's own axes [-].
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        The matrix.
+
+    Raises
+    ------
+    InputError
+        If the position has another shape, or if a number is not finite.
     """
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = (_IDENTITY if rotation is None else np.asarray(rotation)) * np.asarray(scale)
@@ -93,37 +161,68 @@ def transform(
     if not math.isfinite(matrix.sum()):
         as_array("position in the picture", position, (3,), "m")
         raise InputError(
-            f"axes or size of a shape at {position!r} are not finite numbers: "
+            f"The rotation or scale of a shape at {position!r} is not finite: "
             f"{matrix[:3, :3].tolist()}."
         )
     return matrix
 
 
 def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
-    """The vector, shape (3,), m, and its length. what: its name, for the error.
+    """Return a vector and its length.
 
-    Raises `InputError` for a vector without length: it has no direction.
+    Parameters
+    ----------
+    what : str
+        Name of the drawn object, for the message.
+    vector : array_like, shape (3,)
+        Vector [m].
+
+    Returns
+    -------
+    vector : ndarray, shape (3,)
+        The vector [m].
+    length : float
+        Its length [m].
+
+    Raises
+    ------
+    InputError
+        If the vector is zero and therefore has no direction.
     """
     array = np.asarray(vector, dtype=np.float64)
     length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
     if not 1e-12 < length < math.inf:
         as_array(f"the vector of {what}", vector, (3,), "m")
-        raise InputError(f"{what} of no length points nowhere: leave it out of the picture.")
+        raise InputError(
+            f"The vector of {what} is zero, so it has no direction. Leave it out of the picture."
+        )
     return array, length
 
 
 def arrow(
     start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False
 ) -> Item:
-    """An arrow.
+    """Draw an arrow.
 
-    start: (3,), m, world.
-    vector: (3,), m, world, from its start to its tip.
-    colour: RGB.
-    size: size of the robot, m. The width of the shaft grows with the square roots of `size` and of
+    Parameters
+    ----------
+    start : array_like, shape (3,)
+        Tail in the world frame [m].
+    vector : array_like, shape (3,)
+        Vector from tail to tip, in the world frame [m].
+    colour : tuple of float
+        RGB.
+    size : float, optional
+        Size of the robot [m]. The width of the shaft grows with the square roots of `size` and of
         the arrow's length.
-    halo: whether it is wider and translucent, so that it is seen around another arrow at the same
-        place.
+    halo : bool, optional
+        Whether the arrow is wider and translucent, so that it is visible around another arrow at
+        the same place.
+
+    Returns
+    -------
+    Item
+        The arrow.
     """
     vector, length = vector_and_length("an arrow", vector)
     width = arrow_width(length, size) * (1.8 if halo else 1.0)
@@ -135,20 +234,49 @@ def arrow(
 
 
 def arrow_width(length: float, size: float) -> float:
-    """Width of an arrow's shaft, m. length: of the arrow, m. size: of the robot, m."""
+    """Return the width of an arrow's shaft.
+
+    Parameters
+    ----------
+    length : float
+        Length of the arrow [m].
+    size : float
+        Size of the robot [m].
+
+    Returns
+    -------
+    float
+        Width [m].
+    """
     return min(ARROW_SLENDERNESS * math.sqrt(length * ARROW_LENGTH * size), 0.35 * length)
 
 
 def friction_cone(
     position: npt.ArrayLike, normal: npt.ArrayLike, mu: float, height: float, status: str
 ) -> Item:
-    """(28) The cone ‖f_tangent‖ ≤ μ f_normal.
+    """Draw the friction cone ‖f_tangent‖ ≤ μ f_normal.
 
-    position: (3,), m, world, its tip.
-    normal: (3,), unit, world, out of the ground.
-    mu: friction coefficient μ.
-    height: m: the largest normal force that it shows, times the picture's scale.
-    status: "idle" (no force), "inside", "active" or "outside", which gives the colour.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Tip in the world frame [m].
+    normal : array_like, shape (3,)
+        Unit normal in the world frame, pointing out of the ground.
+    mu : float
+        Friction coefficient μ, dimensionless.
+    height : float
+        Height, which is the largest normal force shown times the picture's scale [m].
+    status : {"idle", "inside", "active", "outside"}
+        Status of the force, which gives the colour; "idle" means no force.
+
+    Returns
+    -------
+    Item
+        The cone.
+
+    Notes
+    -----
+    [FBR]_, eq. (28).
     """
     as_positive("mu of a friction cone", mu)
     as_positive("height of a friction cone", height, "m")
@@ -157,7 +285,18 @@ def friction_cone(
 
 
 def cone_colour(status: str) -> RGBA:
-    """The colour of a friction cone with a status, as `friction_cone` has it."""
+    """Return the colour of a friction cone.
+
+    Parameters
+    ----------
+    status : {"idle", "inside", "active", "outside"}
+        Status of its force, as for `friction_cone`.
+
+    Returns
+    -------
+    tuple of float
+        RGBA, from 0 to 1.
+    """
     return with_alpha(CONE[status], CONE_ALPHA[status])
 
 
@@ -168,12 +307,25 @@ def friction_polyhedron(
     status: str,
     active: npt.ArrayLike = (),
 ) -> Picture:
-    """The friction polyhedron that approximates a cone.
+    """Draw the friction polyhedron that approximates a cone.
 
-    position: (3,), m, world, its tip.
-    polyhedron: the polyhedron.
-    height, status: as for `friction_cone`.
-    active: numbers of the facets that have the colour of a reached limit.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Tip in the world frame [m].
+    polyhedron : FrictionPolyhedron
+        The polyhedron.
+    height : float
+        Height, as for `friction_cone` [m].
+    status : {"idle", "inside", "active", "outside"}
+        Status of the force, as for `friction_cone`.
+    active : array_like, shape (m,), optional
+        Indices of the facets that have the colour of an active constraint.
+
+    Returns
+    -------
+    Picture
+        The polyhedron and its active facets.
     """
     as_positive("height of a friction polyhedron", height, "m")
     matrix = transform(position, _contact_axes(polyhedron.normal), height)
@@ -192,10 +344,25 @@ def friction_polyhedron(
 def cone_rim(
     position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, is_round: bool = False
 ) -> Item:
-    """A dark rim around the mouth of a cone, so that a force outside it is told by more than a hue.
+    """Draw a dark rim around the mouth of a cone.
 
-    position, polyhedron, height: as for `friction_polyhedron`.
-    is_round: whether it is the rim of the round cone with the polyhedron's normal and friction.
+    The rim marks a force outside the cone by more than a colour.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Tip of the cone in the world frame [m].
+    polyhedron : FrictionPolyhedron
+        The polyhedron.
+    height : float
+        Height, as for `friction_cone` [m].
+    is_round : bool, optional
+        Whether the rim is that of the round cone with the polyhedron's normal and friction.
+
+    Returns
+    -------
+    Item
+        The rim.
     """
     frame = _contact_axes(polyhedron.normal)
     if is_round:
@@ -213,7 +380,22 @@ def cone_rim(
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
-    """A disc at a contact. position: (3,), m, world. normal: (3,), unit, world. radius: m."""
+    """Draw a disc at a contact.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Contact point in the world frame [m].
+    normal : array_like, shape (3,)
+        Unit normal in the world frame.
+    radius : float
+        Radius [m].
+
+    Returns
+    -------
+    Item
+        The disc.
+    """
     as_positive("radius of a contact patch", radius, "m")
     return Item(
         unit_shapes.disc(PATCH),
@@ -222,9 +404,21 @@ def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float)
 
 
 def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
-    """A ball at the centre of mass, its projection on the ground, and the line between.
+    """Draw a ball at the centre of mass, its projection on the ground, and a line between them.
 
-    position: (3,), m, world. ground: height of the ground below it, m. size: of the robot, m.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Centre of mass in the world frame [m].
+    ground : float
+        Height of the ground below it [m].
+    size : float
+        Size of the robot [m].
+
+    Returns
+    -------
+    Picture
+        The three items.
     """
     x, y, z = np.asarray(position, dtype=np.float64)
     radius = 0.04 * size
@@ -249,13 +443,25 @@ def label(
     colour: RGB = (0.13, 0.13, 0.13),
     plate: bool = True,
 ) -> Item:
-    """Text that always faces the reader.
+    """Draw text that always faces the viewer.
 
-    position: (3,), m, world, its centre.
-    text: the text; braces make a subscript: "f{c}".
-    height: height of its letters, m.
-    colour: RGB of the text.
-    plate: whether a plate lies behind it.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Centre of the text in the world frame [m].
+    text : str
+        The text. Braces make a subscript: "f{c}".
+    height : float
+        Height of the letters [m].
+    colour : tuple of float, optional
+        RGB of the text.
+    plate : bool, optional
+        Whether a plate lies behind the text.
+
+    Returns
+    -------
+    Item
+        The label.
     """
     return Item(
         unit_shapes.label(
@@ -268,20 +474,32 @@ def label(
 def scale_bar(
     position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB
 ) -> Picture:
-    """A bar along x which shows how long a force is drawn.
+    """Draw a bar along x that shows the drawn length of a force.
 
-    position: (3,), m, world, where it starts.
-    force: the force on its label, N.
-    length: how long this force is drawn, m.
-    size: of the robot, m.
-    colour: RGB.
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Start of the bar in the world frame [m].
+    force : float
+        Force on its label [N].
+    length : float
+        Drawn length of this force [m].
+    size : float
+        Size of the robot [m].
+    colour : tuple of float
+        RGB.
+
+    Returns
+    -------
+    Picture
+        The bar and its label.
     """
     start = np.asarray(position, dtype=np.float64)
     along = geometry.rotation_with_z_axis([1.0, 0.0, 0.0])
     thick = 0.012 * size
     text_at = start + np.array(
         [length / 2, 0.17 * size, 0.03 * size]
-    )  # beside it: from its end the bar is short
+    )  # beside the bar, which looks short when seen from its end
     picture = {
         "/bar": Item(
             unit_shapes.cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
@@ -295,50 +513,116 @@ def scale_bar(
         )
     words = unit_shapes.label(
         f"{force:g} N", 0.055 * size, True, colour, False
-    )  # behind the robot where the bar is
+    )  # hidden by the robot, as the bar is
     return picture | {"/label": Item(words, transform(text_at))}
 
 
 def rod(
     start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB
 ) -> Item:
-    """A rod.
+    """Draw a rod.
 
-    start: (3,), m, world.
-    rotation: (3, 3); the rod lies along its z axis.
-    length, radius: m.
-    colour: RGB.
+    Parameters
+    ----------
+    start : array_like, shape (3,)
+        End of the rod in the world frame [m].
+    rotation : array_like, shape (3, 3)
+        Rotation whose z axis is the direction of the rod.
+    length, radius : float
+        Length and radius [m].
+    colour : tuple of float
+        RGB.
+
+    Returns
+    -------
+    Item
+        The rod.
     """
     as_positive("length of a rod", length, "m")
     return Item(unit_shapes.cylinder(colour), transform(start, rotation, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
-    """A flat convex polygon, seen from both sides. corners: (n, 3), m. colour: RGB. opacity: from 0
-    to 1.
+    """Make a flat convex polygon that is visible from both sides.
+
+    Parameters
+    ----------
+    corners : array_like, shape (n, 3)
+        Corners [m].
+    colour : tuple of float
+        RGB.
+    opacity : float
+        Opacity, from 0 to 1 [-].
+
+    Returns
+    -------
+    Shape
+        The polygon.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three corners.
     """
     points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
-        raise InputError(f"a polygon needs three corners or more, not {len(points)}.")
+        raise InputError(f"A polygon needs at least three corners, not {len(points)}.")
     return unit_shapes.polygon(tuple(tuple(corner) for corner in points.tolist()), colour, opacity)
 
 
 def invisible_point(position: npt.ArrayLike) -> Item:
-    """A place without anything to see, for the camera to follow. position: (3,), m, world."""
+    """Make an invisible object for the camera to follow.
+
+    Parameters
+    ----------
+    position : array_like, shape (3,)
+        Position in the world frame [m].
+
+    Returns
+    -------
+    Item
+        The object.
+    """
     return Item(unit_shapes.invisible_point(), transform(position))
 
 
 def ground_grid(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
-    """A square grid of lines on the plane z = 0. colour: RGB. step: m between lines. half: half its
-    side, m.
+    """Draw a square grid of lines on the plane z = 0.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+    step : float, optional
+        Distance between lines [m].
+    half : float, optional
+        Half the side of the grid [m].
+
+    Returns
+    -------
+    Item
+        The grid.
     """
     return Item(_grid(colour, step, half), np.eye(4))
 
 
 def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
-    """Line segments of `ground_grid`, two ends each, shape (2 n, 3), m. step, half: as there."""
+    """Return the line segments of `ground_grid`.
+
+    Parameters
+    ----------
+    step : float, optional
+        Distance between lines [m].
+    half : float, optional
+        Half the side of the grid [m].
+
+    Returns
+    -------
+    ndarray, shape (2 n, 3)
+        Start and end of each segment [m].
+    """
     at = np.arange(-half, half + step / 2, step)
-    # each line in pieces of one step: software renderers lose lines that begin far behind the
+    # each line in pieces of one step: software renderers drop lines that begin far behind the
     # camera
     start, line = (grid.ravel() for grid in np.meshgrid(at[:-1], at))
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
@@ -347,18 +631,19 @@ def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
 
 
 def _contact_axes(normal: npt.ArrayLike) -> Array:
-    """Axes of a contact, (3, 3): the two tangents that the friction rows use, and the normal."""
+    """Return the two tangents used by the friction constraints, and the normal, shape (3, 3)."""
     x, y, z = np.asarray(normal, dtype=np.float64).tolist()
     return _contact_axes_of(x, y, z)
 
 
 @lru_cache(maxsize=256)
 def _contact_axes_of(x: float, y: float, z: float) -> Array:
-    """`_contact_axes` of a normal. There are few normals, so each is computed once."""
+    """Return `_contact_axes` of a normal; each is computed once, since there are few normals."""
     t1, t2 = tangents([x, y, z])
     return read_only(np.stack([t1, t2, np.cross(t1, t2)], axis=1))
 
 
 @lru_cache(maxsize=8)
 def _grid(colour: RGB, step: float, half: float) -> Shape:
+    """Return the lines of a grid; each grid is made once."""
     return threejs.lines(grid_lines(step, half), colour)

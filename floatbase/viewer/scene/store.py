@@ -1,4 +1,4 @@
-"""The scene that a window shows: the newest command of every key."""
+"""Store of the scene that a window shows."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from floatbase.viewer.scene.protocol import Key, Update, checked_control_value, 
 
 
 class Scene:
-    """The newest command of every key, each with the number of the change that brought it.
+    """Newest command of each key, with the number of the change that stored it.
 
-    A page that has seen change n is brought up to date by `since(n)`, whatever it missed. Any
-    thread may write. A change is one assignment under a lock, so an interrupt during a write loses
-    at most that write. No loop stands under the lock itself: where a loop jumps back from an `if`,
-    Python 3.12 and 3.13 leave the lock locked when an interrupt comes just there.
+    A page that has received change n is updated by `since(n)`, whatever it has missed. Any thread
+    may write. A change is one assignment under a lock, so an interrupt during a write loses at most
+    that write. There is no loop directly under the lock: Python 3.12 and 3.13 leave the lock locked
+    if an interrupt comes where a loop jumps back from an `if`.
     """
 
     def __init__(self) -> None:
@@ -28,20 +28,46 @@ class Scene:
         self._entries: dict[Key, tuple[int, bytes]] = {}
 
     def put(self, updates: Iterable[Update]) -> int:
-        """Store updates and return the number of the last one. Readers see all of them or none."""
+        """Store updates; readers see all of them or none.
+
+        Parameters
+        ----------
+        updates : iterable of Update
+            Keys and commands.
+
+        Returns
+        -------
+        int
+            Number of the last change.
+        """
         with self._lock:
             return self._store(updates)
 
     def set_control_value(self, name: object, value: Any, page: str) -> Any:
-        """Store the value that a page reports for a control, for all pages to show, and return it
-        as the control allows it.
+        """Store the value that a page reports for a control, so that all pages show it.
 
-        page: a name of that page, which the command has, so that the page knows its own report.
-        Raises `ViewerError` where there is no such control, or when it cannot have such a value.
+        Parameters
+        ----------
+        name : str
+            Name of the control.
+        value
+            Reported value.
+        page : str
+            Name of the page, by which it recognizes its own report.
+
+        Returns
+        -------
+        float, int, bool or None
+            The value, limited to the control's range.
+
+        Raises
+        ------
+        ViewerError
+            If there is no such control, or if it cannot have such a value.
         """
         control = self.command(("/", "set_control", name)) if isinstance(name, str) else None
         if control is None:
-            raise ViewerError(f"there is no control {name!r}.")
+            raise ViewerError(f"There is no control {name!r}.")
         value = checked_control_value(control, value)
         if value is not None:
             self.put(
@@ -50,8 +76,19 @@ class Scene:
         return value
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
-        """The number of the newest change, and in order the commands that came after change
-        `number`.
+        """Return the commands stored after a change.
+
+        Parameters
+        ----------
+        number : int
+            Number of that change.
+
+        Returns
+        -------
+        newest : int
+            Number of the newest change.
+        commands : list of bytes
+            The commands, in order.
         """
         with self._lock:
             newest, entries = self.newest, list(self._entries.values())
@@ -60,23 +97,52 @@ class Scene:
         ]
 
     def command(self, key: Key) -> dict[str, Any] | None:
-        """The command of a key, decoded; None where there is none."""
+        """Return the decoded command of a key.
+
+        Parameters
+        ----------
+        key : tuple of str
+            Path, type and property.
+
+        Returns
+        -------
+        dict or None
+            The command, or None if there is none.
+        """
         with self._lock:
             entry = self._entries.get(key)
         return None if entry is None else umsgpack.unpackb(entry[1])
 
     def commands(self) -> dict[Key, dict[str, Any]]:
-        """The scene as decoded commands."""
+        """Return the scene as decoded commands.
+
+        Returns
+        -------
+        dict
+            Key -> command.
+        """
         return {key: umsgpack.unpackb(command) for key, command in self._sorted_entries()}
 
     def file_commands(self) -> list[bytes]:
-        """The commands that a file can hold: all but those of the panel, which needs a program that
-        answers it.
+        """Return the commands that a file can hold.
+
+        Commands of the panel are left out, because they need a program that responds.
+
+        Returns
+        -------
+        list of bytes
+            The commands.
         """
         return [command for _, command in self.file_entries()]
 
     def file_entries(self) -> list[tuple[Key, bytes]]:
-        """The same with their keys."""
+        """Return keys and commands of `file_commands`.
+
+        Returns
+        -------
+        list of tuple
+            Keys and commands.
+        """
         return [
             entry
             for entry in self._sorted_entries()
@@ -95,9 +161,7 @@ class Scene:
             return not any(kind == "set_object" for _, kind, _ in self._entries)
 
     def _sorted_entries(self) -> list[tuple[Key, bytes]]:
-        """Keys and commands, oldest first, without those that only report that an object of ours
-        was deleted.
-        """
+        """Return keys and commands, oldest first, without deletions of our own objects."""
         with self._lock:
             entries = sorted(
                 (number, key, command) for key, (number, command) in self._entries.items()
@@ -105,6 +169,7 @@ class Scene:
         return [(key, command) for _, key, command in entries if not _is_deletion(key)]
 
     def _store(self, updates: Iterable[Update]) -> int:
+        """Store updates and return the number of the last one."""
         for key, command in updates:
             self.newest += 1
             self._entries[key] = (self.newest, command)
@@ -113,8 +178,9 @@ class Scene:
         return self.newest
 
     def _drop_below(self, path: str, number: int) -> None:
-        """Drop the entries that the deletion `number` of `path` makes void, and deletions that
-        every page has carried out.
+        """Drop the entries below `path` that the deletion `number` makes void.
+
+        Deletions that all pages have received are dropped, too.
         """
         below = "/" if path == "/" else path + "/"
         for key, (when, _) in list(self._entries.items()):
@@ -125,7 +191,8 @@ class Scene:
 
 
 def _is_deletion(key: Key) -> bool:
-    """Whether the entry deletes an object of ours. (The page's own grid and axes lie elsewhere: new
-    pages must be told.)
+    """Return whether the entry deletes one of our objects.
+
+    The page's own grid and axes have other paths; their deletion must be sent to new pages.
     """
     return key[1] == "delete" and key[0].startswith("/meshcat")

@@ -1,6 +1,6 @@
-"""Meshes, lines and labels as plain data that three.js reads.
+"""Meshes, lines and labels as plain data for three.js.
 
-Equal shapes are the same object, so that a picture that shows a shape again sends nothing.
+Equal shapes are the same object, so a picture that shows a shape again sends nothing.
 """
 
 from __future__ import annotations
@@ -34,8 +34,16 @@ _TYPES = {
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A three.js object as plain data. The object is named "shape", so that animations find its
-    material.
+    """A three.js object as plain data.
+
+    The object in the data is named "shape", by which animations find its material.
+
+    Parameters
+    ----------
+    data : dict
+        The object in the JSON format of three.js.
+    name : str
+        Name or text of the shape.
     """
 
     data: dict[str, Any]
@@ -43,11 +51,12 @@ class Shape:
 
     @cached_property
     def packed(self) -> bytes:
-        """The object in MessagePack, for `protocol.set_object`, packed once for all pictures."""
+        """Object in MessagePack for `protocol.set_object`, packed once for all pictures."""
         return umsgpack.packb(self.data)
 
 
 def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False) -> dict[str, Any]:
+    """Return an attribute of a geometry."""
     raw = np.ascontiguousarray(values, dtype=_TYPES[kind]).tobytes()
     return {
         "itemSize": size,
@@ -60,6 +69,7 @@ def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False
 def _object(
     kind: str, geometry: dict[str, Any] | None, material: dict[str, Any], scale: float = 1.0
 ) -> dict[str, Any]:
+    """Return an object with its geometry and material."""
     object_data: dict[str, Any] = {
         "uuid": "object",
         "type": kind,
@@ -75,7 +85,18 @@ def _object(
 
 
 def colour_number(colour: RGB) -> int:
-    """A colour as the number 0xrrggbb."""
+    """Convert a colour to the number 0xrrggbb.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB, from 0 to 1.
+
+    Returns
+    -------
+    int
+        The number.
+    """
     red, green, blue = (round(255 * part) for part in colour)
     return (red << 16) + (green << 8) + blue
 
@@ -93,18 +114,36 @@ def mesh(
     hide_back: bool = False,
     name: str = "",
 ) -> Shape:
-    """Triangles.
+    """Make a mesh of triangles.
 
-    vertices: (n, 3), m. They are sent as 16-bit numbers, as multiples of 1/32767 of the largest.
-    faces: (m, 3), indices of the vertices.
-    colour: RGB of the whole mesh.
-    colours: (n, 3), 0-255, RGB of each vertex; None for one colour.
-    opacity: 0 is invisible, 1 hides what is behind.
-    flat: whether each triangle has one shade, so that edges look sharp.
-    lit: whether the mesh is shaded by light.
-    on_top: whether it is drawn over whatever is in front of it.
-    hide_back: whether a translucent mesh hides its own far side.
-    name: of the shape.
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3)
+        Vertices [m]. They are sent as 16-bit integers, in units of 1/32767 of the largest
+        coordinate.
+    faces : array_like, shape (m, 3)
+        Indices of the vertices.
+    colour : tuple of float, optional
+        RGB of the whole mesh.
+    colours : array_like, shape (n, 3), optional
+        RGB of each vertex, 0 to 255. By default, the mesh has one colour.
+    opacity : float, optional
+        Opacity [-]: 0 is invisible, 1 is opaque.
+    flat : bool, optional
+        Whether each triangle has one shade, so that edges look sharp.
+    lit : bool, optional
+        Whether the mesh is shaded by light.
+    on_top : bool, optional
+        Whether the mesh is drawn on top of objects in front of it.
+    hide_back : bool, optional
+        Whether a translucent mesh hides its own far side.
+    name : str, optional
+        Name of the shape.
+
+    Returns
+    -------
+    Shape
+        The mesh.
     """
     points = np.asarray(vertices, dtype=np.float64)
     step = max(float(np.abs(points).max(initial=0.0)), 1e-9) / 32767
@@ -131,7 +170,22 @@ def mesh(
 
 
 def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
-    """m line segments, one pixel wide. points: (2 m, 3), start and end of each, m."""
+    """Make m line segments, one pixel wide.
+
+    Parameters
+    ----------
+    points : array_like, shape (2 m, 3)
+        Start and end of each segment [m].
+    colour : tuple of float
+        RGB.
+    opacity : float, optional
+        Opacity, from 0 to 1 [-].
+
+    Returns
+    -------
+    Shape
+        The lines.
+    """
     attributes = {"position": _array("Float32Array", points, 3)}
     material = {
         "type": "LineBasicMaterial",
@@ -149,13 +203,25 @@ def label(
     colour: RGB = (0.13, 0.13, 0.13),
     on_top: bool = True,
 ) -> Shape:
-    """Text that always faces the reader.
+    """Make text that always faces the viewer.
 
-    text: the text; braces make a subscript: "f{c}".
-    height: height of its letters, m.
-    plate: whether a plate lies behind it.
-    colour: RGB of the text.
-    on_top: whether it is drawn over whatever is in front of it.
+    Parameters
+    ----------
+    text : str
+        The text. Braces make a subscript: "f{c}".
+    height : float
+        Height of the letters [m].
+    plate : bool, optional
+        Whether a plate lies behind the text.
+    colour : tuple of float, optional
+        RGB of the text.
+    on_top : bool, optional
+        Whether the text is drawn on top of objects in front of it.
+
+    Returns
+    -------
+    Shape
+        The text.
     """
     image_data = text_image(text, plate, colour)
     tall, wide = image_data.shape[:2]
@@ -174,7 +240,7 @@ def label(
     }
     data = _object("Sprite", None, material)
     data["images"] = [{"uuid": "image", "url": image}]
-    # 1025: two bytes a pixel, grey and alpha; 1006: smooth when scaled
+    # 1025: two bytes per pixel, grey and alpha; 1006: smooth scaling
     texture = {
         "uuid": "texture",
         "image": "image",

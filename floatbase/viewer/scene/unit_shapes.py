@@ -1,5 +1,7 @@
-"""Shapes of unit size, each made once: equal ones are one object, so that a picture that shows one
-again sends nothing.
+"""Shapes of unit size.
+
+Each shape is made once. Equal shapes are the same object, so a picture that shows one again sends
+nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CONE_ALPHA, PATCH, RGB, WARNING
 from floatbase.viewer.scene.threejs import Shape
 
-_RIM = 0.025  # thickness of a rim, over the radius of the mouth
+_RIM = 0.025  # thickness of a rim, as a fraction of the radius of the mouth
 FACET_ALPHA = 0.75
 ARROW = (
     (0.0, 0.0),
@@ -21,18 +23,42 @@ ARROW = (
     (1.0, 0.78),
     (2.1, 0.78),
     (0.0, 1.0),
-)  # (radius, height), 1 long, its shaft of radius 1
+)  # (radius, height) of the corners; length 1, shaft of radius 1
 
 
 @lru_cache(maxsize=64)
 def arrow(colour: RGB, opacity: float) -> Shape:
-    """An arrow along z, 1 long, its shaft of radius 1."""
+    """Return an arrow along z of length 1 whose shaft has radius 1.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+    opacity : float
+        Opacity, from 0 to 1 [-].
+
+    Returns
+    -------
+    Shape
+        The arrow.
+    """
     return threejs.mesh(*geometry.surface_of_revolution(ARROW), colour, opacity=opacity)
 
 
 @lru_cache(maxsize=64)
 def cylinder(colour: RGB) -> Shape:
-    """A rod along z, 1 long, of radius 1."""
+    """Return a rod along z of length 1 and radius 1.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+
+    Returns
+    -------
+    Shape
+        The rod.
+    """
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14),
         colour,
@@ -41,7 +67,18 @@ def cylinder(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=64)
 def disc(colour: RGB) -> Shape:
-    """A disc around z, of radius 1 and thickness 1, its middle at 0."""
+    """Return a disc around z of radius 1 and thickness 1, centred at the origin.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+
+    Returns
+    -------
+    Shape
+        The disc.
+    """
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32),
         colour,
@@ -50,12 +87,32 @@ def disc(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=64)
 def sphere(colour: RGB, on_top: bool = False) -> Shape:
+    """Return a ball of radius 1.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+    on_top : bool, optional
+        Whether it is drawn on top of objects in front of it.
+
+    Returns
+    -------
+    Shape
+        The ball.
+    """
     return threejs.mesh(*geometry.sphere(1.0), colour, on_top=on_top)
 
 
 @lru_cache(maxsize=1)
 def cone() -> Shape:
-    """A cone around z, its tip at 0, 1 high, its opening of radius 1."""
+    """Return a cone around z of height 1 with its tip at the origin and a mouth of radius 1.
+
+    Returns
+    -------
+    Shape
+        The cone.
+    """
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 1.0)], 48),
         (1.0, 1.0, 1.0),
@@ -65,6 +122,24 @@ def cone() -> Shape:
 
 @lru_cache(maxsize=64)
 def polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
+    """Return a friction polyhedron around z of height 1 with its tip at the origin.
+
+    Parameters
+    ----------
+    mu : float
+        Friction coefficient [-].
+    facets : int
+        Number of facets.
+    inner_approximation : bool
+        Whether it lies inside the round cone.
+    facet_rotation : float
+        Rotation of the facets about z [rad].
+
+    Returns
+    -------
+    Shape
+        The polyhedron.
+    """
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -77,6 +152,24 @@ def polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation
 def polygonal_rim(
     mu: float, facets: int, inner_approximation: bool, facet_rotation: float
 ) -> Shape:
+    """Return the rim of `polyhedron`.
+
+    Parameters
+    ----------
+    mu : float
+        Friction coefficient [-].
+    facets : int
+        Number of facets.
+    inner_approximation : bool
+        Whether the polyhedron lies inside the round cone.
+    facet_rotation : float
+        Rotation of the facets about z [rad].
+
+    Returns
+    -------
+    Shape
+        The rim.
+    """
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -89,6 +182,13 @@ def polygonal_rim(
 
 @lru_cache(maxsize=1)
 def round_rim() -> Shape:
+    """Return the rim of `cone`.
+
+    Returns
+    -------
+    Shape
+        The rim.
+    """
     vertices, faces = geometry.torus_arc(1.0, _RIM, 0.0, 2.0 * np.pi)
     return threejs.mesh(vertices + np.array([0.0, 0.0, 1.0], dtype=np.float32), faces, PATCH)
 
@@ -97,7 +197,26 @@ def round_rim() -> Shape:
 def facet(
     mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int
 ) -> Shape:
-    """One side of the polyhedron: facet i lies between rays i - 1 and i."""
+    """Return one facet of `polyhedron`; facet i lies between rays i - 1 and i.
+
+    Parameters
+    ----------
+    mu : float
+        Friction coefficient [-].
+    facets : int
+        Number of facets.
+    inner_approximation : bool
+        Whether the polyhedron lies inside the round cone.
+    facet_rotation : float
+        Rotation of the facets about z [rad].
+    facet : int
+        Index of the facet.
+
+    Returns
+    -------
+    Shape
+        The facet.
+    """
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -107,14 +226,57 @@ def facet(
 
 @lru_cache(maxsize=256)
 def label(text: str, height: float, plate: bool, colour: RGB, on_top: bool = True) -> Shape:
+    """Return a text.
+
+    Parameters
+    ----------
+    text : str
+        The text. Braces make a subscript: "f{c}".
+    height : float
+        Height of the letters [m].
+    plate : bool
+        Whether a plate lies behind the text.
+    colour : tuple of float
+        RGB of the text.
+    on_top : bool, optional
+        Whether it is drawn on top of objects in front of it.
+
+    Returns
+    -------
+    Shape
+        The text.
+    """
     return threejs.label(text, height, plate, colour, on_top)
 
 
 @lru_cache(maxsize=256)
 def polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
+    """Return a flat convex polygon.
+
+    Parameters
+    ----------
+    corners : tuple of tuple
+        Corners, three coordinates each [m].
+    colour : tuple of float
+        RGB.
+    opacity : float
+        Opacity, from 0 to 1 [-].
+
+    Returns
+    -------
+    Shape
+        The polygon.
+    """
     return threejs.mesh(*geometry.convex_polygon(corners), colour, opacity=opacity, lit=False)
 
 
 @lru_cache(maxsize=1)
 def invisible_point() -> Shape:
+    """Return an object without anything visible.
+
+    Returns
+    -------
+    Shape
+        The object.
+    """
     return threejs.lines(np.zeros((2, 3)), PATCH)

@@ -1,9 +1,8 @@
-"""The visuals that a robot's URDF names. The light meshes are made from them, and robots without
-light meshes show them.
+"""Visuals in a robot's URDF, from which light meshes are made; other robots show them directly.
 
 meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with
-wrong triangles. So trimesh reads the files here, material by material. Needs trimesh, and pycollada
-for .dae files.
+wrong triangles. Therefore trimesh reads the files here, material by material. This needs trimesh,
+and pycollada for .dae files.
 """
 
 from __future__ import annotations
@@ -32,10 +31,16 @@ DARK = (0.2, 0.2, 0.2)  # colour of a material whose texture is missing
 class VisualMesh:
     """One piece of a robot.
 
-    joint: Pinocchio's number of the joint that moves it.
-    colour: (3,), RGB, 0-1.
-    mesh: its triangles, m, in the joint's frame.
-    source: name of its file.
+    Parameters
+    ----------
+    joint : int
+        Index of the joint that moves it, in the Pinocchio model.
+    colour : ndarray, shape (3,)
+        RGB, from 0 to 1.
+    mesh : Trimesh
+        Triangles in the joint's frame [m].
+    source : str
+        Name of its file.
     """
 
     joint: int
@@ -45,8 +50,22 @@ class VisualMesh:
 
 
 def urdf_visuals(robot: Robot) -> list[VisualMesh]:
-    """All pieces of the URDF's visuals, one for each material. Raises `ImportError` without
-    trimesh.
+    """Read all visuals of a robot's URDF.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    list of VisualMesh
+        One piece for each material.
+
+    Raises
+    ------
+    ImportError
+        If trimesh is not installed.
     """
     import trimesh  # noqa: F401  raises at once if it is missing
 
@@ -60,7 +79,7 @@ def urdf_visuals(robot: Robot) -> list[VisualMesh]:
 
 
 def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
-    """The pieces of one visual, one for each of its materials."""
+    """Return the pieces of one visual, one for each of its materials."""
     import trimesh
 
     if not Path(item.meshPath).is_file():
@@ -80,8 +99,9 @@ def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
 
 
 def _scene(path: Path) -> trimesh.Scene:
-    """The meshes in a file. If pycollada finds none because a texture is missing, the file is read
-    without textures.
+    """Read the meshes in a file.
+
+    If pycollada finds none because a texture is missing, the file is read without textures.
     """
     import trimesh
 
@@ -92,7 +112,7 @@ def _scene(path: Path) -> trimesh.Scene:
 
 
 def _without_textures(path: Path) -> bytes:
-    """A .dae file with a dark colour instead of each texture."""
+    """Return a .dae file with a dark colour in place of each texture."""
     root = ElementTree.parse(path).getroot()
     space = root.tag.rpartition("}")[0] + "}"
     for parent in list(root.iter()):
@@ -108,7 +128,7 @@ def _without_textures(path: Path) -> bytes:
 
 
 def _primitive(shape: Any) -> trimesh.Trimesh:
-    """A box, cylinder or sphere of the URDF as a mesh."""
+    """Return a box, cylinder or sphere of the URDF as a mesh."""
     import trimesh
 
     if hasattr(shape, "halfSide"):
@@ -119,7 +139,7 @@ def _primitive(shape: Any) -> trimesh.Trimesh:
 
 
 def _colour(item: pin.GeometryObject, mesh: trimesh.Trimesh) -> npt.NDArray[np.float64]:
-    """The colour of the file's material if it has one, else of the URDF's, else grey."""
+    """Return the colour of the file's material, else that of the URDF, else grey."""
     material = getattr(mesh.visual, "material", None)
     if Path(item.meshPath).suffix.lower() in (".dae", ".obj") and material is not None:
         return np.asarray(material.main_color[:3]) / 255.0

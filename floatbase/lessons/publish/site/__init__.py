@@ -1,14 +1,24 @@
-"""The course as a web site: `make site` runs the lessons, prepares all pages for Sphinx, and builds
-them into build/site.
+"""The course as a web site: runs the lessons, prepares the pages, and builds them with Sphinx.
 
-`build` does it. `outputs` prepares the lessons, `references` links what texts name, `reference` and
-`docstrings` make the pages of the library, `mathml` draws formulas; `conf` is Sphinx's, and the
-texts of the site's own pages stand beside it. This needs the extra `site`.
+`build` is the entry point. `outputs` prepares lessons, `references` links equation numbers and
+lessons, `reference` writes the API reference, and `mathml` draws formulas. `conf` configures
+Sphinx. The pages' texts are in the folder `docs`. This needs the extra `site`.
 """
 
-from floatbase.lessons.publish.site import docstrings, mathml
-from floatbase.lessons.publish.site.build import SITE, build
+from floatbase.lessons.publish.site import mathml
+from floatbase.lessons.publish.site.addresses import PACKAGES, exported
+from floatbase.lessons.publish.site.build import SITE, build, replace_site
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import add_links
 
-__all__ = ["SITE", "add_links", "build", "docstrings", "mathml", "prepare_lesson", "run_lessons"]
+__all__ = [
+    "PACKAGES",
+    "SITE",
+    "add_links",
+    "build",
+    "exported",
+    "mathml",
+    "prepare_lesson",
+    "replace_site",
+    "run_lessons",
+]

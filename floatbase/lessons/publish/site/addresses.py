@@ -1,6 +1,4 @@
-"""What stands where on the pages of the library: packages, what they export, and the address of
-each name.
-"""
+"""The public names of each package, and the full name behind each short one."""
 
 from __future__ import annotations
 
@@ -12,32 +10,30 @@ from typing import Any
 
 import floatbase
 
-# package -> what it is for, in the order of the floors
+# package -> what it contains, from the top
 PACKAGES = {
-    "floatbase": "the front door",
-    "floatbase.robots": "robots and their states",
-    "floatbase.dynamics": "contacts, equations of motion, spaces",
-    "floatbase.objectives": "costs and tasks",
-    "floatbase.friction": "cones, polyhedra, wrenches",
-    "floatbase.qp": "quadratic programs",
-    "floatbase.control": "controllers",
-    "floatbase.actuators": "hydraulics, lags, delays",
-    "floatbase.simulation": "MuJoCo, rollouts, sweeps",
-    "floatbase.behaviours": "gaits and walking",
-    "floatbase.viewer": "pictures and plots",
-    "floatbase.playground": "the live page",
-    "floatbase.lessons": "what the lessons share",
+    "floatbase": "the names that most programs need",
+    "floatbase.robots": "robots, their states, and loading them",
+    "floatbase.dynamics": "contacts, constrained equations of motion, null spaces",
+    "floatbase.objectives": "tasks, costs and their pullback",
+    "floatbase.friction": "friction cones, polyhedra and contact wrenches",
+    "floatbase.qp": "quadratic programs and their solvers",
+    "floatbase.control": "the whole-body controller",
+    "floatbase.actuators": "hydraulic cylinders, lags and delays",
+    "floatbase.simulation": "MuJoCo, rollouts, pushes and parameter sweeps",
+    "floatbase.behaviours": "standing, gaits and walking",
+    "floatbase.viewer": "3-D pictures, recordings, films and plots",
+    "floatbase.playground": "the playground, one live page",
+    "floatbase.lessons": "predictions, exercises and figures of the course",
     "floatbase.affine": "affine maps and quadratic costs",
     "floatbase.linear_algebra": "ranks and null spaces",
-    "floatbase.errors": "errors",
+    "floatbase.errors": "exceptions",
 }
 
 
 @cache
 def addresses() -> dict[str, str]:
-    """What texts call a thing -> its address on these pages: alone, with its package, and as a
-    member of its class.
-    """
+    """Map each name that a text may use, such as `Contacts.points`, to its full name."""
     found: dict[str, str] = {}
     for package in list(PACKAGES)[1:]:
         for name, value in exported(package):
@@ -52,9 +48,7 @@ def addresses() -> dict[str, str]:
 
 
 def exported(package: str) -> list[tuple[str, Any]]:
-    """Name and value of all that a package exports; of a module without `__all__`, what it defines
-    itself.
-    """
+    """List name and value of all that a package exports, or that a module defines itself."""
     module = import_module(package)
     names = getattr(module, "__all__", None)
     if names is None:
@@ -68,7 +62,7 @@ def exported(package: str) -> list[tuple[str, Any]]:
 
 
 def members(value: Any) -> list[str]:
-    """The public members of a class, or functions of a module, that have a docstring."""
+    """List the documented public members of a class, or the public names of a module."""
     if isinstance(value, ModuleType):
         return [name for name, _ in exported(value.__name__)]
     if not inspect.isclass(value):

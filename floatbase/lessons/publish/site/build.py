@@ -1,6 +1,4 @@
-"""Builds the site: runs lessons, writes all that Sphinx reads into one folder, and lets it write
-the pages.
-"""
+"""Build the site: run the lessons, collect all sources in one folder, and run Sphinx on it."""
 
 from __future__ import annotations
 
@@ -26,66 +24,110 @@ from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, a
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 
 SITE = Path("build/site")
-_SITE_SOURCE = Path(__file__).parent  # texts and static files of the site
 _ROOT = NOTEBOOKS.parent
+DOCS = _ROOT / "docs"  # the texts of the site's own pages
 RUN_FOLDER = _ROOT / "build" / "site-run"  # lessons that were run
+# addresses in the repository, as the pages of docs link to them -> addresses in the site
+_MOVED = {
+    "../notebooks/": "lessons/",
+    "../benchmarks/": "benchmarks/",
+    "../CHANGELOG.md": "changelog.md",
+}
+_FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 _DESCRIPTIONS = {
-    "equations": "Every equation of the course, written out, with the functions, tests and lessons "
+    "equations": "Every equation of the course text, with the functions, tests and lessons "
     "that belong to it.",
-    "conventions": "Symbols, frames, signs, units and tolerances, the same in every function of "
-    "floatbase.",
-    "how_to": "Where your work is kept, and what to do when something fails.",
-    "changelog": "What changed in floatbase, version by version.",
-    "peers": "The time of floatbase's control tick beside those of TSID and placo, which find the "
-    "same torques.",
-    "tick": "What a control tick of floatbase takes, part by part, and how it grows.",
-    "rollout": "What a simulated second takes in floatbase's rollout, beside a bare loop.",
-    "walking": "How well robots walk with floatbase, as measured and as required.",
+    "conventions": "Symbols, frames, signs, units and tolerances of every function of floatbase.",
+    "how_to": "Where the course keeps your work, and what to do when something fails.",
+    "changelog": "What changed in each version of floatbase.",
+    "peers": "The computing time of a control step of floatbase, TSID and placo for the same QP.",
+    "tick": "The computing time of each part of a control step, and how it grows with the robot.",
+    "rollout": "The computing time of a simulated second in a rollout and in a bare loop.",
+    "walking": "How well robots walk with floatbase: measurements and requirements.",
 }
 
 
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
-    """Write the site into `folder`; the path of its first page.
+    """Build the site.
 
-    lessons: those that it has, all by default. stored: run none of them, and show what their
-        notebooks hold. Raises
-    `InputError` when there is no such lesson, `FloatbaseError` when Sphinx finds a fault.
+    Parameters
+    ----------
+    folder : Path
+        Where to write.
+    lessons : sequence of Path, optional
+        The lessons to include; the default is the whole course.
+    stored : bool
+        Whether to use the stored outputs of the notebooks instead of running them.
+
+    Returns
+    -------
+    Path
+        The first page.
+
+    Raises
+    ------
+    InputError
+        If a lesson does not exist, or if the folder holds a file of the same name as a page that
+        an earlier build did not write.
+    FloatbaseError
+        If Sphinx reports a warning or an error.
     """
     known = sorted(NOTEBOOKS.glob("*.ipynb"))
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
     for path in shown:
         if path not in known:
-            raise InputError(f"there is no lesson {path}; the course's lessons are in {NOTEBOOKS}.")
+            raise InputError(f"There is no lesson {path}. The lessons are in {NOTEBOOKS}.")
     *notebooks, scene = run_lessons(
         [*([] if stored else shown), _front_page_notebook()], RUN_FOLDER
     ).values()
-    pictures = Pictures(folder / "_static")
-    if (folder / ".buildinfo").exists():  # an earlier site, and no other folder of somebody's
-        shutil.rmtree(folder)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
-        source = Path(place) / "source"
-        shutil.copytree(_SITE_SOURCE, source, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+        source, built = Path(place) / "source", Path(place) / "site"
+        pictures = Pictures(built / "_static")
+        shutil.copytree(DOCS, source)
+        (source / "benchmarks").mkdir()
         _write_lessons(
             source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures
         )
         _write_texts(source, shown, _first_picture(scene, pictures))
         _write_reference(source / "api")
-        _run_sphinx(source, folder)
-    pictures.write()
-    pages = (page.read_text(encoding="utf-8") for page in folder.rglob("*.html"))
-    mathml.write_font(pages, folder / "_static" / mathml.FONT)
+        _run_sphinx(source, built)
+        pictures.write()
+        pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
+        mathml.write_font(pages, built / "_static" / mathml.FONT)
+        replace_site(built, folder)
     return folder / "index.html"
 
 
+def replace_site(built: Path, folder: Path) -> None:
+    """Replace the files of an earlier build in `folder`. All other files stay, such as a .git."""
+    for unused in built.rglob("*.map"):  # source maps of the theme
+        unused.unlink()
+    names = {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file()}
+    listed = folder / _FILE_LIST
+    earlier = set(listed.read_text(encoding="utf-8").splitlines()) if listed.is_file() else set()
+    earlier = {name for name in earlier if ".." not in name and not Path(name).is_absolute()}
+    if foreign := sorted(name for name in names - earlier if (folder / name).exists()):
+        raise InputError(
+            f"{folder / foreign[0]} was not written by an earlier build of the site, so it is not "
+            f"replaced. Choose another folder, or move the file."
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    # listed before they are copied, so that an interrupted build can be repeated
+    listed.write_text("".join(f"{name}\n" for name in sorted(names)), encoding="utf-8")
+    for name in earlier - names:
+        (folder / name).unlink(missing_ok=True)
+    shutil.copytree(built, folder, dirs_exist_ok=True)
+
+
 def _front_page_notebook() -> Path:
-    """A notebook that draws the picture of the first page: the program of the README, played."""
+    """Write a notebook that runs the README's program and plays its run."""
     readme = (_ROOT / "README.md").read_text(encoding="utf-8")
     code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
-    play = 'fb.Viewer(robot, height=420).play(run, title="a push of 30 N to the side")'
+    play = 'fb.Viewer(robot, height=420).play(run, title="a 30 N push to the side")'
     notebook = new_notebook(
         cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")]
     )
@@ -96,7 +138,7 @@ def _front_page_notebook() -> Path:
 
 
 def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
-    """The page of each lesson."""
+    """Write the page of each lesson."""
     addresses = {path.name.split("_")[0]: path.name for path in notebooks}
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
@@ -106,7 +148,7 @@ def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures)
 
 
 def _first_picture(notebook: Any, pictures: Pictures) -> str:
-    """The first picture of a notebook, as Markdown; an image where it cannot be placed."""
+    """Return the first picture of a notebook as Markdown, or as an image."""
     data = next(
         output.data for cell in notebook.cells for output in cell.outputs if "data" in output
     )
@@ -118,7 +160,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
 
 
 def _toctrees(lessons: Sequence[Path]) -> str:
-    """The lessons for the bar beside each page."""
+    """Write the list of lessons for the side bar."""
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
     return "\n\n".join(
@@ -144,14 +186,12 @@ def _lesson_table(known: Iterable[Path]) -> str:
 
 
 def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
-    """All texts that are no lessons, with their links; the figures of the benchmarks."""
+    """Write all pages that are not lessons, with their links, and copy the benchmark figures."""
     made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
-        "changelog.md": (_ROOT / "CHANGELOG.md")
-        .read_text(encoding="utf-8")
-        .replace("(notebooks/", "(lessons/"),
+        "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
         **{
             f"benchmarks/{path.name}": path.read_text(encoding="utf-8")
             for path in _ROOT.glob("benchmarks/*.md")
@@ -164,6 +204,9 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
         (source / name).write_text(about + text, encoding="utf-8")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
+        if path.parent == source:
+            for there, here in _MOVED.items():
+                text = text.replace(f"({there}", f"({here}")
         for name, part in {
             "scene": scene,
             "lessons": _lesson_table(lessons),
@@ -192,7 +235,7 @@ def _write_reference(target: Path) -> None:
 
 
 def _with_anchors(page: str) -> str:
-    """The map with link targets, and its functions linked to the pages of the library."""
+    """Add link targets to the page of equations, and link its functions to the API reference."""
     known = addresses()
 
     def link(match: re.Match[str]) -> str:
@@ -218,7 +261,7 @@ def _with_anchors(page: str) -> str:
 
 
 def _run_sphinx(source: Path, folder: Path) -> None:
-    """Let Sphinx write the pages; a warning is a fault."""
+    """Run Sphinx; a warning is an error."""
     from sphinx.cmd.build import build_main
 
     options = [
@@ -229,9 +272,9 @@ def _run_sphinx(source: Path, folder: Path) -> None:
         "-j",
         "2",
         "-c",
-        str(_SITE_SOURCE),
+        str(Path(__file__).parent),  # of conf.py
         "-d",
         str(source / ".doctrees"),
     ]
     if build_main([*options, str(source), str(folder)]):
-        raise FloatbaseError("Sphinx found faults, named above; the site is not whole.")
+        raise FloatbaseError("Sphinx reported the problems above; the site is incomplete.")

@@ -1,14 +1,16 @@
-"""Sphinx's settings for the site; `floatbase.lessons.publish.site.build` starts it on the folder of
-prepared pages.
-"""
+"""Sphinx configuration of the web site, which `floatbase.lessons.publish.site.build` builds."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import floatbase
-from floatbase.lessons.publish.site.docstrings import process_docstring, process_signature
 from floatbase.lessons.publish.site.mathml import visit_displaymath, visit_math
+from floatbase.lessons.publish.site.reference import (
+    hide_protocol_signature,
+    link_equations,
+    resolve_short_name,
+)
 from floatbase.viewer.web import pages
 
 project = "floatbase"
@@ -16,12 +18,23 @@ author = "The floatbase authors"
 copyright = "the floatbase authors, BSD 3-Clause licence"
 version = release = floatbase.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_design"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx_design",
+]
 root_doc = "index"
 exclude_patterns = [".doctrees"]
 add_module_names = False
 autodoc_member_order = "bysource"
-autodoc_typehints_format = "short"
+autodoc_typehints = "none"  # the docstrings give types with shapes and units
+autosummary_generate = False  # `reference` writes the pages
+napoleon_google_docstring = False
+napoleon_use_param = False  # a shape such as (nv,) in a type is no link
+napoleon_use_rtype = False
+default_role = "py:obj"  # `name` in a docstring links to that name
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 90
 toc_object_entries_show_parents = "hide"
@@ -32,7 +45,10 @@ nb_merge_streams = True
 nb_ipywidgets_js: dict[str, Any] = {}
 myst_enable_extensions = ["colon_fence", "dollarmath", "amsmath"]
 myst_heading_anchors = 4
-suppress_warnings = ["myst.header"]  # a lesson may begin a part with a small heading
+suppress_warnings = [
+    "myst.header",  # a lesson may begin a part with a small heading
+    "ref.citation",  # not every reference is cited by a docstring
+]
 
 html_context = {"default_mode": "auto"}
 html_theme = "sphinx_book_theme"
@@ -48,7 +64,7 @@ html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
     "use_download_button": False,
-    "navbar_persistent": [],  # search stands in the side bar
+    "navbar_persistent": [],  # search is in the side bar
     "use_fullscreen_button": False,
     "show_navbar_depth": 1,
     "navigation_depth": 2,
@@ -57,8 +73,9 @@ html_theme_options = {
 
 
 def setup(app: Any) -> dict[str, Any]:
-    """What Sphinx calls first."""
+    """Connect our handlers; Sphinx calls this first."""
     app.add_html_math_renderer("mathml", (visit_math, None), (visit_displaymath, None))
-    app.connect("autodoc-process-docstring", process_docstring)
-    app.connect("autodoc-process-signature", process_signature)
+    app.connect("autodoc-process-docstring", link_equations)
+    app.connect("autodoc-process-signature", hide_protocol_signature)
+    app.connect("missing-reference", resolve_short_name)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

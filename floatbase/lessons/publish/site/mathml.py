@@ -1,6 +1,4 @@
-"""Formulas as MathML, which browsers draw themselves, and a font for them: the site needs no script
-for either.
-"""
+"""Formulas as MathML, and the font that browsers draw them with."""
 
 from __future__ import annotations
 
@@ -19,31 +17,31 @@ from latex2mathml.converter import convert
 from floatbase.errors import ViewerError
 
 FONT = "formulas.woff"  # in the site's static files
-logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells each step
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # it logs each step
 _TAG = re.compile(r"\\tag\{(.*?)\}")
 _MATHML = re.compile(r"<math.*?</math>", re.DOTALL)
-# what the converter leaves out: brackets grow with their own matrix only, dots stand near, and what
-# is below min stands below
+# what the converter leaves out: brackets grow only with their own matrix, dots are close to their
+# letter, and the variable of min is below it
 _MATRIX = re.compile(r"<mo>&#x0005B;</mo><mtable>.*?</mtable><mo>&#x0005D;</mo>")
 _DOTTED = re.compile(r"<mover>(<mi>[^<]*</mi><mo>(?:&#x000A8;|&#x002D9;|&#x0007E;)</mo></mover>)")
 _BELOW = re.compile(r"<msub>(<mo>(?:min|max)</mo>(?:<mi>[^<]*</mi>|<mrow>.*?</mrow>))</msub>")
 
 
 def mathml(latex: str, display: str = "inline") -> str:
-    """A formula as MathML. display: "inline" or "block"."""
+    """Convert a LaTeX formula to MathML. `display` is "inline" or "block"."""
     text = _MATRIX.sub(r"<mrow>\g<0></mrow>", str(convert(latex.strip(), display=display)))
     text = _BELOW.sub(r"<munder>\1</munder>", text) if display == "block" else text
     return _DOTTED.sub(r'<mover accent="true">\1', text)
 
 
 def visit_math(writer: Any, node: Any) -> None:
-    """Sphinx's formula in a line of text."""
+    """Write an inline formula for Sphinx."""
     writer.body.append(mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def visit_displaymath(writer: Any, node: Any) -> None:
-    r"""Sphinx's formula on a line of its own, with its \tag at the right."""
+    r"""Write a displayed formula for Sphinx, with its \tag on the right."""
     latex = node.astext()
     tag = _TAG.search(latex)
     number = f'<span class="number">({tag[1]})</span>' if tag else ""
@@ -54,9 +52,10 @@ def visit_displaymath(writer: Any, node: Any) -> None:
 
 
 def write_font(pages: Iterable[str], target: Path) -> None:
-    """STIX Two Math, which the package ziamath brings, cut down to the formulas in pages of HTML.
+    """Write the part of STIX Two Math that the formulas of the pages use.
 
-    Brackets grow around matrices only in a font made for formulas, and few machines have one.
+    Brackets grow around matrices only in a font made for formulas, and few machines have one. The
+    package ziamath contains this font.
     """
     formulas = (formula for page in pages for formula in _MATHML.findall(page))
     letters = {
@@ -73,7 +72,7 @@ def write_font(pages: Iterable[str], target: Path) -> None:
 
 
 def _font_file() -> str:
-    """Where the font lies; the package around it is not imported."""
+    """Return the path of the font; the package around it is not imported."""
     spec = find_spec("ziamath")
     if spec is None or not spec.submodule_search_locations:
         raise ViewerError(
@@ -84,9 +83,7 @@ def _font_file() -> str:
 
 
 def _slanted(letter: str) -> str:
-    """The letter as browsers draw it when it stands alone in a formula: in italics, which are
-    letters of their own.
-    """
+    """Return the italic letter, its own character, that browsers draw for a single letter."""
     for first, last, slanted in (("a", "z", 0x1D44E), ("A", "Z", 0x1D434), ("α", "ω", 0x1D6FC)):
         if first <= letter <= last:
             return "ℎ" if letter == "h" else chr(slanted + ord(letter) - ord(first))

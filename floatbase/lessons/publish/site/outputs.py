@@ -1,6 +1,4 @@
-"""Lessons as they stand on the site: run, with pictures that need no kernel, and words in place of
-what needs one.
-"""
+"""Prepare lessons for the site: run them, and replace what needs a kernel."""
 
 from __future__ import annotations
 
@@ -20,44 +18,48 @@ import floatbase
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
 from floatbase.lessons.publish.site.references import add_links
 
-RUN_PAGE = "../run.md"
+RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
 _HIGH_RESOLUTION = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"
-_CLAIMS_PROMPT = "claims of the text above, as code that fails if one is wrong"
+_CLAIMS_PROMPT = "claims of the text above, as code that fails if a claim is wrong"
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 _LEARNER_CALLS = re.compile(
     r"^(?:review|show_progress|reveal)\(", re.MULTILINE
-)  # what they print is about the learner
+)  # their output is about the learner
 
 
 class PicturePlacer(Protocol):
-    """What puts pictures into the site."""
+    """Protocol of an object that puts pictures into the site."""
 
     def place(self, data: Mapping[str, Any]) -> str | None:
-        """HTML for an output's data that hold a picture, None for others."""
+        """Return HTML for the data of an output that holds a picture, or None."""
 
 
-def run_lessons(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
-    """The lessons, run: path -> notebook with outputs. Those that are as they were when they ran
-    last are taken from `kept`.
+def run_lessons(lessons: Iterable[Path], cache: Path) -> dict[Path, Any]:
+    """Run lessons and return path -> notebook with outputs. Unchanged lessons are not run again.
 
-    kept: a folder, which is made, for what was run: a name holds a digest of the lesson and of the
-        package.
+    Parameters
+    ----------
+    lessons : iterable of Path
+        The lessons.
+    cache : Path
+        Folder of earlier runs, created if necessary. File names contain a digest of the lesson and
+        of the package.
     """
-    kept.mkdir(parents=True, exist_ok=True)
+    cache.mkdir(parents=True, exist_ok=True)
     source = _digest_of_package()
     files = {
-        path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons
+        path: cache / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons
     }
     new = {path: file for path, file in files.items() if not file.exists()}
     with ProcessPoolExecutor(PARALLEL_RUNS, mp_context=get_context("spawn")) as pool:
         for path in pool.map(_run_lesson, new, new.values()):
             print(f"run: {path.name}", flush=True)
     for path, file in files.items():
-        for former in set(kept.glob(f"{path.stem}-*.ipynb")) - {file}:
+        for former in set(cache.glob(f"{path.stem}-*.ipynb")) - {file}:
             former.unlink()
     return {path: read_notebook(file) for path, file in files.items()}
 
@@ -67,7 +69,7 @@ def _run_lesson(path: Path, file: Path) -> Path:
     notebook.cells.insert(0, new_code_cell(_HIGH_RESOLUTION))
     execute_notebook(notebook, path.parent, FLOATBASE_VIEWER="site", MPLBACKEND=_INLINE)
     notebook.cells.pop(0)
-    part = file.with_suffix(".part")  # a build that was interrupted leaves no half
+    part = file.with_suffix(".part")  # an interrupted build leaves no partial file
     nbformat.write(notebook, part)
     part.replace(file)
     return path
@@ -89,9 +91,16 @@ def _digest(data: bytes) -> str:
 
 
 def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
-    """A lesson as Sphinx reads it. Changes it in place.
+    """Prepare a lesson for Sphinx, in place.
 
-    notebook: with outputs. pictures: takes the 3-D pictures. lessons: number -> address.
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The lesson with outputs.
+    pictures : PicturePlacer
+        Receives the 3-D pictures.
+    lessons : mapping
+        Number -> address of each lesson.
     """
     about, heading = _description(notebook), ""
     for i, cell in enumerate(notebook.cells):
@@ -100,13 +109,13 @@ def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str,
             cell.source = add_links(cell.source, lessons)
         else:
             notebook.cells[i] = _prepare_code_cell(cell, heading, pictures)
-    notebook.metadata.pop("widgets", None)  # they live on no page without a kernel
+    notebook.metadata.pop("widgets", None)  # widgets need a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
 
 
 def _description(notebook: Any) -> str:
-    """What search engines show of a lesson: its first paragraph."""
+    """Return the first paragraph of a lesson, which search engines show."""
     text = next(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
     paragraph = next(part for part in text.split("\n\n")[1:] if part.strip())
     return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
@@ -117,12 +126,10 @@ def _prepare_code_cell(cell: Any, heading: str, pictures: PicturePlacer) -> Any:
     if "predict" in tags:
         return new_markdown_cell(_prediction_question(cell))
     if "check" in tags:
-        return new_markdown_cell(
-            _live_lesson_note("The check of your answer, and hints, are in the live lesson")
-        )
+        return new_markdown_cell(_live_lesson_note("Checks and hints are in the live lesson"))
     if _LEARNER_CALLS.search(cell.source):
         return new_markdown_cell(
-            _live_lesson_note("This is about what you said and solved, in the live lesson")
+            _live_lesson_note("Your predictions and solutions appear here in the live lesson")
         )
     if "claims" in tags:
         cell.metadata["tags"] = [*tags, "hide-input"]
@@ -140,7 +147,7 @@ def _live_lesson_note(text: str) -> str:
 
 
 def _prediction_question(cell: Any) -> str:
-    """What a prediction asks for, in words."""
+    """Describe the prediction that a cell asks for."""
     call = next(
         node
         for node in ast.walk(ast.parse(cell.source))
@@ -156,13 +163,13 @@ def _prediction_question(cell: Any) -> str:
         )
     asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
     return (
-        f":::{{div}} live\n{asked} Typing it in needs [the live lesson]({RUN_PAGE}); here, "
-        f"think first.\n:::"
+        f":::{{div}} live\n{asked} Make your prediction before you read on. You can type it in "
+        f"in [the live lesson]({RUN_PAGE}).\n:::"
     )
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
-    """An output as a page can show it, in a list; none where it is about the run alone."""
+    """Return an output as a list of what a page can show of it."""
     if output.output_type == "stream":
         output.text = _TERMINAL_CODES.sub("", output.text)
         return [output] if output.name == "stdout" else []
@@ -178,9 +185,7 @@ def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
 
 
 def _describe_figure(cell: Any, heading: str) -> None:
-    """Says what a figure shows, for those who cannot see it, and how wide it is, as it has two dots
-    for each pixel.
-    """
+    """Add alternative text and width to a figure, which has two dots per pixel."""
     figures = [
         output
         for output in cell.outputs

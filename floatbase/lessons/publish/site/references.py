@@ -1,6 +1,4 @@
-"""Links from what the course's texts name, an equation (7), a section §4, App. C, a note or a
-lesson, to where it stands.
-"""
+"""Link equations (7), sections §4, App. C, notes and lessons in texts to their pages."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ _IN_MARKDOWN = re.compile(f"(?P<kept>{_NOT_LINKED})|{REFERENCE.pattern}", re.DOT
 
 
 def anchor_of(number: str) -> str:
-    """The name of a place in the map: of "(9)" eq-9, of "§2.1" sec-2-1, of "App. A" app-a."""
+    """Return the anchor on the page of equations: eq-9 for "(9)", sec-2-1 for "§2.1"."""
     if number.startswith("App"):
         return f"app-{number[-1].lower()}"
     return (
@@ -37,21 +35,28 @@ def anchor_of(number: str) -> str:
     )
 
 
+def is_known(number: str) -> bool:
+    """Whether "(9)", "§2.1" or "App. A" has a place on the page of equations."""
+    return number in _NUMBERS | _SECTIONS
+
+
 def target_of(match: re.Match[str]) -> str:
-    """The place in the map that a match of `REFERENCE` leads to; "" where it leads nowhere, or to a
-    lesson.
-    """
+    """Return the anchor for a match of `REFERENCE`, or "" for a lesson or an unknown number."""
     if match["note"]:
         return NOTES_ANCHOR
     named = match["equation"] or match["section"] or (match["appendix"] or "").replace("endix", ".")
-    return anchor_of(named) if named in _NUMBERS | _SECTIONS else ""
+    return anchor_of(named) if is_known(named) else ""
 
 
 def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
-    """Markdown with links to the map and to lessons; what links to a lesson that is not there is
-    text.
+    """Add links to equations and lessons; links to lessons that are not on the site become text.
 
-    lessons: number -> address, such as "05" -> "05_centre_of_mass.ipynb".
+    Parameters
+    ----------
+    markdown : str
+        The text.
+    lessons : mapping
+        Number -> address, such as "05" -> "05_centre_of_mass.ipynb".
     """
     names = {Path(address).name for address in lessons.values()}
 

@@ -8,8 +8,8 @@ export function kindOf({value, min, choices, term}) {
   return min === undefined ? "checkbox" : "slider";
 }
 
-// Where a control goes: {label, key}, of a row of its section. "friction believed" is the row
-// "friction" in the column "believed".
+// Where a control goes: {label, key}, of a row of its section. "friction model" is the row
+// "friction" in the column "model".
 export function rowOf({name, column, section = ""}) {
   const label = column ? name.slice(0, name.length - column.length).trim() : name;
   return {label, key: `${section}/${label}`};

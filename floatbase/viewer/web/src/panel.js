@@ -5,7 +5,7 @@ import {createReports, kindOf, rowOf, sliderText} from "./controls.js";
 import {element, make} from "./dom.js";
 import {createPlot} from "./plot.js";
 
-const COLUMNS = ["", "believed", "true"];
+const COLUMNS = ["", "model", "reality"];
 const COPIED_FOR = 2000; // ms
 
 // report(message): sends a message to the window. redraw(): has the picture drawn again.

@@ -11,11 +11,11 @@ test("a command's fields say which control it is", () => {
 });
 
 test("two columns of a name are one row, and rows of two sections are two", () => {
-  const [believed, actual] = ["believed", "true"].map(
+  const [model, reality] = ["model", "reality"].map(
     (column) => rowOf({name: `friction ${column}`, column, section: "ground"}),
   );
-  assert.deepEqual(believed, {label: "friction", key: "ground/friction"});
-  assert.deepEqual(actual, believed);
+  assert.deepEqual(model, {label: "friction", key: "ground/friction"});
+  assert.deepEqual(reality, model);
   assert.deepEqual(rowOf({name: "__proto__"}), {label: "__proto__", key: "/__proto__"});
 });
 

@@ -1,0 +1,51 @@
+"""The code of README and documentation runs and prints what the pages show."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+WITH_CODE = [page for page in PAGES if "```python\n" in page.read_text(encoding="utf-8")]
+LINK = re.compile(r"\]\(((?!https?:)[^)#\s]+)")
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
+def test_the_code_of_a_page_runs_and_prints_what_the_page_shows(
+    page: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {"__name__": "page"}
+    text = page.read_text(encoding="utf-8")
+    for language, block in re.findall(r"^```(python|text)\n(.*?)^```$", text, re.M | re.S):
+        if language == "text":
+            assert capsys.readouterr().out.endswith(block)
+        else:
+            exec(compile(block, str(page), "exec"), names)
+    for name in ("view", "page"):
+        if name in names:
+            names[name].close()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_of_a_page_lead_to_files(page: Path) -> None:
+    made_by_the_site = ("lessons/", "api/")
+    links = LINK.findall(page.read_text(encoding="utf-8"))
+    missing = [
+        link
+        for link in links
+        if not (page.parent / link).exists() and not link.startswith(made_by_the_site)
+    ]
+    assert missing == []
+
+
+def test_the_program_of_the_readme_has_twelve_lines() -> None:
+    (code,) = re.findall(r"^```python\n(.*?)^```$", PAGES[0].read_text("utf-8"), re.M | re.S)
+    assert len([line for line in code.splitlines() if line]) == 12
