@@ -94,8 +94,8 @@ class Iteration(Value):
     dropped : str or None
         Name of the row that leaves W.
     objective : float
-        Value of ½ xᵀ H x + gᵀ x at x. In phase 1 it is the largest violation at x, for rows scaled
-        to unit length.
+        Value of ½ xᵀ H x + gᵀ x at x [units of the objective]. In phase 1 it is the largest
+        violation at x, for rows scaled to unit length.
     """
 
     working_set: tuple[str, ...]

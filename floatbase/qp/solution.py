@@ -22,15 +22,15 @@ class Residuals:
     Parameters
     ----------
     stationarity : float
-        max |H x + g + Aᵀ ν + Gᵀ μ|.
+        max |H x + g + Aᵀ ν + Gᵀ μ| [units of g].
     equality : float
-        max |A x - b|.
+        max |A x - b| [units of b].
     inequality : float
-        max(G x - h, 0).
+        max(G x - h, 0) [units of h].
     complementarity : float
-        max |μ (G x - h)|.
+        max |μ (G x - h)| [units of the objective].
     dual : float
-        max(-μ, 0).
+        max(-μ, 0) [units of μ].
     """
 
     stationarity: float

@@ -174,9 +174,8 @@ def _check_limits_and_axes(name: str, root: ElementTree.Element, model: pin.Mode
 
 def _check_moments_of_inertia(name: str, root: ElementTree.Element, model: pin.Model) -> None:
     """Check that no link, including everything welded to it, has a negative moment of inertia."""
-    for i, inertia in list(enumerate(model.inertias))[
-        1:
-    ]:  # the sum may be positive although a part is negative
+    # Pinocchio's inertias are sums, which may be positive although a part is negative
+    for i, inertia in list(enumerate(model.inertias))[1:]:
         smallest = float(inertia.inertia.diagonal().min())
         if smallest < -_ROUNDING:
             where = (
