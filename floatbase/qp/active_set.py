@@ -88,11 +88,11 @@ class Iteration(Value):
     step_length : float
         Step length α, dimensionless.
     blocking : str or None
-        Name of the row that blocked a longer step and joins W.
+        Name of the row that blocked a longer step and joins W; None if no row blocked.
     multipliers : mapping of str to float
         Multipliers μ of the rows of W at the end of the step, by name; empty if a row blocked.
     dropped : str or None
-        Name of the row that leaves W.
+        Name of the row that leaves W; None if no row leaves.
     objective : float
         Value of ½ xᵀ H x + gᵀ x at x [units of the objective]. In phase 1 it is the largest
         violation at x, for rows scaled to unit length.
@@ -160,8 +160,8 @@ def active_set(
         Names of the inequality rows that are initially in W, such as the `working_set` of the last
         run. Rows that depend on earlier ones are left out.
     max_iterations : int, optional
-        Largest number of iterations, including those of phase 1, as a real-time program needs it.
-        None means no limit. Reaching the limit raises no error; check `ActiveSetRun.converged`.
+        Largest number of iterations, including those of phase 1; None means no limit. Real-time
+        programs need a limit. Reaching the limit raises no error; check `ActiveSetRun.converged`.
 
     Returns
     -------
@@ -171,7 +171,7 @@ def active_set(
     Raises
     ------
     InfeasibleError
-        If the constraints are in conflict. It names a minimal set of conflicting rows.
+        If the constraints are in conflict; the error names a minimal set of conflicting rows.
     SolverError
         If the objective is not convex or has no minimum, or if the method does not converge.
     UnknownNameError

@@ -52,7 +52,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     Raises
     ------
     InfeasibleError
-        If the constraints are in conflict. It names a minimal set of conflicting rows.
+        If the constraints are in conflict; the error names a minimal set of conflicting rows.
     SolverError
         If the objective has no minimum or is not convex, or if the solver does not converge.
     UnknownNameError

@@ -94,7 +94,7 @@ def load(
     Raises
     ------
     UnknownNameError
-        If no robot has this name; the message lists similar names.
+        If there is no robot, frame or joint with a given name; the message lists similar names.
     InputError
         If the feet, limits or posture do not fit the robot, if joints are coupled by <mimic>, or if
         the robot's inertia matrix M is singular.
