@@ -17,7 +17,7 @@ from floatbase.lessons.publish.site import PACKAGES, exported
 
 UNFINISHED = {
     "floatbase",
-    *(f"floatbase.{name}" for name in ["actuators", "control", "qp", "robots", "viewer"]),
+    *(f"floatbase.{name}" for name in ["actuators", "qp", "robots", "viewer"]),
 }
 LISTED = [name for name in PACKAGES if name not in UNFINISHED]
 # missing, unknown, reordered and untyped parameters; descriptions; the summary's full stop
