@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from floatbase._validation import Array, as_array, as_bool, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_bool,
+    as_number,
+    as_positive,
+    checked,
+    short_repr,
+)
 from floatbase.errors import InputError
+
+_Ball: TypeAlias = tuple[tuple[float, float, float], float]  # centre, m, world, and radius, m
+
+
+def _as_ball(name: str, value: Any) -> _Ball | None:
+    if value is None:
+        return None
+    try:
+        point, radius = value
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name} is {short_repr(value)}; it must be a point and a radius, as "
+            f"((0, 0, 0.3), 0.5)."
+        ) from None
+    x, y, z = as_array(f"point in {name}", point, (3,), "m").tolist()
+    return (x, y, z), as_positive(f"radius in {name}", radius, "m")
 
 
 @dataclass(frozen=True)
-class View:
+class View(Value):
     """A direction to look from, and what fills the picture.
 
     azimuth: degrees around the vertical; 0 is in front of the robot (+x), 90 at its left (+y).
@@ -26,41 +51,19 @@ class View:
     radius that is not positive, and numbers that are not finite.
     """
 
-    azimuth: float = 40.0
-    elevation: float = 18.0
-    distance: float = 1.0
-    angle: float = 32.0
-    feet: bool = False
-    around: tuple[tuple[float, float, float], float] | None = None
+    azimuth: float = field(default=40.0, metadata=checked(as_number, "degrees"))
+    elevation: float = field(default=18.0, metadata=checked(as_number, "degrees", -90.0, 90.0))
+    distance: float = field(default=1.0, metadata=checked(as_positive))
+    angle: float = field(default=32.0, metadata=checked(as_positive, "degrees"))
+    feet: bool = field(default=False, metadata=checked(as_bool))
+    around: _Ball | None = field(default=None, metadata=checked(_as_ball))
 
     def __post_init__(self) -> None:
-        as_positive("distance of a View", self.distance)
-        for name in ("azimuth", "elevation"):
-            as_number(f"{name} of a View", getattr(self, name), "degrees")
-        as_bool("feet of a View", self.feet)
-        if abs(self.elevation) > 90.0:
+        super().__post_init__()
+        if self.angle >= 180.0:
             raise InputError(
-                f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 "
-                f"(above) degrees."
+                f"angle of View is {self.angle:g}; it must be below 180 degrees; 32 is usual."
             )
-        if as_positive("angle of a View", self.angle, "degrees") >= 180.0:
-            raise InputError(
-                f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual."
-            )
-        if self.around is not None:
-            _check_around(self.around)
-
-
-def _check_around(around: Any) -> None:
-    try:
-        point, radius = around
-    except (TypeError, ValueError):
-        raise InputError(
-            f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), "
-            f"0.5)."
-        ) from None
-    as_array("point in around of a View", point, (3,), "m")
-    as_positive("radius in around of a View", radius, "m")
 
 
 PRESETS = {
