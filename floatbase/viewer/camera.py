@@ -18,7 +18,14 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.errors import InputError
+from floatbase.robots import Robot, State
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene.diff import ROOT
+from floatbase.viewer.scene.ground import displacement
+from floatbase.viewer.scene.painter import Painter
 
+# paths in the picture: the robot, and its smoothed position in a recording
+ROBOT, FOLLOWED = "robot", "followed"
 _Ball: TypeAlias = tuple[tuple[float, float, float], float]  # centre, m, world, and radius, m
 
 
@@ -94,3 +101,71 @@ def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
         np.sin(elevation),
     ]
     return target, target + distance * np.array(direction)
+
+
+class FollowingCamera:
+    """The camera of a viewer: it looks at a robot, and can follow it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot that fills the picture.
+    follows : bool
+        Whether the camera follows the robot.
+    """
+
+    def __init__(self, robot: Robot, follows: bool):
+        self.robot, self.follows = robot, follows
+        self._state: State | None = None  # the robot's state when the camera was set
+
+    def commands(
+        self, painter: Painter, view: View, state: State | None, followed: str = ROBOT
+    ) -> tuple[protocol.Update, ...]:
+        """Return the commands for a view of the robot, for what the camera follows, and for the
+        presets.
+
+        state: the robot's state now; None for the standing pose. followed: path of what the camera
+            follows.
+        """
+        self._state = state
+        presets = protocol.set_views(
+            {name: self._placement(painter, preset) for name, preset in PRESETS.items()}
+        )
+        return (
+            protocol.set_camera(*self._placement(painter, view)),
+            self.follow_command(painter, followed),
+            presets,
+        )
+
+    def follow_command(self, painter: Painter, followed: str) -> protocol.Update:
+        """Return the command for what the camera follows: `followed`, or nothing if it stays."""
+        base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
+        follows = self.follows and self.robot.is_floating
+        start = (self._state or painter.standing).joint_transforms[1][:3, 3]
+        return protocol.set_follow(
+            ROOT + base if follows else "",
+            start,
+            self._displacement(painter),
+            smooth=followed == ROBOT,
+        )
+
+    def _placement(self, painter: Painter, view: View) -> tuple[Array, Array, float]:
+        """Return the camera's position and target, shape (3,), m, world, and its angle, degrees."""
+        low, high = painter.feet_box if view.feet else painter.box
+        moved = self._displacement(painter) + [
+            0.0,
+            0.0,
+            painter.drawn_ground.height(painter.standing.com),
+        ]
+        target, eye = target_and_eye(view, low + moved, high + moved)
+        return eye, target, view.angle
+
+    def _displacement(self, painter: Painter) -> Array:
+        """Return how far the robot was from its standing pose when the camera was set, shape (3,),
+        m, along the ground.
+        """
+        return displacement(
+            painter.drawn_ground,
+            painter.standing.com,
+            (self._state or painter.standing).com,
+        )

@@ -4,16 +4,13 @@ or moving.
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import (
-    Array,
     as_array,
     as_bool,
     as_instance,
@@ -25,38 +22,31 @@ from floatbase._validation import (
 )
 from floatbase.behaviours import StepPlan, Walk
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, ViewerError
+from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer.camera import PRESETS, View, target_and_eye
+from floatbase.viewer.camera import FOLLOWED, PRESETS, ROBOT, FollowingCamera, View
 from floatbase.viewer.controls import Controls
-from floatbase.viewer.export import film, recording, thumbnail
-from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
+from floatbase.viewer.export import recording
+from floatbase.viewer.output import Output
 from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.scene.diff import ROOT, DiffRenderer
-from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes, displacement
+from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes
 from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter, legend_kinds, prefixed
 from floatbase.viewer.scene.shapes import Picture
 from floatbase.viewer.transport.window import Window
-from floatbase.viewer.web import pages
 
 if TYPE_CHECKING:
-    from ipywidgets import Widget
-
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
-ROBOT, FOLLOWED = (
-    "robot",
-    "followed",
-)  # in the picture: the robot, and where it is on average of a stride
 _MOST_PIXELS = 10_000  # of a picture's height
 
 
-class Viewer(Controls):
+class Viewer(Controls, Output):
     """Draws a robot in a web page that this process serves.
 
     robot: the robot to draw.
@@ -123,9 +113,9 @@ class Viewer(Controls):
         )
         self.window = Window(port)
         self.renderer = DiffRenderer(self.window)
-        self._is_playing, self._follow = False, as_bool("follow", follow)
+        self._camera = FollowingCamera(robot, as_bool("follow", follow))
+        self._is_playing = False
         self._last: State | None = None
-        self._camera_state: State | None = None  # where the robot was when the camera was set
         self._legend_entries: dict[
             str, tuple[RGB, str]
         ] = {}  # kinds of items that the legend explains beside its own
@@ -182,8 +172,7 @@ class Viewer(Controls):
         picture = self.painter.picture(state, contacts, forces, planned, **options)
         self.draw(picture, title, ghost_name)
         if self._last is None:
-            self._last = state
-            self.renderer.set(*self._camera_commands(View()))
+            self.renderer.set(*self._camera.commands(self.painter, View(), state))
         self._last = state
         return self
 
@@ -259,7 +248,8 @@ class Viewer(Controls):
         everything else.
         """
         if self._is_playing:
-            self.window.put([self._following(ROBOT), *protocol.end_animation()])
+            follow = self._camera.follow_command(self.painter, ROBOT)
+            self.window.put([follow, *protocol.end_animation()])
             self._is_playing = False
         settings = (
             *self._caption(legend_kinds(picture), title, ghost_name),
@@ -341,8 +331,8 @@ class Viewer(Controls):
         self.play_pictures(
             times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name
         )
-        self._last, self._follow = states[0], follow
-        self.renderer.set(*self._camera_commands(View(), FOLLOWED))
+        self._last, self._camera.follows = states[0], follow
+        self.renderer.set(*self._camera.commands(self.painter, View(), states[0], FOLLOWED))
         return self
 
     def play_pictures(
@@ -381,101 +371,11 @@ class Viewer(Controls):
                 f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a "
                 f"View."
             )
-        self._follow = self._follow if follow is None else as_bool("follow", follow)
-        self.renderer.force_set(
-            *self._camera_commands(view, FOLLOWED if self._is_playing else ROBOT)
-        )
+        if follow is not None:
+            self._camera.follows = as_bool("follow", follow)
+        followed = FOLLOWED if self._is_playing else ROBOT
+        self.renderer.force_set(*self._camera.commands(self.painter, view, self._last, followed))
         return self
-
-    def _camera_commands(self, view: View, followed: str = ROBOT) -> tuple[protocol.Update, ...]:
-        """The commands for a view of the robot where it is now, for what the camera follows from
-        there, and for the presets.
-        """
-        self._camera_state = self._last
-        presets = protocol.set_views(
-            {name: self._position_target_angle(preset) for name, preset in PRESETS.items()}
-        )
-        return (
-            protocol.set_camera(*self._position_target_angle(view)),
-            self._following(followed),
-            presets,
-        )
-
-    def _position_target_angle(self, view: View) -> tuple[Array, Array, float]:
-        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a
-        view of the robot `_camera_state`.
-        """
-        low, high = self.painter.feet_box if view.feet else self.painter.box
-        moved = self._displacement + [
-            0.0,
-            0.0,
-            self.painter.drawn_ground.height(self.painter.standing.com),
-        ]
-        target, eye = target_and_eye(view, low + moved, high + moved)
-        return eye, target, view.angle
-
-    def _following(self, followed: str) -> protocol.Update:
-        """The command that lets the camera follow the robot, or what stands for it in a recording,
-        if it is to follow.
-        """
-        base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
-        follows = self._follow and self.robot.is_floating
-        start = (self._camera_state or self.painter.standing).joint_transforms[1][:3, 3]
-        return protocol.set_follow(
-            ROOT + base if follows else "", start, self._displacement, smooth=followed == ROBOT
-        )
-
-    @property
-    def _displacement(self) -> Array:
-        """How far the robot was from where it stands at home when the camera was set, (3,), m,
-        along the ground.
-        """
-        return displacement(
-            self.painter.drawn_ground,
-            self.painter.standing.com,
-            (self._camera_state or self.painter.standing).com,
-        )
-
-    def save(
-        self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
-    ) -> Path:
-        """Write the scene to a file, by its name's ending, and return its path.
-
-        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and
-            .gif are the recording at the speed of `play`, .png its first picture; these need a
-            browser and `pip install "floatbase[video]"`.
-        title: of the page.
-        size: (width, height) of films and images in pixels, even numbers.
-
-        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be
-        written.
-        """
-        target = Path(path if isinstance(path, Path) else as_string("path", path))
-        if self.window.scene.is_empty:
-            raise ViewerError(
-                "nothing is drawn yet, so there is nothing to save; call show(state) or "
-                "play(rollout) first."
-            )
-        size = film.checked_size(size)
-        if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
-            raise ViewerError(
-                f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png."
-            )
-        try:
-            if target.suffix.lower() in film.FRAME_RATES:
-                film.capture(self.static_html(title), target, size)
-            else:
-                target.write_text(self.static_html(title), encoding="utf-8")
-        except OSError as error:
-            raise ViewerError(
-                f"cannot write {target} ({error.strerror}); choose a folder that exists."
-            ) from None
-        return target
-
-    def static_html(self, title: str | None = None) -> str:
-        """The scene as it is now, as one HTML page that needs neither server nor network."""
-        _check_texts(title=title)
-        return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def set_disconnect_message(self, words: str) -> None:
         """What the page says when this viewer has been closed. words: the text."""
@@ -486,52 +386,6 @@ class Viewer(Controls):
     def close(self) -> None:
         """Close the page: its thread ends and its port is free."""
         self.window.close()
-
-    def widget(self) -> Widget:
-        """A widget that shows the picture, for panels: live, until the viewer is displayed again;
-        then it shows the image of the picture with which it opened. Raises `ViewerError` without
-        anywidget.
-
-        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a
-        still copy of the scene.
-        """
-        if self._is_static:
-            import ipywidgets
-
-            return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(
-            self.robot.name,
-            self.height,
-            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
-        )
-
-    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be; a program that stores
-        notebooks may have another, see `MIMEBUNDLES`.
-        """
-        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
-            return bundle(self)
-        if self._is_static:
-            return {"text/html": self._static_frame()}
-        picture = self.widget()
-        data, metadata = thumbnail.with_thumbnail(picture._repr_mimebundle_(**kwargs), picture)
-        return {**data, "text/plain": repr(self)}, metadata
-
-    @property
-    def _is_static(self) -> bool:
-        """Whether a display is a copy of the scene and no more."""
-        return display_mode() == "static" or not self.window.is_open
-
-    def _static_frame(self) -> str:
-        """HTML of the scene as it is now, which needs no kernel."""
-        name, style = (
-            html.escape(self.robot.name),
-            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
-        )
-        return (
-            f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
-            f'style="{style}"></iframe>'
-        )
 
     def __repr__(self) -> str:
         address = f", {self.url}" if self.window.is_listening else ""
