@@ -1,4 +1,4 @@
-"""The camera: from where the page looks at the robot."""
+"""The camera: where the page looks at the robot from, and what it follows."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ from floatbase.viewer.scene.diff import ROOT
 from floatbase.viewer.scene.ground import displacement
 from floatbase.viewer.scene.painter import Painter
 
-# paths in the picture: the robot, and its smoothed position in a recording
+# paths in the picture: the robot, and its position averaged over a stride
 ROBOT, FOLLOWED = "robot", "followed"
 _Ball: TypeAlias = tuple[tuple[float, float, float], float]  # centre, m, world, and radius, m
 
 
 def _as_ball(name: str, value: Any) -> _Ball | None:
+    """Return a centre and a radius as plain numbers, checked; None stays None."""
     if value is None:
         return None
     try:
         point, radius = value
     except (TypeError, ValueError):
         raise InputError(
-            f"{name} is {short_repr(value)}; it must be a point and a radius, as "
+            f"{name} is {short_repr(value)}; it must be a centre and a radius, as in "
             f"((0, 0, 0.3), 0.5)."
         ) from None
     x, y, z = as_array(f"point in {name}", point, (3,), "m").tolist()
@@ -47,15 +48,26 @@ def _as_ball(name: str, value: Any) -> _Ball | None:
 class View(Value):
     """A direction to look from, and what fills the picture.
 
-    azimuth: degrees around the vertical; 0 is in front of the robot (+x), 90 at its left (+y).
-    elevation: degrees above the horizontal.
-    distance: 1 fills the picture; 2 is twice as far away.
-    angle: vertical field of view, degrees.
-    feet: whether the robot's feet fill the picture, instead of the whole robot.
-    around: a point, (3,), m, world, and a radius, m: this ball fills the picture, instead of the
-        robot.
-    Raises `InputError` for an elevation beyond ±90, an angle not between 0 and 180, a distance or
-    radius that is not positive, and numbers that are not finite.
+    Parameters
+    ----------
+    azimuth : float
+        Angle around the vertical [degrees]; 0 is in front of the robot (+x), 90 on its left (+y).
+    elevation : float
+        Angle above the horizontal [degrees], from -90 to 90.
+    distance : float
+        Relative distance, dimensionless: 1 fills the picture, 2 is twice as far away.
+    angle : float
+        Vertical field of view [degrees], between 0 and 180.
+    feet : bool
+        Whether the robot's feet fill the picture, instead of the whole robot.
+    around : tuple, optional
+        Centre, in the world frame [m], and radius [m] of a ball that fills the picture instead of
+        the robot, as `((x, y, z), radius)`.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or outside its range, or if a distance or radius is not positive.
     """
 
     azimuth: float = field(default=40.0, metadata=checked(as_number, "degrees"))
@@ -69,7 +81,8 @@ class View(Value):
         super().__post_init__()
         if self.angle >= 180.0:
             raise InputError(
-                f"angle of View is {self.angle:g}; it must be below 180 degrees; 32 is usual."
+                f"angle of View is {self.angle:g}; it must be less than 180 degrees. The default "
+                "is 32."
             )
 
 
@@ -85,9 +98,19 @@ PRESETS = {
 
 
 def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
-    """The point that the camera looks at, and where the camera is: (3,) each, m, world.
+    """Compute the point that the camera looks at, and its own position.
 
-    low, high: (3,), m, world, corners of the box that fills the picture.
+    Parameters
+    ----------
+    view : View
+        The view.
+    low, high : ndarray, shape (3,)
+        Corners of the box that fills the picture, in the world frame [m].
+
+    Returns
+    -------
+    tuple of ndarray, shape (3,)
+        Target and position of the camera, in the world frame [m].
     """
     if view.around is None:
         target, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
@@ -121,11 +144,23 @@ class FollowingCamera:
     def commands(
         self, painter: Painter, view: View, state: State | None, followed: str = ROBOT
     ) -> tuple[protocol.Update, ...]:
-        """Return the commands for a view of the robot, for what the camera follows, and for the
-        presets.
+        """Return the commands for the camera, for what it follows, and for the presets.
 
-        state: the robot's state now; None for the standing pose. followed: path of what the camera
-            follows.
+        Parameters
+        ----------
+        painter : Painter
+            The painter of the viewer, which knows the robot's size and the ground.
+        view : View
+            Where to look from.
+        state : State or None
+            Current state of the robot; None for the standing pose.
+        followed : str, optional
+            Path of the item that the camera follows.
+
+        Returns
+        -------
+        tuple of Update
+            The commands.
         """
         self._state = state
         presets = protocol.set_views(
@@ -138,7 +173,20 @@ class FollowingCamera:
         )
 
     def follow_command(self, painter: Painter, followed: str) -> protocol.Update:
-        """Return the command for what the camera follows: `followed`, or nothing if it stays."""
+        """Return the command that sets what the camera follows; nothing if it does not follow.
+
+        Parameters
+        ----------
+        painter : Painter
+            The painter of the viewer.
+        followed : str
+            Path of the item to follow.
+
+        Returns
+        -------
+        Update
+            The command.
+        """
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self.follows and self.robot.is_floating
         start = (self._state or painter.standing).joint_transforms[1][:3, 3]
@@ -150,7 +198,7 @@ class FollowingCamera:
         )
 
     def _placement(self, painter: Painter, view: View) -> tuple[Array, Array, float]:
-        """Return the camera's position and target, shape (3,), m, world, and its angle, degrees."""
+        """Return the camera's position and target, shape (3,) [m], and its angle [degrees]."""
         low, high = painter.feet_box if view.feet else painter.box
         moved = self._displacement(painter) + [
             0.0,
@@ -161,9 +209,7 @@ class FollowingCamera:
         return eye, target, view.angle
 
     def _displacement(self, painter: Painter) -> Array:
-        """Return how far the robot was from its standing pose when the camera was set, shape (3,),
-        m, along the ground.
-        """
+        """Return how far the robot was from its standing pose, along the ground [m]."""
         return displacement(
             painter.drawn_ground,
             painter.standing.com,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Output:
-    """Saves and displays the scene of a viewer."""
+    """Saved files and notebook displays of a viewer's scene."""
 
     robot: Robot
     height: int
@@ -30,27 +30,41 @@ class Output:
     def save(
         self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
     ) -> Path:
-        """Write the scene to a file, by its name's ending, and return its path.
+        """Write the scene to a file in the format of its extension.
 
-        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and
-            .gif are the recording at the speed of `play`, .png its first picture; these need a
-            browser and `pip install "floatbase[video]"`.
-        title: of the page.
-        size: (width, height) of films and images in pixels, even numbers.
+        Parameters
+        ----------
+        path : str or Path
+            File to write. An .html file is one page, still or moving, that needs neither server nor
+            network. .mp4 and .gif files contain the recording at the speed of `play`, a .png file
+            its first picture; these need a browser and `pip install "floatbase[video]"`.
+        title : str, optional
+            Title of the page.
+        size : tuple of int, optional
+            Width and height of films and images [pixels], even numbers.
 
-        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be
-        written.
+        Returns
+        -------
+        Path
+            Path of the file.
+
+        Raises
+        ------
+        ViewerError
+            If nothing has been drawn yet, if the extension is unknown, or if the file cannot be
+            written.
         """
         target = Path(path if isinstance(path, Path) else as_string("path", path))
         if self.window.scene.is_empty:
             raise ViewerError(
-                "nothing is drawn yet, so there is nothing to save; call show(state) or "
+                "Nothing has been drawn yet, so there is nothing to save. Call show(state) or "
                 "play(rollout) first."
             )
         size = film.checked_size(size)
         if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
             raise ViewerError(
-                f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png."
+                f"Cannot save {target.name!r}: unknown file type. Use a name that ends in .html, "
+                f".mp4, .gif or .png."
             )
         try:
             if target.suffix.lower() in film.FRAME_RATES:
@@ -59,22 +73,43 @@ class Output:
                 target.write_text(self.static_html(title), encoding="utf-8")
         except OSError as error:
             raise ViewerError(
-                f"cannot write {target} ({error.strerror}); choose a folder that exists."
+                f"Cannot write {target} ({error.strerror}). Choose an existing folder in which you "
+                f"may write."
             ) from None
         return target
 
     def static_html(self, title: str | None = None) -> str:
-        """The scene as it is now, as one HTML page that needs neither server nor network."""
+        """Return the current scene as one HTML page that needs neither server nor network.
+
+        Parameters
+        ----------
+        title : str, optional
+            Title of the page; by default, the robot's name.
+
+        Returns
+        -------
+        str
+            HTML of the page.
+        """
         title = "" if title is None else as_string("title", title)
         return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def widget(self) -> Widget:
-        """A widget that shows the picture, for panels: live, until the viewer is displayed again;
-        then it shows the image of the picture with which it opened. Raises `ViewerError` without
-        anywidget.
+        """Make a widget that shows the picture, for use in panels.
 
-        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a
-        still copy of the scene.
+        It is live until the viewer is displayed again; then it shows the image with which it
+        opened. If the environment variable FLOATBASE_VIEWER is "static", or if the viewer is
+        closed, the widget is a static copy of the scene.
+
+        Returns
+        -------
+        Widget
+            The widget.
+
+        Raises
+        ------
+        ViewerError
+            If anywidget is not installed.
         """
         if self._is_static:
             import ipywidgets
@@ -87,8 +122,9 @@ class Output:
         )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be; a program that stores
-        notebooks may have another, see `MIMEBUNDLES`.
+        """Return the live picture, and an image of it for readers that cannot show widgets.
+
+        A program that stores notebooks can replace both, see `MIMEBUNDLES`.
         """
         if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             return bundle(self)
@@ -100,11 +136,11 @@ class Output:
 
     @property
     def _is_static(self) -> bool:
-        """Whether a display is a copy of the scene and no more."""
+        """Whether a display is only a copy of the scene."""
         return display_mode() == "static" or not self.window.is_open
 
     def _static_frame(self) -> str:
-        """HTML of the scene as it is now, which needs no kernel."""
+        """Return the current scene as an HTML frame that needs no kernel."""
         name, style = (
             html.escape(self.robot.name),
             f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",

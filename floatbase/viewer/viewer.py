@@ -1,6 +1,4 @@
-"""`Viewer(robot)`: draws a robot with its contacts, forces and friction cones in a web page, still
-or moving.
-"""
+"""The `Viewer`: draws a robot with its contacts, forces and friction cones in a web page."""
 
 from __future__ import annotations
 
@@ -43,33 +41,50 @@ if TYPE_CHECKING:
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
-_MOST_PIXELS = 10_000  # of a picture's height
+_MAX_HEIGHT = 10_000  # pixels
 
 
 class Viewer(Controls, Output):
-    """Draws a robot in a web page that this process serves.
-
-    robot: the robot to draw.
-    height: height of the picture in a notebook, pixels.
-    background: "white" or "light", both of which are dark where the page around the picture is, or
-        the browser; or "dark".
-    scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's
-        weight about twice as long as its centre of mass is high.
-    facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
-    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
-    ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin;
-        None takes the plane that the contacts stand on when they share a normal, else a level
-        ground.
-    follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it
-        otherwise.
-    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook
-        has none.
-    Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
+    """A web page in which this process draws a robot.
 
     In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
-    its frames come as a slider's values do. Elsewhere, open `viewer.url` in a browser. The newest
-    display in a notebook is live; earlier ones show the image with which they opened. So give each
-    interactive part its own `Viewer`.
+    its frames use the kernel's own connection, as slider values do. Elsewhere, open `viewer.url` in
+    a browser. Only the newest display in a notebook is live; earlier ones show the image with which
+    they opened. Give each interactive part its own `Viewer`.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot to draw.
+    height : int, optional
+        Height of the picture in a notebook [pixels].
+    background : {"white", "light", "dark"}, optional
+        Background of the picture. "white" and "light" turn dark when the surrounding page or the
+        browser is dark.
+    scale : float, optional
+        Length of a drawn force [m/N], the same for forces and cones. By default, the arrow of the
+        robot's weight is about twice as long as its centre of mass is high.
+    facets : int, optional
+        Number of facets of the drawn friction polyhedra. By default, round cones are drawn.
+    inner_approximation : bool, optional
+        Whether the drawn polyhedra lie inside the friction cones, as for `FrictionPolyhedron`.
+    facet_rotation : float, optional
+        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
+    ground : Ground or array_like, shape (3,), optional
+        The ground of a simulation, or the normal, in the world frame, of a plane through the
+        origin. By default, the plane of the contacts if they share a normal, else level ground.
+    follow : bool, optional
+        Whether the camera follows the robot when it walks; `play` and `camera` can change this.
+    port : int, optional
+        Port of the page; 0 takes a free port when `url` is first read, so a viewer that is only
+        displayed in a notebook opens no port.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid.
+    ViewerError
+        If the port is already in use.
     """
 
     def __init__(
@@ -92,12 +107,12 @@ class Viewer(Controls, Output):
                 f"background is {short_repr(background)}; it must be one of "
                 f"{', '.join(BACKGROUNDS)}."
             )
-        # raises for wrong ones
+        # raises an error if an argument is invalid
         polyhedron = FrictionPolyhedron(
             np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation
         )
         self.robot, self.background = robot, background
-        self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
+        self.height = as_integer("height", height, 1, _MAX_HEIGHT, "in pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
         background_colour, _, line_colour, text_colour = BACKGROUNDS[background]
         self.painter = Painter(
@@ -118,27 +133,32 @@ class Viewer(Controls, Output):
         self._last: State | None = None
         self._legend_entries: dict[
             str, tuple[RGB, str]
-        ] = {}  # kinds of items that the legend explains beside its own
+        ] = {}  # colour and meaning of each user-defined kind of item
         super().__init__()
         self._set_stage(background)
 
     @property
     def url(self) -> str:
-        """Address of the live page. It can be opened on the machine of this process only, by every
-        user of it.
+        """Address of the live page, which only users of this machine can open.
 
-        The page has no port before this is asked for. Raises `ViewerError` when the viewer was
-        closed before.
+        Reading it opens the page's port. It raises `ViewerError` if the viewer was closed before
+        the first read.
         """
         return self.window.web_url
 
     @property
     def scale(self) -> float:
-        """Length of a drawn force, m/N, the same for forces and cones."""
+        """Length of a drawn force [m/N], the same for forces and cones."""
         return self.painter.scale
 
     def set_ground(self, ground: Ground | npt.ArrayLike | None) -> None:
-        """Draw another ground from the next picture on. ground: as for the viewer."""
+        """Change the ground, starting with the next picture.
+
+        Parameters
+        ----------
+        ground : Ground or array_like, shape (3,), or None
+            As for `Viewer`; None restores the default.
+        """
         self.painter = self.painter.replace(ground=_ground(ground))
 
     def show(
@@ -152,21 +172,47 @@ class Viewer(Controls, Output):
         ghost_name: str = GHOST_NAME,
         **options: Unpack[PictureKeywords],
     ) -> Viewer:
-        """Draw the robot and what the arguments ask for, and remove everything else. Returns this
-        viewer.
+        """Draw the robot and everything that the arguments ask for; remove everything else.
 
-        state: the state of the robot.
-        contacts: its contacts; each gets a patch and a friction cone.
-        forces: measured forces of the ground on the robot, shape (3 n,) or (n, 3) for the n points
-            of `contacts`, N, world.
-        planned: the same as a controller plans them. A cone's colour says where its force lies, of
-            `forces` if given, else of `planned`.
-        title: a line in the corner.
-        ghost_name: what the legend calls the ghost.
-        options: what else is drawn: com, cones, arrows, support, wrench, push, ghost, frames,
-            labels, extra, swing_feet; `PictureOptions` explains them.
-        Raises `InputError` for a state of another robot, a wrong number of forces, forces without
-        contacts, and NaN; `ViewerError` when the window is closed.
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        contacts : Contacts, optional
+            Contacts of the robot; each gets a patch and a friction cone.
+        forces : array_like, shape (3 n,) or (n, 3), optional
+            Measured forces of the ground on the robot at the n points of `contacts`, in the world
+            frame [N].
+        planned : array_like, shape (3 n,) or (n, 3), optional
+            The controller's planned forces, in the same form [N]. The colour of a cone shows where
+            its force lies: the one in `forces` if given, else the one in `planned`.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+        **options
+            What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
+            extra, swing_feet. `PictureOptions` describes them.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot, if forces are given without contacts or in the
+            wrong number, or if a value is NaN.
+        ViewerError
+            If the window is closed.
+
+        Examples
+        --------
+        >>> import floatbase as fb
+        >>> robot = fb.load("go2")
+        >>> view = fb.Viewer(robot).show(robot.standing(), title="standing")
+        >>> view.close()
         """
         _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(state, contacts, forces, planned, **options)
@@ -177,9 +223,16 @@ class Viewer(Controls, Output):
         return self
 
     def add_legend_entry(self, kind: str, colour: RGB, meaning: str) -> None:
-        """Let the legend explain user-defined items, from the next picture on that has any.
+        """Add a legend entry for user-defined items; it appears in pictures that contain them.
 
-        kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
+        Parameters
+        ----------
+        kind : str
+            First part of the items' paths.
+        colour : array_like, shape (3,)
+            RGB components from 0 to 1, dimensionless.
+        meaning : str
+            Text of the entry.
         """
         red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
         self._legend_entries[as_string("kind", kind)] = (
@@ -188,17 +241,33 @@ class Viewer(Controls, Output):
         )
 
     def multiplier_labels(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
-        """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle,
-        of a normal force on top.
+        """Make labels for the multipliers of active friction constraints, for `extra` of `show`.
+
+        The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
+        force on top of the cone. It tells how much the objective would decrease if its constraint
+        were relaxed by one newton; two significant digits are shown.
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
 
-        A multiplier is what one newton more of room would lower the objective by; two significant
-        digits are shown.
-        state, contacts: those that the controller was given.
-        solution: its answer: `command.solution`, or that of `solve(controller.qp(state))`.
-        Raises `InputError` for a solution of other contacts.
+        Parameters
+        ----------
+        state : State
+            The state that the controller was given.
+        contacts : Contacts
+            The contacts that the controller was given.
+        solution : Solution
+            The controller's solution: `command.solution`, or that of `solve(controller.qp(state))`.
+
+        Returns
+        -------
+        Picture
+            Labels by path.
+
+        Raises
+        ------
+        InputError
+            If the solution belongs to other contacts, or the state to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         positions, height = (
@@ -215,28 +284,61 @@ class Viewer(Controls, Output):
         return prefixed("multiplier", drawn)
 
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
-        """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the
-        planned ZMP of a `Walk`.
+        """Make markers for the plan of a `Walk`, for `extra` of `show`.
+
+        They mark the planned footholds, the swing paths, the capture point and the planned ZMP.
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
-        walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of
-            the robot, then.
-        Raises `InputError` for those of another robot.
+        Parameters
+        ----------
+        walk : Walk
+            The behaviour after a control step; before the first one, there is nothing to draw.
+        state : State
+            State of the robot at that time.
+
+        Returns
+        -------
+        Picture
+            Markers by path.
+
+        Raises
+        ------
+        InputError
+            If the walk or the state belongs to another robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.walk_overlay(walk, state, self._overlay_style)
 
     def step_overlay(self, step: StepPlan, t: float, state: State) -> Picture:
-        """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s.
-        state: of the robot, then.
+        """Make the markers of `walk_overlay` for a stored step, as it was planned.
+
+        Parameters
+        ----------
+        step : StepPlan
+            An entry of `walk.history`.
+        t : float
+            Time [s].
+        state : State
+            State of the robot at that time.
+
+        Returns
+        -------
+        Picture
+            Markers by path.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.step_overlay(step, t, state, self._overlay_style)
 
     @property
     def _overlay_style(self) -> gait_overlay.Style:
+        """Size, ground and text colour of the overlays."""
         return gait_overlay.Style(
             self.painter.size, self.painter.drawn_ground, self.painter.text_colour
         )
@@ -244,8 +346,16 @@ class Viewer(Controls, Output):
     def draw(
         self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME
     ) -> None:
-        """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove
-        everything else.
+        """Draw a picture and remove everything else.
+
+        Parameters
+        ----------
+        picture : Picture
+            Items by path, made by `painter.picture` or by yourself.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
         """
         if self._is_playing:
             follow = self._camera.follow_command(self.painter, ROBOT)
@@ -255,7 +365,7 @@ class Viewer(Controls, Output):
             *self._caption(legend_kinds(picture), title, ghost_name),
             protocol.set_ground(self.painter.drawn_ground.planes),
         )
-        self.renderer.draw(picture, *settings)  # at once: a second frame would wait
+        self.renderer.draw(picture, *settings)  # in one frame, because a second one would wait
 
     def play(
         self,
@@ -271,27 +381,50 @@ class Viewer(Controls, Output):
         ghost_name: str = GHOST_NAME,
         **options: Unpack[PictureKeywords],
     ) -> Viewer:
-        """Play a rollout in the page, again and again, with a time slider and a choice of speeds.
-        Returns at once.
+        """Play a rollout in the page repeatedly, with a time slider and a choice of speeds.
 
-        A foot that swings, which is not among the controller's contacts just then, has no cone; its
-        measured force is drawn.
-        rollout: the record to play.
-        speed: 1 for real time, 0.25 for slow motion.
-        rate: pictures drawn for each second of the record.
-        planned: whether to draw the planned forces too.
-        title, ghost_name, options: as for `show`. The record says where pushes act and which feet
-            swing, in place of the options for these.
-        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay`
-            makes them.
-        follow: whether the camera goes with the robot, smoothly and at one height over the viewer's
-            ground; afterwards, too.
-        paused: whether the reader must press play first.
-        Raises `InputError` for a record of another robot or without rows.
+        The method returns at once. A swing foot, which is not among the controller's contacts at
+        that time, has no cone; its measured force is drawn.
+
+        Parameters
+        ----------
+        rollout : Rollout
+            The rollout to play.
+        speed : float, optional
+            Playback speed, dimensionless: 1 is real time, 0.25 slow motion.
+        rate : float, optional
+            Pictures drawn per second of the rollout [1/s].
+        planned : bool, optional
+            Whether to draw the planned forces too.
+        steps : iterable of StepPlan, optional
+            `walk.history` of the recorded `Walk`; its markers are drawn as by `step_overlay`.
+        follow : bool, optional
+            Whether the camera follows the robot, smoothly and at a constant height above the
+            viewer's ground. The setting stays in effect afterwards.
+        paused : bool, optional
+            Whether playback waits until the reader presses play.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+        **options
+            As for `show`. The rollout itself determines `push` and `swing_feet`.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If the rollout belongs to another robot or is empty.
         """
-        self.painter.check_robot("record", recording.as_rollout(rollout).robot)
+        self.painter.check_robot("rollout", recording.as_rollout(rollout).robot)
         if not len(rollout.time):
-            raise InputError("the record has no rows, so there is nothing to play.")
+            raise InputError(
+                "The rollout is empty, so there is nothing to play. Record at least one step."
+            )
         for name, flag in {"planned": planned, "follow": follow, "paused": paused}.items():
             as_bool(name, flag)
         _check_texts(title=title, ghost_name=ghost_name)
@@ -340,11 +473,27 @@ class Viewer(Controls, Output):
         paused: bool = False,
         title: str | None = None, ghost_name: str = GHOST_NAME,
     ) -> Viewer:  # fmt: skip
-        """Play pictures, made by `painter.picture` or of your own items. Returns at once.
+        """Play a sequence of pictures repeatedly; return at once.
 
-        times: (n,), s; picture i is shown from times[i] on.
-        pictures: n pictures, path -> item each.
-        speed, paused, title, ghost_name: as for `play`.
+        Parameters
+        ----------
+        times : array_like, shape (n,)
+            Times [s]; picture i is shown from `times[i]` on.
+        pictures : sequence of Picture
+            n pictures, made by `painter.picture` or by yourself.
+        speed : float, optional
+            Playback speed, dimensionless; 1 is real time.
+        paused : bool, optional
+            Whether playback waits until the reader presses play.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
         """
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
@@ -356,20 +505,35 @@ class Viewer(Controls, Output):
         return self
 
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
-        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a
-        `View`.
+        """Set the camera to a preset or to a `View`.
 
-        follow: whether the camera goes with the robot when it walks away, smoothly and at one
-            height over the viewer's ground; None leaves it so.
-        Every call undoes how the reader has turned the view, so do not call it each time a slider
-        moves. Raises `InputError` for another name.
+        Every call discards how the reader has turned the view, so do not call it each time a slider
+        moves.
+
+        Parameters
+        ----------
+        view : {"default", "front", "back", "left", "right", "top", "feet"} or View, optional
+            Where to look from.
+        follow : bool, optional
+            Whether the camera follows the robot when it walks away, smoothly and at a constant
+            height above the viewer's ground. By default, the setting is unchanged.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If there is no preset of this name.
         """
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
         if not isinstance(view, View):
             raise InputError(
-                f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a "
-                f"View."
+                f"The camera's view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, "
+                f"or a View."
             )
         if follow is not None:
             self._camera.follows = as_bool("follow", follow)
@@ -378,13 +542,19 @@ class Viewer(Controls, Output):
         return self
 
     def set_disconnect_message(self, words: str) -> None:
-        """What the page says when this viewer has been closed. words: the text."""
+        """Set the message that the page shows after this viewer has been closed.
+
+        Parameters
+        ----------
+        words : str
+            The message.
+        """
         self.renderer.set(
             protocol.page_command("set_disconnect_message", text=as_string("words", words))
         )
 
     def close(self) -> None:
-        """Close the page: its thread ends and its port is free."""
+        """Close the page: end its thread and free its port."""
         self.window.close()
 
     def __repr__(self) -> str:
@@ -405,7 +575,7 @@ class Viewer(Controls, Output):
     def _caption(
         self, shown: set[str], title: str | None, ghost_name: str
     ) -> tuple[protocol.Update, protocol.Update]:
-        """The commands for the title, and for the legend of the colours in the picture."""
+        """Return the commands for the title and for the legend of the kinds that are shown."""
         return protocol.page_command("set_title", text=title or ""), legend.command(
             frozenset(shown),
             ghost_name,
@@ -415,12 +585,13 @@ class Viewer(Controls, Output):
 
 
 def _check_texts(**texts: str | None) -> None:
+    """Check that each argument is a string; only the title may be None."""
     for name, value in texts.items():
         as_string(name, "" if value is None and name == "title" else value)
 
 
 def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
-    """The ground as it is drawn; None for None."""
+    """Return the ground as it is drawn, or None for None."""
     if ground is None:
         return None
     from floatbase.simulation import (
@@ -432,8 +603,7 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
     for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
         if z < MIN_VERTICAL:
             raise InputError(
-                f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] "
-                f"does."
+                f"ground has the normal {[x, y, z]}; it must point upwards, as [0, 0, 1] does."
             )
         planes.append(Plane((x, y, z), offset))
     return planes[0] if len(planes) == 1 else Planes(tuple(planes))
