@@ -138,7 +138,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ("lacks", "pages", "words"),
     [
         (NO_WEBGL, ("live", "file"), ("needs WebGL", "Switch on hardware acceleration")),
-        ("delete window.DecompressionStream", ("file",), ("too old to open", "Firefox from 113")),
+        ("delete window.DecompressionStream", ("file",), ("too old to open", "Firefox 113")),
     ],
     ids=["WebGL", "DecompressionStream"],
 )

@@ -20,7 +20,8 @@ export function open(config) {
 // The live page. When the window closes, it waits for one at the same address.
 function live(config) {
   if (!window.MeshCat) return comeBack(); // the window has closed while the page was loading
-  element("notice").textContent = `${CLOSED} A page with the same address comes back by itself.`;
+  element("notice").textContent =
+    `${CLOSED} This page reconnects when a viewer opens at the same address.`;
   startWhenSeen(config, (scene) => {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/socket`);
