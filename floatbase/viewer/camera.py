@@ -50,15 +50,15 @@ class View(Value):
 
     Parameters
     ----------
-    azimuth : float
+    azimuth : float, optional
         Angle around the vertical [degrees]; 0 is in front of the robot (+x), 90 on its left (+y).
-    elevation : float
+    elevation : float, optional
         Angle above the horizontal [degrees], from -90 to 90.
-    distance : float
+    distance : float, optional
         Relative distance, dimensionless: 1 fills the picture, 2 is twice as far away.
-    angle : float
+    angle : float, optional
         Vertical field of view [degrees], between 0 and 180.
-    feet : bool
+    feet : bool, optional
         Whether the robot's feet fill the picture, instead of the whole robot.
     around : tuple, optional
         Centre, in the world frame [m], and radius [m] of a ball that fills the picture instead of

@@ -1,4 +1,4 @@
-"""A real browser looks at the page. Screenshots go to build/screenshots."""
+"""The page in a real browser. Screenshots go to build/screenshots."""
 
 from __future__ import annotations
 
