@@ -82,8 +82,8 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
     Near a state where J loses rank (solo8 on four feet), A has a singular value σ that cannot be
     told from 0 with measured angles and velocities. The map ζ would multiply their noise in b by
     1/σ². Such a direction is left out: no row constrains it, and no force acts along it. Newton's
-    law still holds exactly. A q̈ - b is off by at most σ |q̈|, in addition to the part of b that A
-    cannot meet.
+    law still holds exactly. The norm of A q̈ - b is at most σ ‖q̈‖, in addition to the part of b that
+    A cannot meet.
     """
     U, s, A = _resolved(eom)
     U_A, w, Vt_A = np.linalg.svd(A @ np.linalg.solve(eom.M, eom.J.T))

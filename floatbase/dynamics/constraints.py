@@ -163,8 +163,8 @@ class RollingWheel(SinglePointContact):
     Raises
     ------
     InputError
-        By `positions`, `jacobian` and `constraint`, if the wheel lies flat on its side: then it has
-        no single lowest point.
+        If the wheel lies flat on its side when `positions`, `jacobian` or `constraint` is called,
+        since it then has no single lowest point.
 
     Notes
     -----

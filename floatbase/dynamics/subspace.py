@@ -26,7 +26,7 @@ from floatbase.linear_algebra import null_space, rank
 
 
 def delassus_matrix(eom: EquationsOfMotion) -> Array:
-    """Compute A M⁻¹ Jᵀ, the change of the contact accelerations per contact force.
+    """Compute A M⁻¹ Jᵀ, the change of the contact accelerations per unit of contact force.
 
     For point contacts it is J M⁻¹ Jᵀ, known as the Delassus matrix. Its inverse, if it exists, is
     the apparent inertia at the contacts.
