@@ -6,6 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import FrozenInstanceError, fields
+from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 
@@ -99,6 +100,20 @@ class Value:
             )
 
 
+def refuse_new_attributes(self: object, name: str, value: object) -> None:
+    """Set an attribute, as `__setattr__` of a class whose public attributes are properties.
+
+    Any other public name raises `AttributeError`: a misspelled one would be set and never read.
+    Classes derived from such a class may set attributes of their own.
+    """
+    cls = type(self)
+    if not name.startswith("_") and not hasattr(cls, name) and "__setattr__" in vars(cls):
+        public = [known for known in dir(cls) if not known.startswith("_")]
+        near = "".join(f" Did you mean {known!r}?" for known in get_close_matches(name, public, 1))
+        raise AttributeError(f"A {cls.__name__} has no attribute {name!r} to set.{near}")
+    object.__setattr__(self, name, value)
+
+
 def checked(check: Callable[..., Any], *args: Any, **options: Any) -> dict[str, Any]:
     """Return field metadata that declares the check `check(name, value, *args, **options)`.
 
@@ -151,7 +166,7 @@ def as_strings(name: str, value: Any) -> tuple[str, ...]:
         return tuple(value)
     example = value if isinstance(value, str) else "…"
     raise InputError(
-        f'{name} must be a list of strings, such as {name}=["{example}"], not {short_repr(value)}.'
+        f'{name} must be a list of strings, such as ["{example}"], not {short_repr(value)}.'
     )
 
 

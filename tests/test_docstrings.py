@@ -15,7 +15,10 @@ from numpydoc.validate import validate
 
 from floatbase.lessons.publish.site import PACKAGES, exported
 
-UNFINISHED = set(PACKAGES)
+UNFINISHED = {
+    "floatbase",
+    *(f"floatbase.{name}" for name in ["actuators", "control", "qp", "robots", "viewer"]),
+}
 LISTED = [name for name in PACKAGES if name not in UNFINISHED]
 # missing, unknown, reordered and untyped parameters; descriptions; the summary's full stop
 CODES = {"GL08", "PR01", "PR02", "PR03", "PR04", "PR07", "RT01", "RT03", "SS03"}
@@ -26,10 +29,12 @@ ARRAY = re.compile(r"\b(Array|ArrayLike)\b")
 def public(package: str) -> Iterator[tuple[str, Any]]:
     """Full name and value of every public function, class and member of a package."""
     for name, value in exported(package):
-        if inspect.ismodule(value) or not callable(value):
+        if not (inspect.isclass(value) or inspect.isroutine(value)):
+            continue
+        if getattr(value, "_is_protocol", False):
             continue
         yield f"{package}.{name}", value
-        if not inspect.isclass(value) or getattr(value, "_is_protocol", False):
+        if not inspect.isclass(value):
             continue
         for member, thing in vars(value).items():
             if not member.startswith("_") and (

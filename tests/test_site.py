@@ -189,8 +189,8 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
 
 # addresses of images whose proportions are not their own
 STRETCHED = """() => [...document.images].filter((image) => {
-    const shown = image.clientWidth / image.clientHeight;
-    return image.clientHeight && Math.abs(shown * image.naturalHeight / image.naturalWidth - 1) > .05;
+    const [width, height] = [image.clientWidth, image.clientHeight];
+    return height && Math.abs(width * image.naturalHeight / image.naturalWidth / height - 1) > .05;
 }).map((image) => image.src)"""
 SEARCHES = {
     "install": "Installation and troubleshooting",

@@ -54,7 +54,7 @@ class LIPM(Value):
 
     Notes
     -----
-    The model is the three-dimensional linear inverted pendulum mode of Kajita et al. (2001). The
+    The model is the three-dimensional linear inverted pendulum mode of [Kajita2001]_. The
     plan follows the DCM, as in [Englsberger2015]_; for the ZMP see [Vukobratovic2004]_.
 
     Examples

@@ -26,7 +26,7 @@ _PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
 # s after touchdown until the height of a foot is used as that of the ground: earlier heights make
 # the planned footholds climb
 _TOUCHDOWN_SETTLING_TIME = 0.05
-# s before the first lift-off and after the last landing in which the ZMP moves
+# s before the first lift-off and after the last touchdown in which the ZMP shifts
 _ZMP_SHIFT_TIME = 0.8
 # m of DCM error that a stance with area tolerates without moving a step: the error would grow by up
 # to e^{ω 1.2 s}

@@ -20,7 +20,7 @@ Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, accelerati
 UNBOUNDED = 1e6  # N: a bound that no robot of the catalogue reaches
 _MAX_ACCELERATION = 1.0  # m/s² and rad/s²: a jump of the desired velocity makes robots fall
 _ZERO = frozen(np.zeros(3))
-_RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: in a smaller extent no slope is measured
+_RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
 
 
 @dataclass

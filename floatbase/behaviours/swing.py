@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import (
     Array,
     Value,
@@ -101,11 +102,8 @@ class Swing(Value):
         T = self.touchdown - self.lift_off
         u = min(max((as_number("t", t, "s") - self.lift_off) / T, 0.0), 1.0)
         w = u * (1.0 - u)
-        path_derivatives = (
-            u**3 * (10.0 - 15.0 * u + 6.0 * u * u),
-            30.0 * w * w / T,
-            60.0 * w * (1.0 - 2.0 * u) / T**2,
-        )
+        fraction, rate, acceleration = minimum_jerk(u)
+        path_derivatives = fraction, rate / T, acceleration / T**2
         height_derivatives = (
             64.0 * w**3,
             192.0 * w * w * (1.0 - 2.0 * u) / T,

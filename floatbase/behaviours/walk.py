@@ -15,7 +15,15 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_callable, as_instance, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_callable,
+    as_instance,
+    as_number,
+    as_positive,
+    refuse_new_attributes,
+)
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.lipm import LIPM
@@ -42,10 +50,10 @@ class Walk:
 
     It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
     `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
-    next footholds (`neutral_point`) and the centre of mass (`LIPM`) from its present position. In
-    each control step it shifts the ends of the swings by `step_adjustment`, as far as the legs
-    reach. The rest is done by one `WholeBodyController` for each stance. If no contact forces can
-    hold the feet, their contacts become soft.
+    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
+    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
+    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
+    forces can hold the feet, their contacts become soft.
 
     If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
@@ -104,6 +112,8 @@ class Walk:
     >>> walk
     Walk(go2, 4 feet, 0.3 and 0 m/s)
     """
+
+    __setattr__ = refuse_new_attributes
 
     def __init__(
         self,
@@ -205,8 +215,9 @@ class Walk:
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = as_array("velocity", velocity, (2,), "m/s")
-        as_number("speed", float(np.linalg.norm(self._velocity)), "m/s", maximum=_MAX_SPEED)
+        velocity = as_array("velocity", velocity, (2,), "m/s")
+        as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+        self._velocity = velocity
 
     @property
     def yaw_rate(self) -> float:

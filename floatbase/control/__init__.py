@@ -1,4 +1,4 @@
-"""Whole-body control as a quadratic program (§4 of the course text)."""
+"""Whole-body control as a quadratic program."""
 
 from floatbase.control.analytic import AnalyticController
 from floatbase.control.command import Command

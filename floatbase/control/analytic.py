@@ -1,4 +1,4 @@
-"""The controller of objectives alone (§3.1): no limits, one closed-form minimum each tick."""
+"""The analytic controller: no limits, one closed-form minimum per control step."""
 
 from __future__ import annotations
 
@@ -24,9 +24,17 @@ from floatbase.robots import Robot, State
 
 @dataclass(frozen=True, eq=False)
 class AnalyticCommand(Value):
-    """One answer of `AnalyticController`, read-only.
+    """One answer of `AnalyticController`; its arrays are read-only.
 
-    tau: (d,) N·m, joint torques to apply. forces: (k,) N, world, and qdd: (nv,), planned with them.
+    Parameters
+    ----------
+    tau : ndarray, shape (d,)
+        Joint torques to apply [N·m].
+    forces : ndarray, shape (k,)
+        Contact forces planned with them, world frame [N].
+    qdd : ndarray, shape (nv,)
+        Generalized acceleration planned with them: the base's linear [m/s²] and angular [rad/s²]
+        part in the base frame, then the joints [rad/s² or m/s²].
     """
 
     tau: Array
@@ -41,30 +49,54 @@ class AnalyticCommand(Value):
 
 
 class AnalyticController(Value):
-    """(22) + (23) + terms for posture and torque, minimised in closed form over β (17) at every
-    tick.
+    """Controller that minimizes a sum of quadratic costs in closed form at every control step.
 
-    The desired wrench is f̃_c = m (a - g) with a = -kp e - kd ė, where e leads from `com` to the
-    centre of mass; τ̃_c does the same for the base's rotation, with the robot's inertia about its
-    centre of mass. Nothing keeps forces in their cones or torques within limits. Source: [FBR],
-    §3.1.
+    The costs are the error of the wrench about the centre of mass, a bias of the contact forces,
+    and regularization of posture and torques. No constraint keeps forces in their friction cones or
+    torques within limits.
 
-    robot: the robot to control.
-    contacts: its contacts with the ground.
-    state: the posture to return to, with its base orientation.
-    com: (3,) m, world, desired centre of mass; that of `state` by default.
-    alpha: ≥ 0, weight of the normal forces' distance from `a`, beside that of the tangential
-        forces, in (23).
-    a: N, the normal force that (23) prefers at each point; the weight's even share by default.
-    kp: 1/s², stiffness.
-    kd: 1/s, damping.
-    bias_weight: weight of (23) beside (22).
-    posture_weight: per (rad/s²)², weight of the joints' return to `state`.
-    torque_weight: per (N·m)², weight of ‖τ‖².
+    Parameters
+    ----------
+    robot : Robot
+        The robot to control.
+    contacts : Contacts
+        Its contacts with the ground.
+    state : State
+        Desired posture, with the desired orientation of the base.
+    com : array_like, shape (3,), optional
+        Desired position of the centre of mass in the world frame [m]. The default is that of
+        `state`.
+    alpha : float, optional
+        Weight ≥ 0 of the normal forces' deviation from `a`, relative to the tangential forces, in
+        eq. (23) [-].
+    a : float, optional
+        Normal force that eq. (23) prefers at each point [N]. The default is an equal share of the
+        weight.
+    kp : float, optional
+        Stiffness [1/s²].
+    kd : float, optional
+        Damping [1/s].
+    bias_weight : float, optional
+        Weight of the force bias, eq. (23), relative to the wrench error, eq. (22) [-].
+    posture_weight : float, optional
+        Weight of the joints' return to `state` [1/(rad/s²)²].
+    torque_weight : float, optional
+        Weight of ‖τ‖² [1/(N·m)²].
 
-    `posture_weight` and `torque_weight` settle what (22)(23) leave open (d > k). Where nothing is
-    left open they compete with the desired wrench; a light robot feels the weight of the posture
-    more. Raises `InputError` for values that do not fit.
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value, or if `state` belongs to another robot.
+
+    Notes
+    -----
+    [FBR]_, eq. (22). The minimum is taken over β of eq. (17).
+
+    The desired force is f̃_c = m (a - g) with a = -kp e - kd ė, where e is the position of the
+    centre of mass relative to `com`. The desired moment τ̃_c follows in the same way from the
+    base's rotation, with the robot's inertia about its centre of mass. The posture and torque
+    weights resolve the freedom that eqs. (22) and (23) leave open (d > k). Without such freedom
+    they compete with the desired wrench, and the posture weight affects a light robot more.
     """
 
     robot: Robot
@@ -94,10 +126,13 @@ class AnalyticController(Value):
     ):
         as_instance("robot", robot, Robot)
         as_instance("contacts", contacts, Contacts)
-        as_instance("the state to hold", state, State)
+        as_instance("state", state, State)
         if state.robot != robot:
-            raise InputError(f"the state to hold belongs to another robot than {robot.name}.")
-        equations_of_motion(state, contacts)  # frames that do not exist show now, not in the loop
+            raise InputError(
+                f"state belongs to the robot {state.robot.name}. The controller's robot is "
+                f"{robot.name}."
+            )
+        equations_of_motion(state, contacts)  # unknown frames raise here, not in the loop
         weight_share = robot.weight / max(contacts.n_points, 1)
         vars(self).update(
             robot=robot,
@@ -113,11 +148,27 @@ class AnalyticController(Value):
         )
 
     def objective(self, eom: EquationsOfMotion) -> tuple[Quadratic, Quadratic, Quadratic]:
-        """The costs on q̈, τ and λ whose sum is minimised."""
+        """Return the costs on q̈, τ and λ whose sum is minimized.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at a state of the robot.
+
+        Returns
+        -------
+        tuple of Quadratic
+            Costs on q̈, τ and λ.
+
+        Raises
+        ------
+        InputError
+            If the equations belong to another robot.
+        """
         state = as_instance("eom", eom, EquationsOfMotion).state
         if state.robot != self.robot:
             raise InputError(
-                f"the equations are of {state.robot.name}, the controller of another robot, "
+                f"eom belongs to the robot {state.robot.name}. The controller's robot is "
                 f"{self.robot.name}."
             )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
@@ -139,8 +190,24 @@ class AnalyticController(Value):
         )
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> AnalyticCommand:
-        """The tick: the minimum over β, mapped back to (q̈, τ, λ)."""
-        v = as_array("v", v, (self.robot.nv,))  # State takes None for rest; here it is a slip
+        """Compute the command of one control step: the minimum over β, mapped back to (q̈, τ, λ).
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Generalized velocity: the base's linear [m/s] and angular [rad/s] part in the base
+            frame, then the joints [rad/s or m/s].
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        AnalyticCommand
+            Torques, with the forces and accelerations planned with them.
+        """
+        v = as_array("v", v, (self.robot.nv,))  # State takes None for rest; here it is a mistake
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         space = feasible_space(eom)
         qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimiser())

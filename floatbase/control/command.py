@@ -1,4 +1,4 @@
-"""`Command`: one answer of the controller."""
+"""`Command`: one answer of the whole-body controller."""
 
 from __future__ import annotations
 
@@ -13,19 +13,25 @@ from floatbase.qp import Solution
 
 
 class Command(Value):
-    """One answer of `WholeBodyController`.
+    """One answer of `WholeBodyController`; it is immutable, and its arrays are read-only.
 
-    tau: (d,) N·m, joint torques to apply.
-    qdd: (nv,), the acceleration planned with them: base linear m/s² and angular rad/s² in the base
-        frame, then joints.
-    forces: (k,) N, world, the contact forces planned with them, stacked as in `contacts`.
-    contacts: the contacts that the forces act at.
-    backend: which backend answered, "compiled" or "reference".
-    solution: what `solution` gives, or a function that makes it when it is first asked for.
-
-    softened: whether the contacts were made soft, since the tick had no solution otherwise.
-
-    It does not change, and its arrays are read-only.
+    Parameters
+    ----------
+    tau : ndarray, shape (d,)
+        Joint torques to apply [N·m].
+    qdd : ndarray, shape (nv,)
+        Generalized acceleration planned with them: the base's linear [m/s²] and angular [rad/s²]
+        part in the base frame, then the joints [rad/s² or m/s²].
+    forces : ndarray, shape (k,)
+        Contact forces planned with them, stacked as in `contacts`, world frame [N].
+    contacts : Contacts
+        Contacts at which the forces act.
+    backend : {"compiled", "reference"}
+        Backend that computed the answer.
+    solution : Solution or callable
+        Value of the property `solution`, or a function that computes it on first use.
+    softened : bool, optional
+        Whether the contacts were made soft because the QP had no solution otherwise.
     """
 
     tau: Array
@@ -46,7 +52,7 @@ class Command(Value):
         solution: Solution | Callable[[], Solution],
         softened: bool = False,
     ) -> None:
-        # a frozen dataclass takes 0.4 µs more at every tick, writing to the dictionary 0.1 µs
+        # writing to the dictionary takes 0.1 µs per control step, a frozen dataclass 0.4 µs more
         values = self.__dict__
         values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
         values["contacts"], values["backend"], values["_solution"] = contacts, backend, solution
@@ -54,7 +60,7 @@ class Command(Value):
 
     @cached_property
     def solution(self) -> Solution:
-        """The QP of this tick with its optimum, multipliers and residuals."""
+        """QP of this control step with its optimum, multipliers and residuals."""
         return self._solution if isinstance(self._solution, Solution) else self._solution()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -63,26 +69,36 @@ class Command(Value):
         }  # the function that makes it holds the compiled tick
 
     def force(self, name: str) -> Array:
-        """The planned force of one contact, shape (3,), N, world: for a flat foot the sum over its
-        corners.
+        """Return the planned force of one contact; for a flat foot, the sum over its corners.
+
+        Parameters
+        ----------
+        name : str
+            Name of the contact.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Force in the world frame [N].
         """
         return self.contacts.force_of(self.forces, name)
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequalities, such as "FL_foot facet 2": `ConstraintLabel`s, which
-        also know kind and owner.
+        """Names of the active inequalities, such as "FL_foot facet 2".
+
+        Each name is a `ConstraintLabel`, which also holds the kind and owner of the constraint.
         """
         return self.solution.active
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Multiplier of each active row, by name."""
+        """Multiplier of each active inequality, by name."""
         return self.solution.multipliers
 
     def __repr__(self) -> str:
         return (
             f"Command(|tau|={np.linalg.norm(self.tau):.3g} N·m, "
             f"|forces|={np.linalg.norm(self.forces):.3g} N, "
-            f"{len(self.active)} rows active, {self.backend})"
+            f"{len(self.active)} active inequalities, {self.backend})"
         )

@@ -1,4 +1,4 @@
-"""`WholeBodyController`: (26)(27) solved at every tick, on the compiled backend where it can be."""
+"""`WholeBodyController`: solves the whole-body QP once per control step, compiled if possible."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from floatbase._validation import (
     cached_property,
     numeric_copy,
     read_only,
+    refuse_new_attributes,
 )
 from floatbase.control.command import Command
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
@@ -36,57 +37,96 @@ OnInfeasible: TypeAlias = Literal["raise", "soften"]
 
 
 class WholeBodyController:
-    """(26)(27) at every tick: the torques that serve the tasks best while (7), friction, contacts
-    and motors allow them.
+    """Whole-body controller: one quadratic program per control step.
 
-    robot: the robot to control.
-    contacts: its contacts with the ground.
-    tasks: values such as `fb.CoMTask`, or any object of the form of `floatbase.objectives.Task`.
-        Where none acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small
-        weight is added, so that the optimum is unique.
-    facets, inner_approximation, facet_rotation: the friction polyhedron, see
-        `floatbase.friction.FrictionPolyhedron`.
-    min_normal_force, max_normal_force: N, at every contact point, so at each corner of a flat foot;
-        one number, or a mapping from the name of a contact to a number or a function of t: a foot
-        that is unloaded. The name of a foot that does not stand bounds nothing until it does, so
-        that `replace(contacts=…)` may lift it; other names that are no contact's are errors.
-    torque_limits: N·m, one number or shape (d,), the robot's by default; np.inf switches them off.
-    inequalities: user-defined inequality rows on q̈, τ or λ, see
-        `floatbase.control.LinearInequality`.
-    contact_weight: None holds the contacts by rows, (5). A number, such as 1e4, puts ½
-        contact_weight ‖A q̈ - b‖² into the objective instead: contacts give way where torques and
-        friction do not suffice to hold them, and only user-defined rows and bounds of normal forces
-        can make a tick infeasible.
-    on_infeasible: "raise" raises `InfeasibleError`. "soften" answers a tick without a solution once
-        more with contact_weight=1e4, and sets `Command.softened`.
-    modify_qp: a function (qp, eom) -> QP that changes the problem before it is solved, called at
-        every control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
-        `EquationsOfMotion` at that state: to add rows that couple q̈, τ and λ, to relax or scale
-        rows of (7), or to change the objective. It returns a QP in the same x, such as
-        `dataclasses.replace(qp, H=…, g=…)`, and takes the reference backend. None changes nothing.
-    solver: one of `floatbase.qp.solvers()`.
-    backend: "reference" assembles and solves the QP as it is written. "compiled" solves the same
-        problem many times faster (`floatbase.control.tick`), with tasks, constraints and
-        user-defined rows too. "auto" takes compiled where it can.
+    A call returns the torques that fulfil the tasks best, subject to the equations of motion (7),
+    the contacts, friction and the torque limits. The attributes of a controller cannot be set;
+    `replace` makes a new controller.
 
-    The attribute `backend` says which backend runs, `backend_reason` why. `problem` is what is
-    solved. The first compiled controller ever compiles for about a minute, unless the set-up did
-    (`python -m floatbase compile`). Later ones load that code from disk and answer alike to the
-    bit; the process that compiled may differ by rounding. Where the code cannot be kept on disk,
-    `backend_reason` says why. A state that the compiled tick cannot answer to the last digits, or
-    that has no answer, is handed to the reference backend, and its `Command.backend` says so.
+    Parameters
+    ----------
+    robot : Robot
+        The robot to control.
+    contacts : Contacts
+        Its contacts with the ground.
+    tasks : sequence of Task
+        Tasks such as `fb.CoMTask`, or user-defined objects of the form of
+        `floatbase.objectives.Task`. If no task acts on forces, or none on torques, a `ForceTask()`
+        or a `TorqueTask()` of small weight is added, so that the optimum is unique.
+    facets : int, optional
+        Number of facets of the friction polyhedra, see `floatbase.friction.FrictionPolyhedron`.
+    inner_approximation : bool, optional
+        Whether the polyhedra lie inside the friction cones.
+    facet_rotation : float, optional
+        Angle by which the facets are rotated about the normal [rad].
+    min_normal_force, max_normal_force : float or mapping, optional
+        Bounds of the normal force at every contact point, so at each corner of a flat foot [N].
+        Each is one number, or a mapping from names of contacts to numbers or functions of t [s],
+        for example to unload a foot. A bound may name a foot that is not in contact: it has no
+        effect until `replace(contacts=...)` adds the foot. Any other unknown name is an error. The
+        defaults are 0 and no maximum.
+    torque_limits : float or array_like, shape (d,), optional
+        Torque limits [N·m]; np.inf switches them off. The default is those of the robot.
+    inequalities : sequence of LinearInequality, optional
+        User-defined inequality constraints on q̈, τ or λ.
+    contact_weight : float, optional
+        None enforces the contacts as equality constraints, eq. (5). A number, such as 1e4, makes
+        them soft: it adds ½ contact_weight ‖A q̈ - b‖² to the objective instead [1/(m/s²)²].
+        Contacts then yield if torques and friction cannot hold them, and only user-defined
+        inequalities and bounds of normal forces can make the QP infeasible.
+    on_infeasible : {"raise", "soften"}, optional
+        What to do if the QP has no solution. "raise" raises `InfeasibleError`. "soften" solves
+        again with contact_weight=1e4, and sets `Command.softened`.
+    modify_qp : callable, optional
+        Function (qp, eom) -> QP that changes the problem before it is solved. It is called at every
+        control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
+        `EquationsOfMotion` at that state. It can add constraints that couple q̈, τ and λ, relax or
+        scale rows of eq. (7), or change the objective. It must return a QP in the same x, such as
+        `dataclasses.replace(qp, H=..., g=...)`. Only the reference backend supports it.
+    solver : str, optional
+        QP solver, one of `floatbase.qp.solvers()`.
+    backend : {"auto", "compiled", "reference"}, optional
+        "reference" assembles and solves the QP as it is written. "compiled" solves the same problem
+        many times faster (`floatbase.control.tick`), also with user-defined tasks, constraints and
+        inequalities. "auto" uses the compiled backend if it supports the problem, otherwise the
+        reference backend.
 
-    Functions of t and user-defined objects are tried once when a controller is made with them, at t
-    = 0, where the robot stands: a trajectory that begins later must give something at 0 too.
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value.
+    UnknownNameError
+        If a name, solver or option does not exist.
 
-    Attributes cannot be set. `controller.replace(contacts=…)`, also with tasks or limits, makes a
-    new controller.
+    Notes
+    -----
+    [FBR]_, eqs. (26), (27). A call raises `InfeasibleError` with the conflicting constraints.
 
-    Raises `InputError` for arguments that do not fit. A call raises `InfeasibleError` with the rows
-    in conflict.
+    The first compiled controller on a machine compiles for about a minute, unless the installation
+    did so (`python -m floatbase compile`). Later processes load the code from disk, and their
+    answers are identical to the bit. Answers of the process that compiled may differ by rounding.
+    If the code cannot be kept on disk, `backend_reason` says why.
+
+    The properties `backend` and `backend_reason` say which backend is in use and why. If the
+    compiled backend finds no answer at a state, or none that is accurate to the last digits, the
+    reference backend takes over, and `Command.backend` is "reference".
+
+    Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
+    and in the standing posture. They must therefore be defined at t = 0, also if a trajectory
+    starts later.
+
+    Examples
+    --------
+    >>> robot = fb.load("go2")
+    >>> state = robot.standing()
+    >>> contacts = fb.Contacts.points(robot)
+    >>> controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
+    >>> controller(state.q, state.v).tau.shape
+    (12,)
     """
 
-    _softened = False  # whether this controller answers what another one finds infeasible
+    __setattr__ = refuse_new_attributes
+    _softened = False  # whether this controller is another one's fallback for infeasible states
 
     def __init__(
         self,
@@ -123,7 +163,7 @@ class WholeBodyController:
         if contact_weight is not None:
             problem = _softened(problem, contact_weight)
         limits.check_names(contacts.names, _foot_frames(robot))
-        with dry_run():  # unknown names and shapes that do not fit raise here, not in the loop
+        with dry_run():  # unknown names and wrong shapes raise here, not in the loop
             problem.qp(robot.standing())
         check_solver(solver)
         _check_choice("backend", backend, Backend)
@@ -138,8 +178,9 @@ class WholeBodyController:
         on_infeasible: OnInfeasible,
         warm_up: bool = True,
     ) -> None:
-        """Keep a checked problem, and prepare the compiled tick where it can be had. warm_up: run
-        it once, outside the loop.
+        """Store a checked problem, and prepare the compiled controller if it supports the problem.
+
+        warm_up: whether to run it once, outside the loop.
         """
         self._problem, self._settings = problem, (solver, backend, on_infeasible)
         if backend == "reference":
@@ -154,20 +195,21 @@ class WholeBodyController:
         if reason and backend == "compiled":
             raise InputError(
                 f'backend="compiled" is not possible: {reason}. backend="auto" takes the fastest '
-                f"that is."
+                f"backend that supports the problem."
             )
         self._compiled = None if reason else compiled
-        self._backend_reason = reason or "nothing stands in its way" + cache_warning()
+        self._backend_reason = reason or "it supports this problem" + cache_warning()
 
     def _with_problem(self, problem: Problem) -> WholeBodyController:
-        """A controller of another problem with the same settings."""
+        """Return a controller of another problem with the same settings."""
         other = object.__new__(type(self))
         other._prepare(problem, *self._settings, warm_up=self._compiled is None)
         return other
 
     def __getstate__(self) -> tuple[Problem, tuple[str, Backend, OnInfeasible]]:
-        """Copies and pickles hold the problem; the compiled tick has views into Pinocchio's memory
-        and is made anew.
+        """Return the problem and the settings, for copies and pickles.
+
+        The compiled tick has views into Pinocchio's memory, so it is made again.
         """
         return self._problem, self._settings
 
@@ -176,60 +218,92 @@ class WholeBodyController:
 
     @property
     def problem(self) -> Problem:
-        """The problem that is solved."""
+        """Problem that is solved."""
         return self._problem
 
     @property
     def solver(self) -> str:
-        """The solver of the reference backend."""
+        """Solver of the reference backend."""
         return self._settings[0]
 
     @property
     def compiled(self) -> CompiledTick | None:
-        """The compiled tick, None on the reference backend."""
+        """Compiled tick, or None if the reference backend is used."""
         return self._compiled
 
     @property
     def backend(self) -> Literal["compiled", "reference"]:
-        """The backend that runs."""
+        """Backend in use."""
         return "reference" if self._compiled is None else "compiled"
 
     @property
     def backend_reason(self) -> str:
-        """Why that backend runs."""
+        """Reason why this backend is in use."""
         return self._backend_reason
 
     @property
     def robot(self) -> Robot:
-        """The robot to control."""
+        """Robot to control."""
         return self._problem.robot
 
     @property
     def contacts(self) -> Contacts:
-        """Its contacts."""
+        """Contacts of the robot."""
         return self._problem.contacts
 
     @property
     def tasks(self) -> Sequence[Task]:
-        """All tasks, with the regularisation that was added."""
+        """All tasks, including the regularization that was added."""
         return self._problem.tasks
 
     @property
     def limits(self) -> Limits:
-        """Friction, normal forces and torque limits."""
+        """Friction, normal force and torque limits, and user-defined inequalities."""
         return self._problem.limits
 
     def qp(self, state: State, t: float = 0.0) -> QP:
-        """The QP of one tick, to look at."""
+        """Return the QP of one control step, for inspection.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        QP
+            The QP in x = (q̈, τ, λ).
+        """
         return self._problem.qp(state, t)
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """The tick: torques for configuration q, shape (nq,), and velocity v, shape (nv,), at time
-        t in s.
+        """Compute the command of one control step.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Generalized velocity: the base's linear [m/s] and angular [rad/s] part in the base
+            frame, then the joints [rad/s or m/s].
+        t : float, optional
+            Time, for tasks and bounds that depend on it [s].
+
+        Returns
+        -------
+        Command
+            Torques, with the forces and accelerations planned with them.
+
+        Raises
+        ------
+        InfeasibleError
+            If the QP has no solution, unless `on_infeasible` is "soften".
         """
         if type(t) is not float or not -MAX_MAGNITUDE <= t <= MAX_MAGNITUDE:
             t = as_number("t", t, "s")
-        if v is None:  # State takes it for rest; here it is a slip
+        if v is None:  # State takes None for rest; here it is a mistake
             as_array("v", v, (self.robot.nv,))
         try:
             return self._answer(q, v, t)
@@ -240,12 +314,13 @@ class WholeBodyController:
 
     @cached_property
     def _soft_controller(self) -> WholeBodyController:
-        """The same controller with soft contacts."""
+        """Build the same controller with soft contacts."""
         other = self._with_problem(_softened(self._problem, SOFT_CONTACT_WEIGHT))
         other._softened = True
         return other
 
     def _answer(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command:
+        """Return the compiled backend's command, or the reference backend's if there is none."""
         command = (
             None if self._compiled is None else self._compiled_command(self._compiled, q, v, t)
         )
@@ -258,9 +333,7 @@ class WholeBodyController:
     def _compiled_command(
         self, tick: CompiledTick, q: npt.ArrayLike, v: npt.ArrayLike, t: float
     ) -> Command | None:
-        """The compiled tick's answer, or None where the reference backend must answer, or say what
-        is wrong.
-        """
+        """Return the compiled tick's answer, or None if the reference backend must decide."""
         q_array, v_array = numeric_copy(q), numeric_copy(v)
         if q_array is None or v_array is None:
             return None
@@ -283,8 +356,9 @@ class WholeBodyController:
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
     ) -> Solution:
-        """The reference problem at q, v and t, with what `CompiledTick.__call__` returned for them
-        as its solution.
+        """Return the QP of a compiled tick with its answer as the solution.
+
+        The arguments after t are what `CompiledTick.__call__` returned for q, v and t.
         """
         tick = self._compiled
         assert tick is not None  # it answered
@@ -298,10 +372,24 @@ class WholeBodyController:
         tasks: Sequence[Task] | None = None,
         limits: Limits | None = None,
     ) -> WholeBodyController:
-        """A new controller with other contacts, tasks or limits and everything else as here; cheap
-        enough for the loop.
+        """Return a controller with other contacts, tasks or limits and otherwise equal settings.
 
-        Other limits: `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+        It is fast enough to be called in the control loop. To change limits, pass for example
+        `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+
+        Parameters
+        ----------
+        contacts : Contacts, optional
+            New contacts.
+        tasks : sequence of Task, optional
+            New tasks.
+        limits : Limits, optional
+            New limits.
+
+        Returns
+        -------
+        WholeBodyController
+            The new controller.
         """
         problem = replace(
             self._problem,
@@ -322,7 +410,7 @@ class WholeBodyController:
         if other._compiled is None:
             problem.check()
         elif tasks is not None or limits is not None or other._compiled.user_terms.any:
-            # what its tables have not found to fit
+            # what the problem arrays have not checked
             problem.check(other._compiled.unchecked_tasks)
         return other
 
@@ -334,17 +422,17 @@ class WholeBodyController:
 
 
 def _check_choice(name: str, value: object, choices: object) -> None:
-    """Raise `UnknownNameError` for a value that is none of a `Literal`'s."""
+    """Raise `UnknownNameError` if a value is none of the choices of a `Literal`."""
     if not isinstance(value, str) or value not in get_args(choices):
         raise unknown_name(name, value, get_args(choices))
 
 
 def _softened(problem: Problem, weight: float) -> Problem:
-    """The problem with soft contacts."""
+    """Return the problem with soft contacts."""
     contacts, tasks = with_soft_contacts(problem.contacts, problem.tasks, weight)
     return replace(problem, contacts=contacts, tasks=tasks)
 
 
 def _foot_frames(robot: Robot) -> list[str]:
-    """Frames of the feet, which are the names of contacts there."""
+    """Return the frames of the feet, which are also the names of contacts there."""
     return [foot.frame for foot in robot.feet]

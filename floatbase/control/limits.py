@@ -1,6 +1,4 @@
-"""The inequalities of (27) without a state: friction, normal forces, torque limits, and
-user-defined rows.
-"""
+"""Inequality constraints of the whole-body QP: friction, normal forces, torques, user-defined."""
 
 from __future__ import annotations
 
@@ -34,12 +32,13 @@ from floatbase._validation import (
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
-from floatbase.friction.cones import MAX_FACETS
+from floatbase.friction._polytopes import MAX_FACETS
 from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits
 
-SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}  # of the blocks of x, attributes of (7)
+# sizes of the blocks of x: attributes of the equations of motion (7)
+SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}
 BLOCKS = tuple(SIZES)
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
@@ -47,20 +46,43 @@ Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
 @dataclass(frozen=True, eq=False)
 class LinearInequality(Value):
-    """User-defined inequality rows, G x ≤ h, on one block x of (q̈, τ, λ).
+    """User-defined inequality constraints G x ≤ h on one block x of (q̈, τ, λ).
 
-    name: in messages; of the row, where there is one, else of "name 0", "name 1", …
-    block: "qdd", "tau" or "forces".
-    coefficients: G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that gives
-        them; n is the size of the block, which for forces goes with the contacts. The unit is that
-        of the rows: N for forces, m/s² or rad/s² for accelerations.
-    row_names: one text for each row instead of its number, such as the names of joints.
+    Parameters
+    ----------
+    name : str
+        Name used in messages. A single row has this name; several rows are called "name 0",
+        "name 1" and so on.
+    block : {"qdd", "tau", "forces"}
+        Block x on which the inequalities act.
+    coefficients : tuple or callable
+        G, shape (m, n), and h, shape (m,), or a function of (eom, t in s) that returns them. n is
+        the size of the block, which for "forces" depends on the contacts. The unit of h is that of
+        G x, for example N for forces, m/s² or rad/s² for accelerations.
+    row_names : sequence of str, optional
+        One text for each row instead of its number, such as the names of joints.
 
-    Bounds on joints' accelerations, with E = np.eye(robot.nv)[6:]:
-    `LinearInequality("acceleration", "qdd", (E, np.full(robot.d, 50.0)))`. At most 500 N from all
-    feet, however many stand: `LinearInequality("total", "forces", lambda eom, t: (np.tile([0.0,
-    0.0, 1.0], (1, eom.k // 3)), [500.0]))`. Raises `InputError` for another block;
-    `at` does so for shapes that do not fit.
+    Raises
+    ------
+    InputError
+        If the block is unknown, or if shapes do not fit. Shapes that depend on the robot are
+        checked by `at`.
+
+    Examples
+    --------
+    Joint accelerations of at most 50 rad/s²:
+
+    >>> robot = fb.load("go2")
+    >>> E = np.eye(robot.nv)[6:]
+    >>> limit = LinearInequality("acceleration", "qdd", (E, np.full(robot.d, 50.0)))
+    >>> len(limit.labels(robot.d))
+    12
+
+    A total vertical force of at most 500 N, whatever the number of feet in contact:
+
+    >>> def coefficients(eom, t):
+    ...     return np.tile([0.0, 0.0, 1.0], (1, eom.k // 3)), [500.0]
+    >>> total = LinearInequality("total", "forces", coefficients)
     """
 
     name: str = field(metadata=checked(as_string))
@@ -83,24 +105,58 @@ class LinearInequality(Value):
         return f"inequality {self.name!r}"
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
-        """G, shape (m, n), and h, shape (m,), at a state and a time t in s, checked."""
+        """Return G and h at a state and a time, checked.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at the state.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        G : ndarray, shape (m, n)
+            Coefficients; n is the size of the block.
+        h : ndarray, shape (m,)
+            Right-hand side, in the unit of G x.
+
+        Raises
+        ------
+        InputError
+            If the shapes do not fit.
+        """
         n = getattr(eom, SIZES[self.block])
         if (
             not callable(self.coefficients) and np.shape(self.coefficients[0])[1] == n
-        ):  # checked when they were made, but for that
+        ):  # everything else was checked at construction
             return cast("tuple[Array, Array]", self.coefficients)
         return self._checked(
             self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n
         )
 
     def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
-        """A label for each of m rows. Raises `InputError` where there is another number of row
-        names.
+        """Return a label for each of m rows.
+
+        Parameters
+        ----------
+        m : int
+            Number of rows.
+
+        Returns
+        -------
+        tuple of ConstraintLabel
+            The labels.
+
+        Raises
+        ------
+        InputError
+            If `row_names` has another length.
         """
         if self.row_names and len(self.row_names) != m:
             raise InputError(
-                f"inequality {self.name!r} has {len(self.row_names)} row names and {m} rows; give "
-                f"one for each row."
+                f"inequality {self.name!r} has {len(self.row_names)} row names but {m} rows. Give "
+                f"one name for each row."
             )
         if self.row_names:
             return tuple(
@@ -113,36 +169,40 @@ class LinearInequality(Value):
         )
 
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
+        """Return G and h as arrays, checked; n: size of the block, None if it is unknown."""
         if not isinstance(given, tuple | list) or len(given) != 2:
             raise InputError(
-                f"inequality {self.name!r} must be G and h, as in (G, h), not {short_repr(given)}."
+                f"coefficients of inequality {self.name!r} must be a pair (G, h), not "
+                f"{short_repr(given)}."
             )
         G = as_array(f"G of {self.name}", given[0], (None, None))
         if n is not None and G.shape[1] != n:
             follows = (
-                "; a function of (eom, t) can follow the contacts" if self.block == "forces" else ""
+                " Use a function of (eom, t) to follow the contacts."
+                if self.block == "forces"
+                else ""
             )
             raise InputError(
-                f"inequality {self.name!r} takes {G.shape[1]} numbers; its block {self.block!r} "
-                f"has {n}{follows}."
+                f"G of inequality {self.name!r} has {G.shape[1]} columns, but its block "
+                f"{self.block!r} has {n} entries.{follows}"
             )
         return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
 
 def _as_limits(name: str, value: npt.ArrayLike) -> Array:
-    """Torque limits of as many joints as they are given for, checked."""
+    """Return torque limits for as many joints as `value` has entries, checked."""
     limits = numeric_copy(value)
     return as_torque_limits(1 if limits is None else limits.size, value)
 
 
 def _as_bounds(name: str, value: Any, optional: bool = False) -> NormalForces:
-    """Return a checked copy of bounds of normal forces; none at all may be given if `optional`."""
+    """Return a checked copy of bounds of normal forces; `optional` allows None for no bound."""
     given = {} if optional and value is None else value
     if not isinstance(given, Mapping):
         number = numeric_copy(given)
         if number is None or number.ndim:
             raise InputError(
-                f"{name} is {short_repr(given)}. It must be one number (N), or a mapping from "
+                f"{name} is {short_repr(given)}. It must be one number [N], or a mapping from "
                 f"names of contacts to numbers or functions of t, such as "
                 f'{{"FL_foot": lambda t: …}}.'
             )
@@ -167,20 +227,34 @@ def _as_inequalities(name: str, value: Any) -> tuple[LinearInequality, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Limits(Value):
-    """The inequalities of (27).
+    """Inequality constraints of a controller.
 
-    torque_limits: shape (d,), N·m, +inf where there is none.
-    facets: number of facets of the friction polyhedron (28) of every contact point.
-    inner_approximation: whether the polyhedron lies inside the friction cone (safe) or outside it
-        (optimistic).
-    facet_rotation: rad, by which its facets are turned about the normal.
-    min_normal_force, max_normal_force: N, bounds of normal · f at every contact point, so at each
-        corner of a flat foot: one number for all, or a mapping from the name of a contact to a
-        number or a function of the time t in s; 0 and none where it has none. The bound of a name
-        that is not among the contacts waits until it is: a foot that has lifted will stand again.
-    inequalities: user-defined inequality rows.
+    Parameters
+    ----------
+    torque_limits : array_like, shape (d,)
+        Torque limits, +inf for none [N·m].
+    facets : int, optional
+        Number of facets of the friction polyhedron, eq. (28), at every contact point.
+    inner_approximation : bool, optional
+        Whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
+    min_normal_force : float or mapping, optional
+        Minimum of normal · f at every contact point, so at each corner of a flat foot [N]. It is
+        one number for all points, or a mapping from names of contacts to numbers or functions of
+        the time t [s]. Contacts that are not in the mapping have a minimum of 0. A name that is not
+        among the contacts has no effect until it is: a foot that has been lifted will be in contact
+        again.
+    max_normal_force : float or mapping, optional
+        Maximum of normal · f, in the same form [N]. Contacts that are not in the mapping have no
+        maximum.
+    inequalities : sequence of LinearInequality, optional
+        User-defined inequality constraints.
+    facet_rotation : float, optional
+        Angle by which the facets are rotated about the normal [rad].
 
-    Raises `InputError` for values that do not fit.
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, shape or value.
     """
 
     _example = "controller.limits"
@@ -198,19 +272,19 @@ class Limits(Value):
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
-        """Options of the friction polyhedra: arguments of `FrictionPolyhedron` after mu."""
+        """Options of the friction polyhedra: the arguments of `FrictionPolyhedron` after mu."""
         return self.facets, self.inner_approximation, self.facet_rotation
 
     @cached_property
     def time_varying(self) -> bool:
-        """Whether a normal force is bounded by a function of time."""
+        """Whether a bound of a normal force is a function of time."""
         return any(
             callable(value) for bound in self._bounds_by_name.values() for value in bound.values()
         )
 
     @property
     def _bounds_by_name(self) -> dict[str, Mapping[str, Any]]:
-        """The bounds of normal forces that are mappings, by the name of the argument."""
+        """Bounds of normal forces that are mappings, by the name of the argument."""
         both = {
             "min_normal_force": self.min_normal_force,
             "max_normal_force": self.max_normal_force,
@@ -218,8 +292,19 @@ class Limits(Value):
         return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
 
     def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
-        """Raise `UnknownNameError` where a normal force is bounded by a name that is neither known
-        nor in the limits before.
+        """Check that bounds of normal forces name known contacts only.
+
+        Parameters
+        ----------
+        *known : iterable of str
+            Known names.
+        before : Limits, optional
+            Limits whose names are known, too.
+
+        Raises
+        ------
+        UnknownNameError
+            If a name is neither known nor in the limits before.
         """
         names = {
             name
@@ -232,23 +317,51 @@ class Limits(Value):
                     raise unknown_name(f"contact in {argument}", name, names)
 
     def normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
-        """Least and largest normal force, N, of each point at time t in s, shapes (P,); inf where
-        none is the largest.
+        """Return minimum and maximum normal force of each contact point.
 
-        Raises `InputError` for a function's value that is no force.
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts with P points.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        minimum : ndarray, shape (P,)
+            Minimum normal forces [N].
+        maximum : ndarray, shape (P,)
+            Maximum normal forces, inf for none [N].
+
+        Raises
+        ------
+        InputError
+            If a function returns a value that is not a number ≥ 0.
         """
         if not self.time_varying:
             return _constant_normal_forces(contacts, self)
         return self._normal_forces_at(contacts, t)
 
     def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
-        assert self.max_normal_force is not None  # as it was made
+        """Return minimum and maximum normal force of each contact point at time t."""
+        assert self.max_normal_force is not None  # __post_init__ replaces None
         least = _bounds_at("min_normal_force", self.min_normal_force, contacts, t, 0.0)
         largest = _bounds_at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
         return least, largest
 
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
-        """Which points have a largest normal force, shape (P,)."""
+        """Return which contact points have a maximum normal force.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts with P points.
+
+        Returns
+        -------
+        ndarray of bool, shape (P,)
+            True for points with a maximum.
+        """
         given = self.max_normal_force
         names = given if isinstance(given, Mapping) else contacts.names
         return np.array(
@@ -260,7 +373,7 @@ class Limits(Value):
 def _bounds_at(
     name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float
 ) -> Array:
-    """Bounds of normal forces at time t, (P,)."""
+    """Return bounds of normal forces at time t, (P,)."""
     if not isinstance(given, Mapping):
         return np.full(contacts.n_points, given)
     found = []
@@ -272,18 +385,34 @@ def _bounds_at(
     return np.array(found, dtype=np.float64)
 
 
-# what does not depend on the state is built once for each contacts, robot and limits (all
-# immutable)
+# what does not depend on the state is cached; contacts, robots and limits are immutable
 @lru_cache(maxsize=64)
 def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
+    """Return bounds that do not depend on time, cached."""
     least, largest = limits._normal_forces_at(contacts, 0.0)
     return read_only(least), read_only(largest)
 
 
 @lru_cache(maxsize=64)
 def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[ConstraintLabel, ...]]:
-    """G of friction facets and least normal force of every point, then of the largest normal
-    forces, and the rows' names.
+    """Return G of the constraints on contact forces, and their names.
+
+    The rows are the friction facets and the minimum normal force of every point, then the maximum
+    normal forces.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts with k force components.
+    limits : Limits
+        The limits.
+
+    Returns
+    -------
+    G : ndarray, shape (m, k)
+        Coefficients.
+    names : tuple of ConstraintLabel
+        Names of the rows.
     """
     per_point = limits.facets + 1
     names: list[ConstraintLabel] = []
@@ -311,7 +440,22 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
 
 
 def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Array) -> Array:
-    """h of `force_rows` for the least and largest normal force of every point, (P,)."""
+    """Return h of `force_rows`.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts with P points.
+    limits : Limits
+        The limits.
+    least, largest : ndarray, shape (P,)
+        Minimum and maximum normal force of every point [N].
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Right-hand side [N].
+    """
     h = np.zeros((contacts.n_points, limits.facets + 1))
     h[:, -1] = -least
     return np.concatenate([h.ravel(), largest[limits.bounded_points(contacts)]])
@@ -319,7 +463,24 @@ def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Arra
 
 @lru_cache(maxsize=64)
 def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
-    """τ ≤ limit and -τ ≤ limit for every joint that has one: G τ ≤ h, and the names of the rows."""
+    """Return G, h and names of τ ≤ limit and -τ ≤ limit, for every joint that has a limit.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot with d joints.
+    limits : Limits
+        The limits.
+
+    Returns
+    -------
+    G : ndarray, shape (m, d)
+        Coefficients.
+    h : ndarray, shape (m,)
+        Right-hand side [N·m].
+    names : tuple of ConstraintLabel
+        Names of the rows.
+    """
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
     sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]

@@ -1,4 +1,4 @@
-"""(26)(27) as a value: robot, contacts, tasks and limits, and the QP that they make of a state."""
+"""The whole-body QP: robot, contacts, tasks and limits, and the QP that they define at a state."""
 
 from __future__ import annotations
 
@@ -38,19 +38,36 @@ from floatbase.robots._checks import as_torque_limits
 ModifyQP: TypeAlias = Callable[[QP, EquationsOfMotion], QP]  # of `Problem.modify_qp`
 Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and residual of each task
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
-# m/s²: contact rows that disagree by less do so by rounding of Jacobians and drifts
+# m/s²: contact rows that disagree by less do so because Jacobians and drifts are rounded
 INCONSISTENCY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Value):
-    """(26)(27) without a state: what `WholeBodyController` is made of, and with the same meaning
-    there.
+    """Control problem without a state: what a `WholeBodyController` solves.
 
-    modify_qp: (qp, eom) -> QP, applied to the assembled QP; None leaves it as it is.
+    Parameters
+    ----------
+    robot : Robot
+        The robot to control.
+    contacts : Contacts
+        Its contacts with the ground.
+    tasks : sequence of Task
+        Tasks. A `ForceTask()` or a `TorqueTask()` of small weight is added if no task acts on
+        forces, or none on torques.
+    limits : Limits
+        Inequality constraints.
+    modify_qp : callable, optional
+        Function (qp, eom) -> QP, applied to the assembled QP. None leaves it unchanged.
 
-    Raises `InputError` for values of a wrong kind; `qp` does so for names and shapes that do not
-    fit.
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type. Names and shapes are checked by `qp`.
+
+    Notes
+    -----
+    [FBR]_, eqs. (26), (27).
     """
 
     robot: Robot = field(metadata=checked(as_instance, Robot))
@@ -70,10 +87,30 @@ class Problem(Value):
         return "the control problem"
 
     def qp(self, state: State, t: float = 0.0) -> QP:
-        """The QP at a state and a time t in s."""
+        """Return the QP at a state and a time.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        QP
+            The QP in x = (q̈, τ, λ).
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot, or if names or shapes do not fit.
+        InfeasibleError
+            If the motion constraints of the contacts are inconsistent.
+        """
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(
-                f"the state belongs to another robot, {state.robot!r}, than the problem, "
+                f"state belongs to another robot, {state.robot!r}. The robot of the problem is "
                 f"{self.robot!r}."
             )
         eom = equations_of_motion(state, self.contacts, t)
@@ -89,10 +126,19 @@ class Problem(Value):
         return modified
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
-        """Raise what `qp` would raise of names and shapes, where the robot stands at time 0, and
-        make no QP.
+        """Check names and shapes as `qp` does, at the standing state and t = 0, without a QP.
 
-        tasks: those to check, all by default.
+        Parameters
+        ----------
+        tasks : sequence of Task, optional
+            Tasks to check. The default is all tasks.
+
+        Raises
+        ------
+        InputError
+            If shapes do not fit.
+        UnknownNameError
+            If a name does not exist.
         """
         with dry_run():
             eom = _standing_equations(self.robot, self.contacts)
@@ -109,23 +155,43 @@ def build_qp(
     limits: Limits,
     t: float = 0.0,
 ) -> QP:
-    """(26)(27) as a QP in x = (q̈, τ, λ).
+    """Assemble the whole-body QP in x = (q̈, τ, λ) at a state.
 
-    Objective: the sum of (weight / 2) ‖residual‖² of the tasks. Equalities: the equations of motion
-        (7). Inequalities: those of
-    `Limits`. Source: [FBR], §4.1.
+    The objective is the sum of (weight / 2) ‖residual‖² of the tasks. The equality constraints are
+    the equations of motion (7). The inequality constraints are those of `limits`.
 
-    eom: the equations of motion (7) at a state.
-    tasks: at least one for each block of x, or the optimum is not unique (`Problem` adds what is
-        missing).
-    limits: the inequalities.
-    t: s, the time that tasks with moving targets are evaluated at.
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion (7) at a state.
+    tasks : sequence of Task
+        Tasks, at least one for each block of x. Otherwise the optimum is not unique (`Problem` adds
+        what is missing).
+    limits : Limits
+        Inequality constraints.
+    t : float, optional
+        Time at which tasks with time-varying targets are evaluated [s].
 
-    Where A of (5) loses rank or nearly does (solo8 on four feet), its rows repeat each other, and a
-    measured velocity that the contacts do not quite allow makes them inconsistent. The rows
-    therefore count along the directions that A resolves well
-    (`floatbase.dynamics.resolved_constraint`). Raises `InfeasibleError` where they are inconsistent
-    beyond that.
+    Returns
+    -------
+    QP
+        The QP in x = (q̈, τ, λ).
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type, or if names or shapes do not fit.
+    InfeasibleError
+        If the motion constraints of the contacts are inconsistent.
+
+    Notes
+    -----
+    [FBR]_, eqs. (26), (27). [FBR]_, §4.1.
+
+    If A of eq. (5) loses rank or nearly does (solo8 on four feet), its rows are redundant. A
+    measured velocity that does not quite satisfy the contacts then makes them inconsistent. The
+    constraint is therefore applied only along the directions that A resolves well
+    (`floatbase.dynamics.resolved_constraint`).
     """
     as_instance("eom", eom, EquationsOfMotion)
     as_instance("limits", limits, Limits)
@@ -146,11 +212,25 @@ def assemble_qp(
     normal_forces: tuple[Array, Array],
     inequalities: Sequence[tuple[Array, Array]],
 ) -> QP:
-    """`build_qp` from what is known at the state: one array or residual for each function.
+    """Assemble the QP of `build_qp` from terms that are already evaluated at the state.
 
-    costs: block, weight and residual of each task.
-    normal_forces: least and largest of every point, (P,), N.
-    inequalities: G and h of each of `limits.inequalities`.
+    Parameters
+    ----------
+    eom : EquationsOfMotion
+        Equations of motion (7) at the state.
+    costs : sequence of tuple
+        Block, weight and residual of each task.
+    limits : Limits
+        Inequality constraints.
+    normal_forces : tuple of ndarray, shape (P,)
+        Minimum and maximum normal force of every contact point [N].
+    inequalities : sequence of tuple
+        G and h of each of `limits.inequalities`.
+
+    Returns
+    -------
+    QP
+        The QP in x = (q̈, τ, λ).
     """
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
@@ -193,28 +273,32 @@ def assemble_qp(
 
 @contextmanager
 def dry_run() -> Iterator[None]:
-    """Tells whose function raises while a controller is made that nothing moves yet."""
+    """Add a note to exceptions that user code raises while a controller is made.
+
+    The note says that nothing moves yet.
+    """
     try:
         yield
     except FloatbaseError:
         raise
     except Exception as error:
         error.add_note(
-            "Raised while a controller was made: it tries what it is given once, at t = 0, where "
-            "the robot stands."
+            "This error was raised while a controller was made. User functions are evaluated once "
+            "then, at t = 0 and in the standing posture, so they must be defined there."
         )
         raise
 
 
 @lru_cache(maxsize=64)
 def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
-    """(7) where the robot stands."""
+    """Return (7) at the standing state of a robot."""
     return equations_of_motion(robot.standing(), contacts)
 
 
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
-    """The tasks as a tuple, with a small `ForceTask` or `TorqueTask` where none acts on forces or
-    torques.
+    """Return the tasks as a tuple, with small regularization tasks where they are missing.
+
+    A `ForceTask` or `TorqueTask` is added if no task acts on forces, or none on torques.
     """
     if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
         raise InputError(
@@ -226,17 +310,17 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         lacks = [part for part in _TASK_ATTRIBUTES if not hasattr(task, part)]
         if 0 < len(lacks) < len(_TASK_ATTRIBUTES):
             raise InputError(
-                f"{type(task).__name__} is no task yet, for it has no {' and no '.join(lacks)}; a "
-                f"task has block, name, weight and residual(eom, t), as floatbase.objectives.Task "
-                f"says."
+                f"{type(task).__name__} is not a task: it lacks {', '.join(lacks)}. A task has "
+                f"block, name, weight and residual(eom, t), see floatbase.objectives.Task."
             )
         if lacks or isinstance(task, type) or not callable(task.residual):
             raise InputError(
-                f"tasks must hold tasks, such as fb.CoMTask(state.com); {short_repr(task)} is none."
+                f"tasks must contain tasks, such as fb.CoMTask(state.com), not {short_repr(task)}."
             )
         if task.block not in BLOCKS:
             raise InputError(
-                f'task {task.name!r} has block {task.block!r}; it must be "qdd", "tau" or "forces".'
+                f'block of task {task.name!r} is {task.block!r}. It must be "qdd", "tau" or '
+                f'"forces".'
             )
         as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
     missing = [
@@ -248,10 +332,30 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
 
 
 def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-    """The residual of a task, after checking that it takes its block of x."""
+    """Return the residual of a task, after checking that it fits its block of x.
+
+    Parameters
+    ----------
+    task : Task
+        The task.
+    eom : EquationsOfMotion
+        Equations of motion at a state.
+    t : float, optional
+        Time [s].
+
+    Returns
+    -------
+    Affine
+        The residual.
+
+    Raises
+    ------
+    InputError
+        If the residual is not an `Affine` of the size of its block.
+    """
     try:
         residual = task.residual(eom, t)
-    except InputError as error:  # such as an `Affine` that holds NaN: say whose it is
+    except InputError as error:  # such as an `Affine` with NaN: name the task
         raise (
             error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}")
         ) from None
@@ -259,22 +363,24 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         as_callable(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
         raise
     if not isinstance(residual, Affine):
-        form = f"A x + b of its block x as fb.Affine(A, b), not {type(residual).__name__}"
-        raise InputError(f"the residual of {task.name!r} must be {form}.")
+        raise InputError(
+            f"The residual of {task.name!r} must be A x + b of its block x, as fb.Affine(A, b), "
+            f"not of type {type(residual).__name__}."
+        )
     size = getattr(eom, SIZES[task.block])
     if residual.n_in != size:
         raise InputError(
-            f"the residual of {task.name!r} takes {residual.n_in} numbers; its block "
-            f"{task.block!r} has {size}."
+            f"The residual of {task.name!r} has {residual.n_in} columns, but its block "
+            f"{task.block!r} has {size} entries."
         )
     return residual
 
 
 def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
-    """(5) A (m, nv) and b (m,) along the directions that A resolves.
+    """Return A (m, nv) and b (m,) of (5) along the directions that A resolves.
 
-    Raises `InfeasibleError` with the rows where they are inconsistent by more than the contacts'
-    own motion explains.
+    Raises `InfeasibleError` with the rows that are inconsistent by more than the contacts' own
+    motion explains.
     """
     A, b = resolved_constraint(eom)
     gap = np.abs(eom.b - b)
@@ -285,8 +391,8 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
             for i in np.flatnonzero(gap > 0.1 * gap.max())
         ]
         raise InfeasibleError(
-            f"these motions are inconsistent: {', '.join(names)}. At least one of their "
-            f"constraints has to go.",
+            f"These motion constraints are inconsistent: {', '.join(names)}. Remove at least one "
+            f"of them.",
             names,
         )
     return A, b
@@ -294,7 +400,7 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _equality_names(robot: Robot, contacts: Contacts) -> tuple[ConstraintLabel, ...]:
-    """Names of the rows of (7)."""
+    """Return the names of the rows of (7)."""
     axes = (
         [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
         if robot.is_floating

@@ -1,4 +1,4 @@
-"""Soft contacts: (5) as a cost instead of rows, for states in which no forces hold them."""
+"""Soft contacts: the contact constraint (5) as a cost, for states in which no forces satisfy it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ from floatbase.dynamics import (
 from floatbase.objectives import Task
 from floatbase.robots import State
 
-SOFT_CONTACT_WEIGHT = 1e4  # of contacts that must give way, beside 10 of the tasks
+SOFT_CONTACT_WEIGHT = 1e4  # of the motion of soft contacts; the weight of tasks is 10
 
 
 @dataclass(frozen=True, eq=False)
 class SoftConstraint(Value):
-    """A constraint that holds no motion: its forces act, and `ContactMotionTask` asks for its rows.
+    """A constraint whose forces act but whose motion is only a cost, in `ContactMotionTask`.
 
-    contact: the rigid one.
+    Parameters
+    ----------
+    contact : MotionConstraint
+        The rigid constraint.
     """
 
     contact: MotionConstraint
@@ -35,54 +38,106 @@ class SoftConstraint(Value):
 
     @property
     def name(self) -> str:
-        """The contact's name."""
+        """Name of the contact."""
         return self.contact.name
 
     @property
     def k(self) -> int:
-        """The contact's number of force components."""
+        """Number of force components of the contact."""
         return self.contact.k
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """J of (4), shape (k, nv), at time t, s."""
+        """Return the Jacobian J of eq. (4).
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (k, nv)
+            The Jacobian.
+        """
         return self.contact.jacobian(state, t)
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """(5) without rows."""
+        """Return A and b of eq. (5), which have no rows.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        A : ndarray, shape (0, nv)
+            Empty matrix.
+        b : ndarray, shape (0,)
+            Empty vector.
+        """
         return read_only(np.zeros((0, state.robot.nv))), read_only(np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class SoftContact(SoftConstraint):
-    """A soft constraint whose forces act at points, inside their cones."""
+    """A soft constraint whose forces act at points, inside their friction cones.
+
+    Parameters
+    ----------
+    contact : FrictionContact
+        The rigid contact.
+    """
 
     contact: FrictionContact
 
     @property
     def mu(self) -> float:
-        """The contact's coefficient of friction."""
+        """Coefficient of friction of the contact [-]."""
         return self.contact.mu
 
     @property
     def normal(self) -> Array:
-        """The contact's unit normal, shape (3,), world."""
+        """Unit normal of the contact, shape (3,), world frame."""
         return self.contact.normal
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """The contact's points."""
+        """Names of the contact's points."""
         return self.contact.point_names
 
     def positions(self, state: State) -> Array:
-        """World positions of the points, shape (n, 3), m."""
+        """Return the positions of the points.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Positions in the world frame [m].
+        """
         return self.contact.positions(state)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactMotionTask(Value):
-    """The motion that contacts hold, as a wish: residual A q̈ - b of (5), m/s² and rad/s².
+    """The motion constraint of contacts as a cost: residual A q̈ - b of eq. (5).
 
-    contacts: as if they were rigid. weight: of ½‖residual‖² in the objective.
+    Parameters
+    ----------
+    contacts : Contacts
+        The rigid contacts.
+    weight : float
+        Weight of ½ ‖residual‖² in the objective [1/(m/s²)²].
+    name : str, optional
+        Name used in messages.
     """
 
     contacts: Contacts
@@ -91,7 +146,20 @@ class ContactMotionTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """A q̈ - b, shape (m,)."""
+        """Return A q̈ - b as a function of q̈.
+
+        Parameters
+        ----------
+        eom : EquationsOfMotion
+            Equations of motion at a state.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        Affine
+            The residual, shape (m,) [m/s², rad/s²].
+        """
         A, b = self.contacts.constraint(eom.state, t)
         return Affine(A, -b)
 
@@ -99,8 +167,23 @@ class ContactMotionTask(Value):
 def with_soft_contacts(
     contacts: Contacts, tasks: Sequence[Task], weight: float
 ) -> tuple[Contacts, tuple[Task, ...]]:
-    """Contacts and tasks, soft or not, as those of a controller whose contacts give way at this
-    weight.
+    """Return soft contacts and tasks from contacts and tasks that may be soft or rigid.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        Rigid or soft contacts.
+    tasks : sequence of Task
+        Tasks, with or without a `ContactMotionTask`.
+    weight : float
+        Weight of the contacts' motion [1/(m/s²)²].
+
+    Returns
+    -------
+    contacts : Contacts
+        Soft contacts.
+    tasks : tuple of Task
+        Tasks with a `ContactMotionTask` of this weight.
     """
     rigid = Contacts(
         [
@@ -115,5 +198,5 @@ def with_soft_contacts(
 
 
 def contact_weight_of(tasks: Sequence[Task]) -> float | None:
-    """The weight of soft contacts among the tasks, None where there is none."""
+    """Return the weight of soft contacts among the tasks, or None if there is none."""
     return next((task.weight for task in tasks if isinstance(task, ContactMotionTask)), None)

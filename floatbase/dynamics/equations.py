@@ -119,13 +119,13 @@ class EquationsOfMotion(Value):
 
     @property
     def d(self) -> int:
-        """Length of τ, the number of actuated joints."""
-        return self.robot.d
+        """Length of τ: the number of actuated joints, unless another S was given."""
+        return int(self.S.shape[1])
 
     @property
     def k(self) -> int:
-        """Length of λ, three for each contact point."""
-        return self.contacts.k
+        """Length of λ: that of `contacts`, unless another J was given."""
+        return len(vars(self)["J"]) if "J" in vars(self) else self.contacts.k
 
     def acceleration(self, tau: npt.ArrayLike, forces: npt.ArrayLike) -> Array:
         """Compute q̈ = M⁻¹ (S τ + Jᵀ λ - h), regardless of the constraint A q̈ = b.

@@ -25,9 +25,9 @@ from floatbase._validation import (
     read_only,
     unit_vector,
 )
+from floatbase.friction._polytopes import MAX_FACETS
 
 TOLERANCE = 1e-9  # N, by which `contains` lets a force lie outside: rounding of forces up to 1 MN
-MAX_FACETS = 1000  # they miss the cone by 5e-6 of μ, which is never known as accurately
 # fraction of the friction limit μ α_⊥ within which a force counts as on the surface: measured
 # forces scatter
 ACTIVE_TOLERANCE = 0.02

@@ -97,7 +97,7 @@ class WrenchSet(Value):
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             raise InputError(
                 f"max_normal_force must be one number > 0, or {len(points)} of them, one for each "
-                f"contact point (N)."
+                f"contact point [N]."
             )
         object.__setattr__(self, "max_normal_force", read_only(limits))
 
@@ -243,7 +243,7 @@ class WrenchSet(Value):
             Directions from the world's x axis towards y, evenly spaced [rad].
         forces : ndarray, shape (n,)
             `max_scaling` of each direction from (0, 0, weight, 0, 0, 0) [N], +inf if there is no
-            limit. Divided by `weight`, they are the possible accelerations of the centre of mass as
+            limit. Divided by `weight`, they are the largest accelerations of the centre of mass as
             fractions of g. They are limited by the facets and by the height of the centre of mass.
 
         Raises
@@ -440,6 +440,13 @@ def wrench_set(
     Notes
     -----
     [FBR]_, eqs. (20), (21), (28).
+
+    Examples
+    --------
+    >>> state = fb.load("go2").standing()
+    >>> stance = wrench_set(state, fb.Contacts.points(state.robot))
+    >>> stance.contains([0.0, 0.0, stance.weight, 0.0, 0.0, 0.0])
+    True
     """
     as_instance("state", state, State)
     as_instance("contacts", contacts, Contacts)

@@ -358,8 +358,8 @@ class _StatusLine(widgets.Label):
         with self._telling:
             self._news = self._news if news is None else news
             status = self._run.status
-            told = status_message(status, self._run.reason)
-            self.value = self._news if status == "running" and self._news else told
+            summary = status_message(status, self._run.reason)
+            self.value = self._news if status == "running" and self._news else summary
 
 
 def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.Button:

@@ -34,8 +34,8 @@ def rounded(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str
     digits : int, optional
         Significant digits, from 1 to 12. Trailing zeros of a fraction are omitted: 2.0 is "2".
     floor : float, optional
-        Numbers below this are written as "0", and so are entries of an array below 1e-6 of its
-        largest entry.
+        Numbers below this [in `unit`] are written as "0". So are entries of an array below 1e-6 of
+        its largest entry.
 
     Returns
     -------

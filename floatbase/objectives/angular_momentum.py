@@ -64,7 +64,9 @@ class AngularMomentumTask(TargetTask):
             Map from q̈ to the residual, shape (3,), in the world frame [N·m].
         """
         momentum, rate = self._targets(eom, t)
-        model, state = eom.robot.model, eom.state
-        data = model.createData()
-        drift = pin.dccrba(model, data, state.q, state.v) @ state.v
-        return Affine(data.Ag[3:], drift[3:] - rate + self.kd * (data.hg.angular - momentum))
+        robot, state = eom.robot, eom.state
+        data = state._data
+        # of one joint Pinocchio gives (6,)
+        rate_matrix = pin.dccrba(robot.model, data, state.q, state.v).reshape(6, robot.nv)
+        drift, matrix = rate_matrix[3:] @ state.v, data.Ag.reshape(6, robot.nv)[3:]
+        return Affine(matrix, drift - rate + self.kd * (data.hg.angular - momentum))

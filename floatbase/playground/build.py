@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array, T
 from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
@@ -299,14 +300,9 @@ def nodding_rotation(
 
     def angles(t: float) -> Array:
         """Return pitch and yaw at time t."""
-        s = min(max((t - begin) / _RAMP_TIME, 0.0), 1.0)
+        amplitude = size * minimum_jerk((t - begin) / _RAMP_TIME)[0]
         phase = 2.0 * math.pi * _NODDING_FREQUENCY * (t - begin)
-        return (
-            size
-            * s**3
-            * (10.0 - 15.0 * s + 6.0 * s**2)
-            * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
-        )
+        return amplitude * np.array([math.sin(phase), _YAW_OVER_PITCH * math.cos(phase)])
 
     turning = pitch_and_yaw(angles)
 

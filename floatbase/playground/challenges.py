@@ -380,13 +380,13 @@ CHALLENGES = (
     ),
     Challenge(
         "Quick foot",
-        "Start with load on all four feet. Have a front foot 2 cm in the air in less than 0.5 s, "
-        "and keep it there for 1 s.",
+        "Start with load on all four feet. Lift a front foot 2 cm in less than 0.5 s, and keep it "
+        "up for 1 s.",
         _quick_foot, locked=_LOCKED_PHYSICS,
     ),
     Challenge(
         "Feet that travel",
-        "Move all four feet 12 mm away from where they stood. No foot may be lifted or slip.",
+        "Move all four feet 12 mm away from their starting points. No foot may be lifted or slip.",
         _feet_that_travel, locked=_LOCKED_PHYSICS,
     ),
     Challenge(

@@ -65,13 +65,10 @@ class Playground:
         )
         self.session = Session(robot, settings)
         self._initial_settings = self.session.settings
-        self.force, self.towards = (
-            self._default_push,
-            0.0,
-        )  # N, and degrees: 0 is forwards, 90 to the left
-        self.pushed_frame = (
-            "base" if robot.is_floating else robot.model.frames[-1].name
-        )  # the tip of an arm
+        self.force = self._default_push  # N
+        self.towards = 0.0  # degrees: 0 is forwards, 90 to the left
+        # of an arm, its tip
+        self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name
         self.outcome = ""
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
@@ -81,9 +78,7 @@ class Playground:
         self._requested: dict[str, Any] = {}
         self._applying: dict[str, Any] = {}  # what is being applied now
         self._lock = threading.Lock()  # protects the requests
-        self._drawing_lock = (
-            threading.Lock()
-        )  # the run draws, and so does the thread that pauses it
+        self._drawing_lock = threading.Lock()  # the run and a thread that pauses it both draw
         session = self.session
         self.run = LiveSimulation(
             session.sim, session.controller, self._on_slice, control_period=PERIOD,
@@ -320,7 +315,7 @@ class Playground:
             self.run.pause()
         if self.robot.is_floating:
             self.view.add_plot_point(
-                "difference of planned and measured forces",
+                "difference between planned and measured forces",
                 float(record.time[-1]),
                 mean_force_error(record),
                 "N",

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import floatbase as fb
+from floatbase._geometry import rotation_z
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
 from floatbase.playground import build
@@ -190,7 +191,7 @@ class Session:
             return self.home
         present = self.last.final
         R, R0 = (state.frame_pose("base").rotation for state in (present, self.home))
-        turn = pin.exp3(np.array([0.0, 0.0, math.atan2(*(R @ R0.T)[[1, 0], 0])]))
+        turn = rotation_z(math.atan2(*(R @ R0.T)[[1, 0], 0]))
         q = np.array(self.home.q)
         q[3:7] = pin.Quaternion(turn @ R0).coeffs()
         turned = self.home.replace(q=q)

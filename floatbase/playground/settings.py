@@ -17,6 +17,7 @@ from floatbase._validation import (
 )
 from floatbase.behaviours import Gait
 from floatbase.errors import unknown_name
+from floatbase.friction._polytopes import MAX_FACETS
 from floatbase.playground.equation import EQUATION
 
 GAITS = {  # by number of feet
@@ -25,7 +26,6 @@ GAITS = {  # by number of feet
 }
 IDEAL_BANDWIDTH = 100.0  # Hz: actuators with this bandwidth, the end of the slider, are ideal
 IDEAL_KP = 100.0  # 1/s², gain of tasks with ideal actuators
-_MAX_FACETS = 1000
 _MAX_SLOPE = 89.0  # degrees: at 90 the ground is a wall
 _MAX_SHIFT = 10.0  # m: a larger value is probably in the wrong unit
 _MAX_SPEED = 5.0  # m/s and rad/s: a larger value is probably in the wrong unit
@@ -119,7 +119,7 @@ class Settings(Value):
         ):
             numbers = [as_number(name, x, unit, -limit, limit) for x in self._entries(name)]
             self._keep(name, [round(x, 6) for x in numbers])
-        self._keep("facets", as_integer("facets", self.facets, 3, _MAX_FACETS))
+        self._keep("facets", as_integer("facets", self.facets, 3, MAX_FACETS))
         self._keep("nod", as_positive("nod", self.nod, "rad", True, 0.5 * math.pi))
         fraction = as_positive("torque_fraction", self.torque_fraction, maximum=1.0)
         self._keep("torque_fraction", fraction)

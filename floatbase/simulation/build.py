@@ -23,7 +23,7 @@ from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-# friction is made stiffer relative to the normal force: feet creep less under a steady load
+# of friction to the normal force: stiffer friction makes feet creep less under a steady load
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
@@ -35,11 +35,11 @@ _CONTACT_IMPEDANCE = (
     2.0,
 )  # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
-# s in which a link that was below the ground before collisions were on comes out
+# s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
 # m: a flat foot stands on small balls whose lowest points are its corners
 _CORNER_BALL_RADIUS = 0.005
-# m: MuJoCo has no balls of radius 0, which is the radius of a foot that is a point
+# m: MuJoCo has no balls of radius 0, which is the radius of a foot without a size
 _MIN_BALL_RADIUS = 1e-4
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero (mjMINVAL)
 # relative: for a thin plate the triangle inequality of principal inertias is an equality, up to
@@ -233,7 +233,7 @@ def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
     if body.explicitinertial:  # else the URDF gives none
         ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(
             body.fullinertia
-        )  # MuJoCo notes NaN for a tensor of zeros
+        )  # MuJoCo stores NaN for a tensor of zeros
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
         tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
         inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor

@@ -152,8 +152,8 @@ class LiveSimulation:
     def pause(self) -> None:
         """Pause after the present slice; `start` continues from there.
 
-        The status of a run that has ended does not change, but a robot that is falling stops in
-        mid-air.
+        The status of a run that has ended does not change, but a robot that is still falling stops
+        in mid-fall.
         """
         with self._lock:
             self._stop.set()

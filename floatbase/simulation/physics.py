@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     cross,
+    refuse_new_attributes,
 )
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError
@@ -31,10 +32,10 @@ from floatbase.simulation.push import Push, as_pushes
 _FALLEN_HEIGHT_FRACTION = 0.4
 _FALLEN_COSINE = float(
     np.cos(np.deg2rad(60.0))
-)  # of the base's tilt since the last reset: no leg brings it back from there
+)  # of the base's tilt since the last reset: no leg can recover from more
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
-_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and a contact's time constant is 4 ms
+_MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
 )  # after this warning of MuJoCo or a later one, its numbers are meaningless
@@ -81,6 +82,7 @@ class Simulation:
     """
 
     _example = "fb.Simulation(robot)"
+    __setattr__ = refuse_new_attributes
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self._robot = as_instance("robot", robot, Robot)
@@ -93,7 +95,7 @@ class Simulation:
         self._actuator_ids = np.array(
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
-        self.foot_contacts = FootContacts(self.model, self.ground, self.point_names)
+        self._foot_contacts = FootContacts(self.model, self.ground, self.point_names)
         self._planes = list(
             zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
         )
@@ -163,6 +165,11 @@ class Simulation:
     def point_names(self) -> tuple[str, ...]:
         """Names of the robot's contact points: point feet, and corners of flat feet."""
         return self.feet.point_names
+
+    @property
+    def foot_contacts(self) -> FootContacts:
+        """Reader of the feet's contacts."""
+        return self._foot_contacts
 
     @property
     def time(self) -> float:

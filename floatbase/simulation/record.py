@@ -28,7 +28,7 @@ Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
 @dataclass(frozen=True, eq=False)
 class Rollout(Value):
-    """Record of a simulation run, with one row for each of n control steps; it cannot be changed.
+    """Read-only record of a simulation run, with one row for each of n control steps.
 
     Times and states are those at the beginning of each control step. Torques and measured forces
     are means over the control step.
@@ -72,10 +72,6 @@ class Rollout(Value):
         Time at which the controller was switched off after a fall or a failure [s], otherwise None.
         With a settling time, the rollout has rows from then on: `tau_desired` is the joint damping
         and `planned` is NaN.
-
-    Notes
-    -----
-    The NumPy arrays are read-only.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -168,8 +164,8 @@ class Rollout(Value):
     def slip(self, include_rolling: bool = True) -> Array:
         """Compute the largest distance of each contact point from where its stance began.
 
-        A point is in stance while the controller's contacts include it. Points that never were have
-        0.
+        A point is in stance while the controller's contacts include it. Points that were never in
+        stance have 0.
 
         Parameters
         ----------

@@ -297,7 +297,7 @@ def _run_substeps(
         if actuators is not None:
             tau = _as_torques(
                 sim,
-                "the actuators' torques",
+                "The actuators' torques",
                 actuators.step(desired, *sim.joint_state, sim.timestep),
             )
         sim.advance(tau, pushes)
@@ -312,7 +312,7 @@ def _desired_torques(sim: Simulation, command: Any) -> Array:
             f"[N·m], such as a Command or types.SimpleNamespace(tau=…). This one returned "
             f"{command!r}."
         )
-    return _as_torques(sim, "the controller's torques", command.tau)
+    return _as_torques(sim, "The controller's torques", command.tau)
 
 
 def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
@@ -338,8 +338,8 @@ def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
             False
         )
         raise _NonFiniteTorques(
-            f"The torque of joint {sim.robot.joint_names[i]} in {name} is {entries[i]} at "
-            f"{sim.time:.3f} s. All torques must be finite numbers."
+            f"{name} contain {entries[i]} for joint {sim.robot.joint_names[i]} at {sim.time:.3f} "
+            f"s. All torques must be finite numbers."
         ) from None
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
 _POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
 _MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep
-_PARENT_CHECK_PERIOD = 1.0  # s between checks that the program that sweeps is still alive
+_PARENT_CHECK_PERIOD = 1.0  # s between checks that the program that runs the sweep is alive
 _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
 _SINGLE_THREAD_ENV = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -68,7 +68,7 @@ def sweep(
         fastest. Alternatively, one dict of parameters for each point.
     setup : callable, optional
         Called once in each process (on Dask once in each thread), for objects that are slow to make
-        or cannot be pickled.
+        or cannot be pickled. An exception that it raises ends the sweep, and is raised here.
     file : str or Path, optional
         Path of a JSON Lines file to which each row is written as it finishes. Running the same
         sweep with the same file resumes it, even after it was killed; at most two points for each

@@ -1,6 +1,4 @@
-"""Gaits, swings, the pendulum and footholds: what their definitions promise, by finite differences
-and closed forms.
-"""
+"""Gaits, swings, the pendulum and footholds against finite differences and closed forms."""
 
 from __future__ import annotations
 
@@ -81,7 +79,7 @@ def test_stance_times_bear_the_rounding_of_the_clock() -> None:
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
     timestep, stances = 1e-3, []
     t = 0.0
-    for _ in range(20_000):  # as a simulation adds up its steps: 20 s
+    for _ in range(20_000):  # 20 s, added up as in a simulation
         stances.append(gait.stance(t))
         t += timestep
     changes = [
@@ -134,7 +132,7 @@ def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp() -> None:
             before, after = plan(t - STEP), plan(t + STEP)
             assert np.allclose((after[0] - before[0]) / (2 * STEP), v, atol=1e-6)
             assert np.allclose((after[1] - before[1]) / (2 * STEP), a, atol=1e-4)
-    for edge in times[1:]:  # position and velocity do not jump where the ZMP turns
+    for edge in times[1:]:  # position and velocity are continuous where the ZMP turns
         before, after = plan(edge - 1e-9), plan(edge + 1e-9)
         assert np.allclose(before[0], after[0], atol=1e-7) and np.allclose(
             before[1], after[1], atol=1e-7
@@ -195,7 +193,7 @@ def test_the_support_margin_is_the_distance_to_the_hull() -> None:
 
 
 def test_names_of_the_front_door_are_untouched() -> None:
-    assert not {"Gait", "Walk"} & set(fb.__all__)  # they live in their package
+    assert not {"Gait", "Walk"} & set(fb.__all__)  # they are exported by their package only
 
 
 def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_over() -> None:
@@ -224,4 +222,4 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
     assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx(
         (3.0, 3.25)
-    )  # 30 · 0.1 is not 3: the rounding lifts it
+    )  # 30 · 0.1 is not 3 but more, due to rounding

@@ -1,8 +1,7 @@
-"""`Walk` and `Stand` on MuJoCo: the figures that were reached, and the falls on the way there, each
-with its name.
+"""`Walk` and `Stand` in MuJoCo: what they achieve, and one test for each fall during development.
 
-All run with a control period of 2 ms; `benchmarks/walking.py` has the long runs, 1 ms, and thirty
-pushes each.
+All run with a control period of 2 ms. `benchmarks/walking.py` has the long runs, a period of 1 ms,
+and thirty pushes each.
 """
 
 from __future__ import annotations
@@ -42,13 +41,13 @@ def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollou
 
 @cache
 def trot(push: float = 0.0) -> tuple[Rollout, Walk]:
-    """go2 trots forwards at 0.3 m/s from 1 s on, and is pushed to the left for 0.1 s at 2.5 s."""
+    """Let go2 trot forwards at 0.3 m/s from 1 s on, and push it to the left for 0.1 s at 2.5 s."""
     walk = walk_of("go2", Gait.trot, (0.3, 0.0))
     return run(walk, 5.0, *([fb.Push([0.0, push, 0.0], start=2.5)] if push else [])), walk
 
 
 def tilt(record: Rollout) -> float:
-    """The largest angle between the base's and the world's vertical, degrees."""
+    """Return the largest angle between the base's vertical and the world's, in degrees."""
     x, y = record.q[:, 3], record.q[:, 4]
     return float(np.rad2deg(np.arccos(1.0 - 2.0 * (x**2 + y**2)).max()))
 
@@ -192,7 +191,7 @@ def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float,
     push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
     assert (
         run(stand, 2.0, push).outcome == "completed"
-    )  # it fell at 230 N, which standing alone survives
+    )  # it used to fall at 230 N, which it survives without a step
     assert next(step.stance for step in stand.history if len(step.stance) == 2) == (
         "FL_foot",
         "RR_foot",
@@ -244,7 +243,7 @@ def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
     command = soft(moving.q, moving.v)
     assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6)
     held = fb.equations_of_motion(moving, contacts)
-    assert np.abs(held.A @ command.qdd - held.b).max() > 0.1  # m/s² and rad/s²: they do give way
+    assert np.abs(held.A @ command.qdd - held.b).max() > 0.1  # m/s² and rad/s²: they are soft
     rest = held.M @ command.qdd + held.h - held.S @ command.tau - held.J.T @ command.forces
     assert np.abs(rest).max() < 1e-6 * robot.weight
 
@@ -302,10 +301,10 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
             assert all(
                 np.sign(at[foot][1]) == np.sign(robot.standing().point(foot)[1]) for foot in feet
             )
-    assert np.abs(ways[0] - ways[1]).max() < 0.02  # m, of 0.3: what rounds otherwise grows
+    assert np.abs(ways[0] - ways[1]).max() < 0.02  # m, of 0.3: differences in rounding grow
 
 
-# the falls on the way, each a test ----------------------------------------------------------------
+# one test for each fall during development -------------------------------------------------------
 
 
 def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
@@ -318,10 +317,10 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
         if step.time > 1.5
     )
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
-    assert record.outcome == "completed"  # limited about the plan it falls
+    assert record.outcome == "completed"  # it falls if footholds are limited around the plan
     assert (
         reach < leg + walk.reach + 0.05
-    )  # from the body; from the plan they would be where the push has led it
+    )  # relative to the body, which the push has moved away from the plan
 
 
 def test_a_stance_with_area_does_not_throw_its_feet_away() -> None:
@@ -363,7 +362,7 @@ def test_endless_standing_has_an_end_to_plan_for() -> None:
 def test_the_path_gives_way_after_a_long_step() -> None:
     (calm, _), (record, _) = trot(), trot(200.0)
     moved = record.com[-1, 1] - calm.com[-1, 1]
-    assert moved > 0.1  # it goes on where it was pushed to, and does not run back
+    assert moved > 0.1  # it continues from where it was pushed, and does not run back
     assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(
         speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1
     )
@@ -382,11 +381,11 @@ def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> 
             assert place[2] - radius < 2e-3
 
 
-# when it begins, ends, and begins anew ------------------------------------------------------------
+# start, stop and restart --------------------------------------------------------------------------
 
 
 def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
-    """How far the centre of mass was from the plan from time `begin` on, at most, m."""
+    """Return the largest distance of the centre of mass from the plan from time `begin` on [m]."""
     steps, times = list(walk.history), [step.time for step in walk.history]
     rows = np.flatnonzero(record.time >= begin)
     plans = np.searchsorted(times, record.time[rows] + 1e-9) - 1
@@ -455,7 +454,7 @@ def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked()
         fb.rollout(sim, walk, 0.08, control_period=PERIOD)
     assert [round(step.time, 2) for step in walk.history] == [0.0, 0.1, 0.35, 0.6]
     trot = walk.gait
-    for gait in (Gait.crawl(walk.robot), trot):  # a control that is moved, and moved back
+    for gait in (Gait.crawl(walk.robot), trot):  # like a slider that is moved and moved back
         walk.gait = gait
         fb.rollout(sim, walk, 0.002, control_period=PERIOD)
     assert fb.rollout(sim, walk, 0.8, control_period=PERIOD).outcome == "completed"
@@ -465,7 +464,7 @@ def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked()
 def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.0), (0.3, 0.0))
     standing = walk.robot.standing()
-    walk(standing.q, standing.v)  # somebody looked at a command before
+    walk(standing.q, standing.v)  # an earlier call, for example to look at the command
     q = np.array(standing.q)
     q[:2] += 3.0
     sim = fb.Simulation(walk.robot)
@@ -473,7 +472,7 @@ def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
     assert fb.rollout(sim, walk, 1.0, control_period=PERIOD).outcome == "completed"
     other = Stand(walk.robot, fb.Contacts.feet(walk.robot))
     fb.rollout(sim, other, 3.0, control_period=PERIOD)
-    record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # 3 s went by without it
+    record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # after 3 s without a call
     assert (
         record.outcome == "completed"
         and tilt(record) < 0.5
@@ -499,7 +498,7 @@ def test_a_least_normal_force_bounds_the_ramps() -> None:
     assert planned[planned > 0.0].min() == pytest.approx(5.0, abs=1e-3)
 
 
-# what it is ---------------------------------------------------------------------------------------
+# properties and errors ----------------------------------------------------------------------------
 
 
 def test_a_foothold_of_ones_own_is_taken() -> None:
@@ -549,7 +548,7 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: Walk(robot, fb.Contacts.none(), trot), "FL_foot"),
         (lambda: Walk(robot, contacts, trot, speed=0.3), "speed", "facets"),
         (lambda: Walk(robot, contacts, trot, tasks=[]), "tasks", "facets"),
-        (lambda: Walk(robot, contacts, trot, velocity=(20.0, 0.0)), 20, 10),  # slips of units
+        (lambda: Walk(robot, contacts, trot, velocity=(20.0, 0.0)), 20, 10),  # wrong units
         (lambda: Walk(robot, contacts, trot, yaw_rate=30.0), "yaw_rate", 30, 10),
         (lambda: Walk(robot, contacts, trot, clearance=5.0), "clearance", 5, 1),
         (lambda: Walk(robot, contacts, trot, reach=20.0), "reach", 20, 1),
@@ -572,9 +571,11 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),
     ):
         refused(call, InputError, *named)
-    for name in ("clearance", "history", "time"):
+    refused(lambda: setattr(walk, "velocity", (100.0, 0.0)), InputError, "speed", 100)
+    assert np.array_equal(walk.velocity, (0.0, 0.0))  # a value that was refused is not kept
+    for name in ("clearance", "history", "time", "velocty"):
         with pytest.raises(AttributeError):
-            setattr(walk, name, getattr(walk, name))
+            setattr(walk, name, getattr(walk, name, 0.2))
 
 
 @pytest.mark.parametrize("name", ["anymal_kinova", "hyq", "g1"])

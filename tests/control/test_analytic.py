@@ -1,6 +1,4 @@
-"""The controller of objectives alone (§3.1): it stands, it is the optimum it claims, and it fails
-as §4 says it must.
-"""
+"""The analytic controller (§3.1): the robot stands, the answer is optimal, and fails as in §4."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ def standing(name: str) -> fb.Rollout:
 
 
 def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State:
-    """A state near standing, moving, with a velocity that the contacts allow."""
+    """Return a moving state near standing, with a velocity that the contacts allow."""
     rng = np.random.default_rng(seed)
     state = judges.load(name).standing()
     state = judges.along(state, rng.normal(size=state.robot.nv), far)
@@ -44,7 +42,7 @@ def near(name: str, seed: int, far: float = 0.03, fast: float = 0.3) -> fb.State
 
 
 def inertia_about_com(state: fb.State) -> Array:
-    """Σ R I Rᵀ + m (‖r‖² 1 - r rᵀ) over MuJoCo's bodies about their common centre."""
+    """Return Σ R I Rᵀ + m (‖r‖² 1 - r rᵀ) over MuJoCo's bodies about their centre of mass."""
     judge = judges.mujoco_of(state.robot.name).move_to(state)
     total = np.zeros((3, 3))
     centre = (judge.model.body_mass[:, None] * judge.data.xipos).sum(
@@ -58,8 +56,7 @@ def inertia_about_com(state: fb.State) -> Array:
 
 
 def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]:
-    """q̈, τ, λ and the value of the controller's objective, minimised by cvxpy over all three with
-    (7) as equalities.
+    """Return q̈, τ, λ and the controller's objective, minimized by cvxpy subject to (7).
 
     Every term is written from its formula: (22), (23), posture and torque with the default gains
     and weights.
@@ -105,8 +102,9 @@ def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]
 
 @pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
 def test_robots_of_every_kind_stand_on_objectives_alone(name: str) -> None:
-    """1.5 s in MuJoCo: too few torques (solo8), enough (go2, solo12), redundant ones
-    (anymal_kinova), flat feet (talos).
+    """1.5 s in MuJoCo with too few torques (solo8), enough (go2, solo12) and redundant ones.
+
+    anymal_kinova has redundant torques, talos has flat feet.
     """
     run, start = standing(name), judges.load(name).standing()
     assert run.outcome == "completed"
@@ -146,8 +144,9 @@ def test_it_goes_where_its_centre_of_mass_is_to_be() -> None:
 def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(
     exponent: int,
 ) -> None:
-    """solo8 with joint angles off by 1e-6 rad and 0.1 rad/s of noise: rows taken to the letter need
-    thousands of N·m.
+    """solo8 with joint angles off by 1e-6 rad and a velocity noise of 0.1 rad/s.
+
+    Enforcing all rows exactly would need thousands of N·m.
     """
     robot = judges.load("solo8")
     rng = np.random.default_rng(0)
@@ -167,8 +166,9 @@ def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lack
 def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(
     name: str, seed: int
 ) -> None:
-    """Value to 1e-6 everywhere; the answer itself too where weights of 1e-6 do not leave it to
-    rounding.
+    """The value agrees to 1e-6 everywhere.
+
+    The answer itself agrees where weights of 1e-6 determine it beyond rounding.
     """
     state, controller = near(name, seed), controller_of(name)
     command = controller(state.q, state.v)
@@ -203,8 +203,9 @@ def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
 
 
 def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same() -> None:
-    """§4: the QP is a strict generalisation. The same terms as tasks, limits far away: the same
-    torques.
+    """§4: the QP is a strict generalization.
+
+    The same terms as tasks, with limits that are never reached, give the same torques.
     """
     from floatbase.control import Limits, build_qp
     from floatbase.qp import QP, solve
@@ -232,7 +233,7 @@ def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(nam
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
-    """The sign of τ̃_c: the angular momentum planned changes against the lean."""
+    """The sign of τ̃_c: the planned change of angular momentum opposes the lean."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
     lean = np.zeros(18)
@@ -258,7 +259,7 @@ def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
 
 
 def turned(state: fb.State, yaw: float) -> fb.State:
-    """The same robot on the same ground, facing another way."""
+    """Return the same robot on the same ground, with another heading."""
     q = np.array(state.q)
     turn = pin.Quaternion(judges.rotation([0.0, 0.0, yaw]))
     q[:3] = turn.matrix() @ q[:3]
@@ -267,8 +268,9 @@ def turned(state: fb.State, yaw: float) -> fb.State:
 
 
 def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
-    """Errors of rotation are world vectors: with the held posture and the state turned together
-    nothing changes.
+    """Rotation errors are world vectors.
+
+    Rotating the desired posture and the state together changes nothing.
     """
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot)
@@ -287,9 +289,7 @@ def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
 
 @cache
 def pushed(controller: str, weights: float) -> fb.Rollout:
-    """go2 pushed sideways for 0.1 s with a part of its weight, by the analytic or the QP
-    controller.
-    """
+    """Push go2 sideways for 0.1 s with a fraction of its weight, under either controller."""
     robot = judges.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     program = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
@@ -306,8 +306,9 @@ def test_a_light_push_costs_it_nothing() -> None:
 
 
 def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> None:
-    """A foot is told to hold on by more than 1 N; MuJoCo's ground never does, and within half a
-    second the robot is down.
+    """The controller plans a pull of more than 1 N at a foot; the ground never pulls.
+
+    Within half a second the robot is down.
     """
     run = pushed("analytic", 0.5)
     asks = np.flatnonzero(run.planned[:, 2::3].min(axis=1) < -1.0)

@@ -1,4 +1,4 @@
-"""The compiled tick: when it runs, what it compiles and keeps on disk, what it does with memory."""
+"""The compiled tick: when it runs, what it compiles and keeps on disk, and its memory."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TICK = Path(tick.__file__).parent
 
 
 def tick_of(robot: Robot) -> CompiledTick:
-    """The compiled tick of a controller that stands."""
+    """Return the compiled tick of a standing controller."""
     compiled = judges.controller_of(robot.name).compiled
     assert compiled is not None
     return compiled
@@ -67,9 +67,9 @@ except fb.FloatbaseError as error:
         (
             'sys.modules["numba"] = None',
             {},
-            "numba cannot be loaded (.*); pip install numba may mend it",
+            "numba cannot be loaded (.*); reinstall it with pip install numba",
         ),
-        ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, and numba compiles nothing"),
+        ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, so numba does not compile"),
     ],
 )
 def test_without_numba_the_reference_backend_answers_and_says_why(
@@ -90,7 +90,7 @@ def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(
 ) -> None:
     robot = fb.load(
         "go2", torque_limits=20.0
-    )  # one that no other test has: what fits is remembered for each robot
+    )  # a robot of this test alone, since the result is cached for each robot
     monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "layout_supported", False)
     controller = fb.WholeBodyController(
         robot, judges.stance(robot), fb.standing_tasks(robot.standing())
@@ -129,7 +129,7 @@ def test_threads_may_share_a_controller() -> None:
 @pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
-    """The other threads, and the locks that they hold, stay behind in the middle of a tick."""
+    """Other threads and the locks that they hold do not exist in the forked process."""
     controller, state = (
         judges.controller_of("go2", backend=backend),
         judges.load("go2").random_state(3, 0.1),
@@ -152,7 +152,7 @@ def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
         child.start()
         answers.append(
             into.recv() if into.poll(10.0) else "nothing"
-        )  # s: a tick takes some milliseconds at most
+        )  # s: a tick takes at most a few milliseconds
         child.kill()
         child.join()
         if answers[-1] == "nothing":
@@ -248,7 +248,7 @@ print(tick(2.0), len(tick.stats.cache_hits))"""
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    """The folder of a copy of the package with a small entry point."""
+    """Return the folder of a copy of the package with a small entry point."""
     package = TICK.parents[1]
     copy = shutil.copytree(
         package, tmp_path / "floatbase", ignore=shutil.ignore_patterns("__pycache__", "_assets")
@@ -258,9 +258,9 @@ def copied(tmp_path: Path) -> Path:
 
 
 def run_copied(copy: Path, cache: Path | str = "") -> list[str]:
-    """A process on that copy: what it computes, and how often it loaded code.
+    """Run a process on that copy; return what it computes and how often it loaded code.
 
-    cache: numba's folder, "" where numba looks for one, and that is beside the source.
+    cache: numba's folder, "" for its default, which is beside the source.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
     done = subprocess.run(
@@ -283,10 +283,10 @@ def edit_copied(copy: Path) -> None:
     )
 
 
-def test_edited_code_is_compiled_anew_and_installed_code_is_loaded(
+def test_edited_code_is_recompiled_and_installed_code_is_loaded(
     copied: Path, tmp_path: Path
 ) -> None:
-    """The installation compiles beside the source; the users' caches are somewhere else."""
+    """The installation compiles beside the source; the users' caches are elsewhere."""
     user = tmp_path / "user"
     assert run_copied(copied) == ["6.0", "0"] and run_copied(copied) == ["6.0", "1"]
     assert run_copied(copied, user) == ["6.0", "1"]
@@ -296,7 +296,7 @@ def test_edited_code_is_compiled_anew_and_installed_code_is_loaded(
 
 
 def make_small(digest: int) -> Callable[..., int]:
-    """A function that is compiled and kept like the tick, in no time."""
+    """Return a function that is compiled and cached like the tick, but in no time."""
 
     def small(*arguments: object) -> int:
         _ = digest
@@ -307,8 +307,9 @@ def make_small(digest: int) -> Callable[..., int]:
 
 @pytest.fixture
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """Makes a controller with `make_small` as its tick, cached in tmp_path, and returns its
-    `backend_reason`.
+    """Make a controller with `make_small` as its tick, and return its `backend_reason`.
+
+    The tick is cached in tmp_path.
     """
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
 
@@ -394,7 +395,7 @@ def test_a_tick_reads_nothing_of_its_workspace_that_it_did_not_write(name: str) 
 
 
 def test_a_tick_allocates_nothing_and_says_when_its_workspace_is_too_small() -> None:
-    """Real-time code must not ask for memory; only near-singular contacts do, for an SVD."""
+    """Real-time code must not allocate memory; only near-singular contacts do, for an SVD."""
     robot = judges.load("go2")
     compiled = tick_of(robot)
     state = robot.random_state(5, 0.3)
@@ -413,8 +414,9 @@ def test_a_tick_allocates_nothing_and_says_when_its_workspace_is_too_small() -> 
 def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(
     weight: float,
 ) -> None:
-    """Forces inside the robot cost hardly anything: rounding may drive them anywhere, but no such
-    answer comes out.
+    """Internal forces cost almost nothing, so rounding may make them huge.
+
+    Such answers are rejected.
     """
     robot = judges.load("talos")
     tasks = [

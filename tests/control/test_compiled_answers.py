@@ -1,6 +1,4 @@
-"""The compiled tick against the reference backend, which is the specification: same torques, same
-verdicts, same messages.
-"""
+"""The compiled backend against the reference backend: same torques, verdicts and messages."""
 
 from __future__ import annotations
 
@@ -22,8 +20,7 @@ from floatbase.linear_algebra import null_space
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
 from floatbase.robots import Robot, State
 
-# N·m between the backends where contact rows depend on one another: the reference backend holds no
-# more digits
+# N·m between the backends if contact rows are dependent: the reference backend has no more digits
 DEPENDENT = 1e-6
 # N·m between the backends: both keep eight digits of the strongest motor's limit on
 # well-conditioned contacts
@@ -31,8 +28,9 @@ TORQUE = 1e-8
 
 
 def prove_optimal(solution: Solution) -> None:
-    """The optimality conditions of a convex problem, relative to the terms that they are sums of:
-    they prove the optimum.
+    """Check the optimality conditions of a convex problem, relative to the terms of their sums.
+
+    They prove that the answer is the optimum.
     """
     qp, x, mu, residuals = (
         solution.qp,
@@ -51,7 +49,7 @@ def prove_optimal(solution: Solution) -> None:
 
 
 def prove_all(controller: fb.WholeBodyController, states: list[State]) -> None:
-    """`prove_optimal` in all states but infeasible ones, of which there may be a few."""
+    """Apply `prove_optimal` at all states except infeasible ones, of which there may be a few."""
     proved = 0
     for state in states:
         try:
@@ -67,7 +65,7 @@ def largest(*terms: np.ndarray) -> float:
     return max(1.0, *(float(np.max(np.abs(term), initial=0.0)) for term in terms))
 
 
-# part of the terms of a sum that its rounding may be, through a Cholesky factor of condition 1e7
+# rounding of a sum, as a fraction of its terms, through a Cholesky factor of condition 1e7
 ROUNDING = 1e-9
 
 
@@ -93,9 +91,7 @@ def test_on_dependent_contact_rows_a_compiled_tick_is_optimal() -> None:
 
 
 def test_weights_of_1e_8_leave_both_backends_their_digits() -> None:
-    """Talos with corner forces that are hardly determined: DAQP alone ends 1e-6 N·m from the
-    optimum.
-    """
+    """Talos with nearly undetermined corner forces: DAQP alone ends 1e-6 N·m from the optimum."""
     robot = judges.load("talos")
     tasks = [
         *fb.standing_tasks(robot.standing()),
@@ -107,7 +103,7 @@ def test_weights_of_1e_8_leave_both_backends_their_digits() -> None:
 
 
 def resolution(robot: Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
-    """The least singular value of A in (5), relative to the largest."""
+    """Return the smallest singular value of A in (5), relative to the largest."""
     s = np.linalg.svd(
         fb.equations_of_motion(State(robot, q, np.zeros(robot.nv)), contacts).A, compute_uv=False
     )
@@ -115,8 +111,9 @@ def resolution(robot: Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
 
 
 def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
-    """The state in which `resolution` is `value`, on the way from standing, where A loses rank,
-    through `state`.
+    """Return the state with this `resolution` on the line from standing through `state`.
+
+    A loses rank at standing.
     """
     robot, low, high = state.robot, 0.0, 1.0
     away = pin.difference(robot.model, robot.standing().q, state.q)
@@ -139,8 +136,9 @@ def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
 def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(
     share: float,
 ) -> None:
-    """solo8 on three feet, with the least singular value of A on either side of
-    CONSTRAINT_RANK_TOLERANCE.
+    """solo8 on three feet: the smallest singular value of A on either side of the tolerance.
+
+    The tolerance is CONSTRAINT_RANK_TOLERANCE.
     """
     robot = judges.load("solo8")
     contacts = fb.Contacts.points(robot).without(robot.feet[3].frame)
@@ -295,7 +293,7 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
 
 
 def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
-    """Pinocchio's Jacobians of one joint have one dimension less."""
+    """Pinocchio's Jacobians of one joint have one dimension fewer."""
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(
         f'<robot name="pendulum">{LINK.format("wall")}{LINK.format("bob")}'
@@ -323,8 +321,8 @@ def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
 # the same verdicts and messages -------------------------------------------------------------------
 
 
-def test_infeasible_problems_are_told_by_both_with_the_same_rows() -> None:
-    """Legs whose motors cannot push with ten times the robot's weight each."""
+def test_infeasible_problems_are_reported_by_both_with_the_same_rows() -> None:
+    """The motors cannot push with ten times the robot's weight at each leg."""
     robot = judges.load("solo12")
     both = judges.pair(robot, judges.stance(robot), min_normal_force=10.0 * 9.81 * robot.mass)
     for state in judges.near_and_far("solo12", 4):
@@ -334,9 +332,7 @@ def test_infeasible_problems_are_told_by_both_with_the_same_rows() -> None:
 
 
 def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference_backend() -> None:
-    """solo8 on four feet: a velocity that J forgives to first order is forbidden by its curvature,
-    J̇ v.
-    """
+    """solo8 on four feet: J allows a velocity to first order, but its curvature J̇ v forbids it."""
     robot = judges.load("solo8")
     compiled, reference = judges.pair(robot, judges.stance(robot))
     state = robot.standing()
@@ -390,7 +386,7 @@ def test_a_bad_target_is_refused_in_the_same_words(target: object) -> None:
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
 def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> None:
-    """All joints but one are limited to nine tenths of the largest torque that they would take."""
+    """All joints but one are limited to nine tenths of the largest torque that they would need."""
     robot = judges.load(name)
     free, _ = judges.pair(robot, judges.stance(robot), torque_limits=np.inf)
     limited = np.arange(robot.d) != 4
@@ -407,9 +403,7 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> 
         assert r.dual == 0.0
         assert found.solution.objective == pytest.approx(expected.solution.objective, rel=1e-9)
         assert np.allclose(found.solution["forces"], found.forces)
-        if (
-            name == "go2"
-        ):  # a flat foot's four corners share one wrench: rows can depend on one another
+        if name == "go2":  # a flat foot's four corners share one wrench: rows can be dependent
             assert set(found.active) == set(expected.active)
             for row, multiplier in expected.multipliers.items():
                 assert found.multipliers[row] == pytest.approx(multiplier, rel=1e-5, abs=1e-7)
@@ -433,7 +427,7 @@ def test_a_command_keeps_its_numbers_when_the_state_moves_on() -> None:
 # which backend runs -------------------------------------------------------------------------------
 
 
-def test_the_path_is_visible_and_can_be_chosen() -> None:
+def test_the_backend_is_visible_and_can_be_chosen() -> None:
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     state = robot.standing()
@@ -483,9 +477,7 @@ def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend(
 
 
 def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
-    """As when two threads share a controller: one tick's targets must not reach the other's
-    problem.
-    """
+    """Two threads may share a controller: one tick's targets must not reach the other's problem."""
     robot = judges.load("go2")
     state, com = robot.standing(), robot.standing().com
 
@@ -541,9 +533,7 @@ def test_a_controller_can_be_copied_and_sent_to_another_process(backend: str) ->
 def test_weights_far_apart_give_the_optimum_or_the_reference_backend(
     name: str, weight: float
 ) -> None:
-    """Rounding in the search can end it at wrong active rows: Newton's method shows that, and the
-    search goes on.
-    """
+    """Rounding can end the search at the wrong active set: Newton's method detects it."""
     robot = judges.load(name)
     at = robot.standing()
     contacts = fb.Contacts.points(robot, mu=0.4, frames=[foot.frame for foot in robot.feet][:3])

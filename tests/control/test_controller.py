@@ -1,6 +1,4 @@
-"""The whole-body controller (26)(27): judged by cvxpy, by the articulated-body algorithm and by
-closed forms.
-"""
+"""The whole-body controller (26)(27) against cvxpy, forward dynamics and closed forms."""
 
 from __future__ import annotations
 
@@ -20,12 +18,12 @@ from floatbase.robots import State
 # of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on
 # anymal_kinova
 SAG = 2e-3
-# of the friction coefficient 0.3: a force at its limit may lean a little aside of the wish
+# of the friction coefficient 0.3: a force at its limit may deviate slightly from the desired one
 ASIDE = 5e-3
 
 
 def cases(name: str, n: int) -> list[State]:
-    """Half the states near standing, half far away, where many rows are active."""
+    """Return states, half of them near standing, half far away with many active inequalities."""
     return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
 
 
@@ -68,7 +66,7 @@ def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: s
 
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) -> None:
-    """By differences of the rolling feet's centres, whose velocity ω × r n a rolling ball has."""
+    """Finite differences of the rolling feet's centres, which move with ω × r n."""
     controller = judges.controller_of(name)
     for state in judges.states(name, 3, 0.2) if name != "solo8" else []:
         command = controller(state.q, state.v)
@@ -145,7 +143,7 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) 
 
 
 def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
-    """(1) τ = M (-kp e - kd ė) + h, the closed form, when nothing limits it."""
+    """Without active limits, (1) gives τ = M (-kp e - kd ė) + h in closed form."""
     robot = judges.load("ur5")
     target = robot.standing().q
     task = fb.PostureTask(target, kp=30.0, kd=4.0, weight=1e6)
@@ -181,9 +179,7 @@ def test_tasks_are_met_when_nothing_limits_them() -> None:
 
 
 def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
-    """Newton: the body cannot be accelerated sideways by more than μ g while the feet carry its
-    weight.
-    """
+    """Newton: the sideways acceleration is at most μ g while the feet carry the weight."""
     robot = judges.load("go2")
     state = robot.standing()
     tasks = [
@@ -206,8 +202,9 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
 def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
     backend: str,
 ) -> None:
-    """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides, out of
-    which forwards is one.
+    """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides.
+
+    Without rotation, one of the sides faces forwards.
     """
     robot = judges.load("go2")
     state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.3)
@@ -229,8 +226,9 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
 
 
 def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled() -> None:
-    """Outside, every second of 2 n facets is one of n; inside, n and 2 n facets have other edges,
-    neither holds the other.
+    """Every second one of 2 n outer facets is one of n facets.
+
+    Inner polyhedra of n and 2 n facets have different edges, so neither contains the other.
     """
     for state in judges.states("go2", 5, 0.3):
         outside = [
@@ -367,9 +365,7 @@ def test_anything_of_the_form_of_a_task_is_a_task() -> None:
 def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(
     name: str,
 ) -> None:
-    """J loses rank on solo8: then A q̈ = b is met in the least-squares sense, and exactly wherever
-    that is possible.
-    """
+    """J of solo8 loses rank: A q̈ = b holds in the least-squares sense, exactly where possible."""
     controller = judges.controller_of(name)
     for state in judges.states(name, 5, 0.3):
         eom = fb.equations_of_motion(state, controller.contacts)
@@ -478,7 +474,7 @@ def test_limits_keep_their_own_copy() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_command_tells_the_force_of_a_foot_and_prints_in_one_line(backend: str) -> None:
+def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend: str) -> None:
     robot = judges.load("talos")
     contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
     command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend=backend)(

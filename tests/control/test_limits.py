@@ -1,5 +1,6 @@
-"""User-defined rows and bounds of normal forces: kept on both backends, told when they conflict,
-refused where they do not fit.
+"""User-defined inequalities and bounds of normal forces on both backends.
+
+They are respected, named when they conflict, and refused if they do not fit.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from floatbase.robots import Robot
 
 
 def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequality]:
-    """Joint accelerations, the sum of the normal forces, and a mix of torques that shrinks with
-    time.
+    """Return limits of joint accelerations, of the total normal force and of a torque combination.
+
+    The last one shrinks with time.
     """
     E, up = np.eye(robot.nv)[robot.nv - robot.d :], np.zeros((1, contacts.k))
     up[0, contacts.point_force_indices[2::3]] = 1.0
@@ -46,7 +48,7 @@ def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequal
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_rows_of_ones_own_hold_and_have_their_names_on_both_backends(name: str) -> None:
+def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(name: str) -> None:
     robot = judges.load(name)
     contacts = judges.stance(robot)
     inequalities = user_inequalities(robot, contacts)
@@ -65,13 +67,13 @@ def test_rows_of_ones_own_hold_and_have_their_names_on_both_backends(name: str) 
         for each in inequalities:
             G, h = each.at(eom, t)
             assert np.all(G @ command.solution[each.block] <= h + 1e-6)
-        if name != "talos":  # four corners share one wrench: rows can depend on one another
+        if name != "talos":  # four corners share one wrench: rows can be dependent
             assert command.active == expected.active
         kinds |= {row.kind for row in command.active} | {row.owner for row in command.active}
     assert {"acceleration limit", "total force", "joined torques"} <= kinds
 
 
-def test_rows_of_ones_own_against_cvxpy() -> None:
+def test_user_defined_inequalities_against_cvxpy() -> None:
     robot = judges.load("go2")
     contacts = judges.stance(robot)
     controller = judges.pair(
@@ -86,7 +88,7 @@ def test_rows_of_ones_own_against_cvxpy() -> None:
         assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
 
 
-def test_rows_in_conflict_are_told_by_their_names() -> None:
+def test_conflicting_inequalities_are_reported_by_name() -> None:
     robot = judges.load("go2")
     light = LinearInequality("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
     for controller in judges.pair(
@@ -140,7 +142,7 @@ def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> No
 
 
 class Heel(PointContact):
-    """A contact with a name of its own, which is no frame's."""
+    """A contact whose name is not the name of a frame."""
 
     name = "heel"
 
@@ -181,11 +183,11 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str
     with raises(UnknownNameError, "min_normal_force", "heel"):
         torques(
             swing, **bounds
-        )  # a new controller knows the robot's feet, and no other contact that is not there
+        )  # a new controller knows the robot's feet, but no other absent contact
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_bound_that_is_a_function_is_asked_once_at_a_time(backend: str) -> None:
+def test_a_time_varying_bound_is_evaluated_once_at_a_time(backend: str) -> None:
     robot = judges.load("go2")
     asked: list[float] = []
     bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
@@ -201,7 +203,7 @@ def test_a_bound_that_is_a_function_is_asked_once_at_a_time(backend: str) -> Non
     assert asked == [0.0, 0.5, 0.0]
 
 
-def test_a_bound_that_goes_wrong_is_told_on_both_backends() -> None:
+def test_a_bound_that_goes_wrong_is_reported_on_both_backends() -> None:
     robot = judges.load("go2")
     bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
     for controller in judges.pair(robot, judges.stance(robot), [], max_normal_force=bound):

@@ -1,6 +1,4 @@
-"""What tasks, limits and controllers refuse: the type of each error, and the names and numbers in
-it.
-"""
+"""Errors of tasks, limits and controllers: their types, and the names and numbers in them."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ UP = [0.0, 0.0, 1.0]
 
 
 class Own:
-    """A user-defined task, whose parts a test leaves out or makes wrongly."""
+    """A user-defined task, with attributes that a test removes or replaces."""
 
     def __init__(self, without: str = "", residual: object = None):
         parts = {
@@ -321,7 +319,9 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
     refused(*case)
 
 
-def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_that() -> None:
+def test_the_error_of_a_trajectory_that_begins_later_explains_why_it_was_evaluated_at_zero() -> (
+    None
+):
     def later(t: float) -> np.ndarray:
         if t < 1.0:
             raise ArithmeticError(f"nothing at {t}")
@@ -338,8 +338,8 @@ def test_a_trajectory_that_does_not_begin_at_zero_is_told_why_it_was_asked_for_t
 
 
 @pytest.mark.parametrize("number", ["10", np.array(10.0), np.float32(10.0), 10])
-def test_a_number_in_another_dress_is_a_number_or_is_refused(number: object) -> None:
-    """Gains and weights that pass their check can be computed with."""
+def test_a_number_of_another_type_is_used_or_refused(number: object) -> None:
+    """Gains and weights that pass their check can be used in computations."""
     try:
         task = fb.CoMTask(UP, kp=number, kd=number, weight=number)
     except InputError:
@@ -355,3 +355,9 @@ def test_what_a_controller_was_made_with_cannot_be_set(name: str) -> None:
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
         with raises(AttributeError, name):
             setattr(one, name, getattr(one, name))
+
+
+@pytest.mark.parametrize("name", ["task", "facets", "torque_limits", "on_infeasible"])
+def test_a_controller_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+    with raises(AttributeError, name):
+        setattr(controller(fb.ForceTask(), backend="reference"), name, 3)

@@ -17,7 +17,7 @@ PARTS = ("H", "g", "A", "b", "G", "h")
 
 
 def with_even_knees(qp: QP, eom: fb.EquationsOfMotion) -> QP:
-    """A row that couples torques: both front knees give the same."""
+    """Add a row that couples torques: both front knees have the same torque."""
     first, second = (eom.robot.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR"))
     row = np.zeros((1, qp.n))
     row[0, qp.blocks["tau"]][[first, second]] = 1.0, -1.0

@@ -1,6 +1,4 @@
-"""Tasks and user-defined constraints: the same answers on both backends, and the words for what is
-wrong with them.
-"""
+"""User-defined tasks and constraints: the same answers on both backends, and their errors."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ from floatbase.robots import Robot, State
 
 @dataclass
 class MyCoM:
-    """What `fb.CoMTask` is, as a user writes it."""
+    """`fb.CoMTask` as a user would write it."""
 
     target: np.ndarray
     weight: float = 10.0
@@ -40,7 +38,7 @@ class MyCoM:
 
 @dataclass
 class MyHand:
-    """What `fb.FrameTask` is, as a user writes it; the target moves with 0.1 m/s."""
+    """`fb.FrameTask` as a user would write it; the target moves at 0.1 m/s."""
 
     frame: str
     target: np.ndarray
@@ -60,9 +58,7 @@ class MyHand:
 
 @dataclass
 class MyEffort:
-    """Forces and torques that share a load: rows on λ, or on τ, with a matrix that couples their
-    entries.
-    """
+    """Forces or torques that share a load: rows on λ or τ, with a matrix that couples entries."""
 
     block: str
     weight: float = 1e-3
@@ -80,7 +76,7 @@ HANDS = {"go2": "FL_foot", "solo12": "FL_FOOT", "talos": "gripper_left_base_link
 
 
 def stance(robot: Robot) -> fb.Contacts:
-    """The feet that stand, without the one that serves as a hand."""
+    """Return the contacts of the feet, without the one that serves as a hand."""
     contacts = judges.stance(robot)
     return contacts.without(HANDS[robot.name]) if HANDS[robot.name] in contacts.names else contacts
 
@@ -89,7 +85,7 @@ def stance(robot: Robot) -> fb.Contacts:
 
 
 @pytest.mark.parametrize("name", HANDS)
-def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: str) -> None:
+def test_a_user_defined_task_does_what_the_same_built_in_task_does(name: str) -> None:
     robot = judges.load(name)
     at, frame, contacts = robot.standing(), HANDS[robot.name], stance(robot)
     hand = at.point(frame) + [0.0, 0.0, 0.05]
@@ -110,7 +106,7 @@ def test_a_task_of_ones_own_does_what_the_same_task_of_the_package_does(name: st
     assert active > 8, "nothing was saturated: these states try nothing"
 
 
-def test_tasks_of_ones_own_on_torques_and_forces() -> None:
+def test_user_defined_tasks_on_torques_and_forces() -> None:
     robot = judges.load("go2")
     tasks = [
         *fb.standing_tasks(robot.standing()),
@@ -127,7 +123,7 @@ def test_tasks_of_ones_own_on_torques_and_forces() -> None:
 
 @dataclass
 class Looks:
-    """A task that keeps what it saw, and may have any number of rows."""
+    """A task that keeps what it sees, and may have any number of rows."""
 
     seen: list[EquationsOfMotion]
     rows: int = 2
@@ -141,7 +137,7 @@ class Looks:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_later(
+def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(
     name: str,
 ) -> None:
     robot = judges.load(name)
@@ -150,7 +146,7 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
     controller = fb.WholeBodyController(
         robot, contacts, [*fb.standing_tasks(robot.standing()), Looks(seen)], backend="compiled"
     )
-    states = judges.states(name, 5)  # more than the spare memory of a robot
+    states = judges.states(name, 5)  # more than a robot's cached memory holds
     seen.clear()
     for state in states:
         controller(state.q, state.v)
@@ -191,7 +187,7 @@ def test_a_task_of_ones_own_sees_the_equations_of_motion_which_do_not_change_lat
 
 
 def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> None:
-    """Its memory serves the states of later ticks."""
+    """The memory of a state is reused by states of later ticks."""
     robot = judges.load("go2")
     seen: list[EquationsOfMotion] = []
     controller = judges.pair(
@@ -200,7 +196,7 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> No
     parts = ("M", "h", "com", "com_velocity", "com_jacobian", "com_drift", "joint_transforms")
 
     def arrays(state: State) -> list[np.ndarray]:
-        """All that the state of a new tick says."""
+        """Return all arrays that the state of a new tick provides."""
         seen.clear()
         controller(state.q, state.v)
         at = seen.pop().state
@@ -233,12 +229,12 @@ def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
         ) < judges.agreement(robot)
 
 
-def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -> None:
+def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_on() -> None:
     robot = judges.load("go2")
     task, slider, pull = MyCoM(np.array(robot.standing().com)), {"bound": 40.0}, np.ones(1)
 
     class Drive(LinearConstraint):
-        """One that gives away the array that it works in."""
+        """A constraint that returns the array that it works in."""
 
         def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             return np.eye(18)[6:7], pull
@@ -272,7 +268,7 @@ def test_the_solution_is_that_of_the_tick_when_what_is_ones_own_has_moved_on() -
     assert np.allclose(solution["tau"], command.tau)
 
 
-def test_threads_may_share_a_controller_whose_task_asks_another_controller() -> None:
+def test_threads_may_share_a_controller_whose_task_calls_another_controller() -> None:
     robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
     inner = judges.controller_of("go2", backend="compiled")
 
@@ -281,7 +277,7 @@ def test_threads_may_share_a_controller_whose_task_asks_another_controller() -> 
             found = super().residual(eom, t)
             inner(
                 eom.state.replace(v=np.zeros(18)).q, np.zeros(18)
-            )  # which runs a tick of the same robot
+            )  # this runs a tick of the same robot
             return found
 
     tasks = [Nested(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
@@ -325,7 +321,7 @@ def _fail() -> object:
         (_fail, RuntimeError, ("the sensor is gone",)),
     ],
 )
-def test_a_task_that_goes_wrong_is_told_on_both_backends(
+def test_a_task_that_goes_wrong_is_reported_on_both_backends(
     later: Callable[[], object], kind: type[Exception], named: tuple[str | float, ...]
 ) -> None:
     robot = judges.load("go2")
@@ -367,7 +363,7 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
     assert not recorder.buffer
 
 
-def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_end() -> None:
+def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_end() -> None:
     psutil = pytest.importorskip("psutil")
     robot = judges.load("go2")
     tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
@@ -382,15 +378,16 @@ def test_ten_thousand_ticks_with_a_task_of_ones_own_take_no_more_memory_at_the_e
         return psutil.Process().memory_info().rss / 1e6
 
     before = resident(2_000)
-    assert resident(10_000) - before < 2.0  # MB: one array that stays of each tick would be more
+    assert resident(10_000) - before < 2.0  # MB: one array kept per tick would take more
 
 
 # constraints --------------------------------------------------------------------------------------
 
 
 def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
-    """Some joints that accelerate as a function of time says, by rows of which no two have the same
-    unit.
+    """Return a constraint that gives some joints accelerations as a function of time.
+
+    No two of its rows have the same unit.
     """
     rows = np.eye(robot.nv)[joints] * (1.0 + np.arange(len(joints)))[:, None]
     return fb.Contacts(
@@ -403,7 +400,7 @@ def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> None:
+def test_user_defined_constraints_are_kept_with_the_same_torques(name: str) -> None:
     robot = judges.load(name)
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
@@ -428,7 +425,7 @@ def test_constraints_of_ones_own_are_kept_with_the_same_torques(name: str) -> No
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(backend: str) -> None:
+def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend: str) -> None:
     robot = judges.load("go2")
     asked: list[float] = []
     held = LinearConstraint(
@@ -444,7 +441,7 @@ def test_a_constraint_of_ones_own_is_asked_once_in_a_tick(backend: str) -> None:
 
 
 def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
-    """λ acts on two joints, and holds one of them."""
+    """λ acts on two joints, and the rows constrain one of them."""
 
     class Coupled(LinearConstraint):
         def jacobian(self, state: State, t: float = 0.0) -> np.ndarray:
@@ -459,8 +456,9 @@ def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
 
 
 class Reuses(PointContact):
-    """A contact that writes all its answers into the same arrays; its rows are twice those of a
-    point, and hold the same.
+    """A contact that returns the same arrays every time; its rows are twice those of a point.
+
+    Both sets of rows express the same constraint.
     """
 
     rows, right_side = np.zeros((3, 18)), np.zeros(3)
@@ -475,7 +473,7 @@ class Reuses(PointContact):
         return self.rows
 
 
-def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
+def test_user_defined_contacts_may_write_into_the_same_arrays_again() -> None:
     robot = judges.load("go2")
     others, frames = (
         fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]),
@@ -494,7 +492,7 @@ def test_contacts_of_ones_own_may_write_into_the_same_arrays_again() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(backend: str) -> None:
+def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(backend: str) -> None:
     class Short(PointContact):
         def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             A, b = super().constraint(state, t)
@@ -505,9 +503,9 @@ def test_a_contact_of_ones_own_whose_shapes_do_not_fit_together_is_told_so(backe
         fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], backend=backend)
 
 
-def test_a_rolling_wheel_and_a_contact_of_ones_own_carry_forces_in_their_cones() -> None:
+def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones() -> None:
     class MyPoint(PointContact):
-        """A subclass: of another kind, so the tick asks it as it asks a user's."""
+        """A subclass of a built-in contact, which the tick treats as user-defined."""
 
     robot = judges.load("go2")
     feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot"])

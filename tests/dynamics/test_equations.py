@@ -127,3 +127,11 @@ def test_matrices_are_computed_on_first_use_and_can_be_replaced() -> None:
     assert heavy.J is eom.J and heavy.b is eom.b
     with raises(TypeError, "mass"):
         replace(eom, mass=2.0)
+
+
+def test_tau_and_forces_have_the_size_of_the_matrices_that_were_given() -> None:
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    other = replace(eom, S=np.eye(eom.nv), J=eom.J[:3])
+    assert (other.d, other.k) == (eom.nv, 3)
+    assert other.acceleration(np.ones(eom.nv), np.zeros(3)).shape == (eom.nv,)

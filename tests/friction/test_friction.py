@@ -1,6 +1,4 @@
-"""The force taken apart, the exact cone, its projection, and what the polyhedron adds to rows and
-rays.
-"""
+"""Components of a force, the exact cone, its projection, and the facets and edges of polyhedra."""
 
 from __future__ import annotations
 
@@ -33,7 +31,7 @@ def any_normal(rng: np.random.Generator) -> Array:
 
 
 def any_force(rng: np.random.Generator) -> Array:
-    """A force of any direction, from 1 mN to 10 kN."""
+    """Return a force of any direction, from 1 mN to 10 kN."""
     return rng.normal(size=3) * 10.0 ** rng.uniform(-3, 4)
 
 
@@ -115,8 +113,9 @@ def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97() -> None:
 @settings(max_examples=25)
 @given(seeds, facets, mus, st.booleans())
 def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, inside: bool) -> None:
-    """The largest push in any direction, cut off at normal component 1, is the same over the rows
-    and over the rays.
+    """The largest force in any direction is the same over the rows and over the rays.
+
+    The set is cut off at normal component 1.
     """
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
@@ -158,7 +157,7 @@ def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_i
 
 
 def slips(force: Array, normal: Array, mu: float) -> float:
-    """α∥ - μ α⊥ of (28), N: how far a force is outside the exact cone."""
+    """Return α∥ - μ α⊥ of (28) in N: how far a force lies outside the exact cone."""
     pressing = float(normal @ force)
     return float(np.linalg.norm(force - pressing * normal)) - mu * pressing
 
@@ -246,7 +245,7 @@ def test_tangents_are_right_handed_with_the_normal(seed: int) -> None:
 
 
 def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parameter, cp.Variable]:
-    """The exact second-order cone, written once for any normal and μ."""
+    """Return the projection onto the exact second-order cone, written for any normal and μ."""
     x, f = cp.Variable(3), cp.Parameter(3)
     tangential, pressing = cp.Parameter((3, 3)), cp.Parameter(3)
     problem = cp.Problem(cp.Minimize(cp.sum_squares(x - f)), [cp.SOC(pressing @ x, tangential @ x)])
@@ -264,7 +263,7 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
         problem.solve(solver=cp.CLARABEL)
         found = cone.project(f.value)
         assert np.allclose(found, x.value, atol=2e-5)
-        # the judge stops within its tolerance: ours must not be farther away
+        # cvxpy stops within its tolerance: our result must not be farther away
         assert np.linalg.norm(found - f.value) <= np.linalg.norm(x.value - f.value) + 1e-7
         cases.add(
             "inside" if np.array_equal(found, f.value) else "surface" if np.any(found) else "apex"
@@ -276,8 +275,9 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
 def test_a_projection_is_the_nearest_point_of_the_cone(
     seed: int, n: int, mu: float, inside: bool
 ) -> None:
-    """Moreau: p in K, (f - p) · p = 0, (f - p) · k ≤ 0 for all k in K; together they make p the
-    nearest point.
+    """Moreau: three conditions make p the nearest point.
+
+    p in K, (f - p) · p = 0, and (f - p) · k ≤ 0 for all k in K.
     """
     rng = np.random.default_rng(seed)
     polyhedron = FrictionPolyhedron(any_normal(rng), mu, n, inside)
@@ -292,7 +292,7 @@ def test_a_projection_is_the_nearest_point_of_the_cone(
     rest = decompose(f - shape.project(f), polyhedron.normal)
     gone = decompose(f - FrictionCone(polyhedron.normal, mu).project(f), polyhedron.normal)
     assert mu * gone.alpha_par + gone.alpha_perp <= 1e-12 * size
-    assert rest.alpha_perp <= 1e-12 * size  # what is taken away never pushes
+    assert rest.alpha_perp <= 1e-12 * size  # the part that is removed never pushes
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,4 @@
-"""Facets from rays and vertices from farthest points, also where the set is flat or holds whole
-lines.
-"""
+"""Facets from rays and vertices from extreme points, also if the set is flat or contains lines."""
 
 from __future__ import annotations
 
@@ -25,7 +23,10 @@ def made_of(rays: Array, x: Array) -> bool:
 @settings(max_examples=60)
 @given(seeds, st.integers(1, 6), st.integers(1, 12))
 def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> None:
-    """Any rays: too few to span the space, enough, or so many that they span lines or all."""
+    """Any number of rays: too few to span the space, enough, or so many that they span lines.
+
+    They may also span the whole space.
+    """
     rng = np.random.default_rng(seed)
     rays = rng.normal(size=(n, N)) + rng.uniform(0, 1.5) * np.eye(n)[:, :1]
     G, E = cone_face_matrix(rays)
@@ -57,7 +58,7 @@ def test_a_half_space_has_one_row_and_the_whole_space_none() -> None:
 
 
 def points_of(rng: np.random.Generator, n: int, rank: int) -> Array:
-    """A cloud of points in R^n that lies in an affine space of dimension rank."""
+    """Return random points in R^n that lie in an affine space of dimension rank."""
     return rng.normal(size=(12, rank)) @ rng.normal(size=(rank, n)) + rng.normal(size=n)
 
 
@@ -85,7 +86,7 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(
 
 def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clockwise() -> None:
     square = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 1.0]])
-    # the worst answer that is allowed: among the farthest, the one in the middle of the edge
+    # the worst answer that is allowed: of the extreme points, the one in the middle of the edge
     middle = np.array([0.0, 1e-12, 0.0, 0.0, 0.0, 1e-12])
     found = polytope_vertices(lambda d: square[int(np.argmax(square @ d + middle))], 2, 2.0)
     assert len(found) == 4

@@ -1,6 +1,4 @@
-"""Centre of pressure and the wrench of a sole: by their definitions, and where MuJoCo's ground
-pushes.
-"""
+"""Centre of pressure and wrench of a sole: by definition, and against MuJoCo's contact forces."""
 
 from __future__ import annotations
 
@@ -20,7 +18,7 @@ SOLES = judges.stance(TALOS)
 
 
 def loads(seed: int) -> np.ndarray:
-    """Forces at the corners of both soles, pushing up, shape (8, 3), N."""
+    """Return forces at the corners of both soles that push up, shape (8, 3), N."""
     rng = np.random.default_rng(seed)
     return np.column_stack([rng.normal(0.0, 20.0, (8, 2)), rng.uniform(0.0, 200.0, 8)])
 

@@ -1,6 +1,4 @@
-"""The wrenches of a stance, judged by cvxpy, by linear programs over rows and rays, and by brute
-force.
-"""
+"""Wrenches of a stance against cvxpy, linear programs over rows and rays, and brute force."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ STANCES = [("go2", 4), ("go2", 3), ("go2", 2), ("go2", 1), ("talos", 2), ("talos
 
 @cache
 def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contacts]:
-    """A robot standing on its first feet, each on a slope of its own when tilt > 0."""
+    """Return a robot standing on its first feet, each on its own slope if tilt > 0."""
     robot = judges.load(name)
     kind = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
     frames = [foot.frame for foot in robot.feet][:feet]
@@ -49,7 +47,7 @@ def of(
     inside: bool = True,
     limit: npt.ArrayLike = np.inf,
 ) -> WrenchSet:
-    """Contact points without a robot, weight 100 N, about the origin."""
+    """Return the set of contact points without a robot, with weight 100 N, about the origin."""
     cones = tuple(
         FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float)
     )
@@ -59,7 +57,7 @@ def of(
 
 
 def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) -> WrenchSet:
-    """Feet about a metre apart, some higher than others, each on a slope of its own."""
+    """Return feet about a metre apart, some higher than others, each on its own slope."""
     rng = np.random.default_rng(seed)
     return of(
         rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside
@@ -67,8 +65,9 @@ def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) 
 
 
 def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
-    """Sums of forces from the cones, so inside: the first quarter as they are, to the others ever
-    harder pushes are added.
+    """Return sums of forces in the cones, so inside the set; perturb all but the first quarter.
+
+    The perturbations grow with the index.
     """
     rng = np.random.default_rng(seed)
     inside = wrenches.rays @ rng.exponential(30.0, (wrenches.rays.shape[1], n))
@@ -77,9 +76,7 @@ def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
 
 
 class Judge:
-    """(20)(21)(28) in cvxpy: how far inside its cone every force can be; rows for four facets,
-    written out.
-    """
+    """(20)(21)(28) in cvxpy: how far inside its cone every force can be, for four facets."""
 
     def __init__(self, points: Array, normals: Array, mu: float, exact: bool):
         forces, self.about, self.wrench = (
@@ -124,8 +121,7 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
     found = []
     for w in random_wrenches(wrenches, 16, seed=feet):
-        # what the stance cannot produce at all is told apart by the equalities; the judge decides
-        # the rest
+        # the equalities exclude what the stance cannot produce at all; cvxpy decides the rest
         E = wrenches.equalities
         w = w - np.linalg.pinv(E) @ E @ w if len(E) else w
         expected = judge.margin(state.com, w)
@@ -170,7 +166,7 @@ def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: 
     assert np.max(np.abs(E @ rays), initial=0.0) <= 1e-9
     scale = np.repeat([1.0, wrenches.max_lever_arm], 3)
     assert np.allclose(np.linalg.norm(rows * scale, axis=1), 1.0)
-    # the other way round: the farthest that the rows allow in any direction is made by the rays
+    # conversely, the rays reach the extreme point that the rows allow in any direction
     rng = np.random.default_rng(feet)
     inwards = rays.sum(axis=1)
     for _ in range(8):
@@ -210,8 +206,8 @@ def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
     wrenches = wrench_set(state, contacts)
     carrying = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
     assert wrenches.margin(3.0 * carrying) == pytest.approx(3.0 * wrenches.margin(carrying))
-    # the weight divides between front and rear pair as the lever says; the lighter pair has the
-    # smaller margin
+    # the lever arms determine how front and rear pair share the weight; the pair with less load has
+    # the smaller margin
     x = wrenches.points[:, 0] - state.com[0]
     lightest = 0.5 * state.robot.weight * min(x[0], -x[2]) / (x[0] - x[2])
     assert wrenches.margin(carrying) == pytest.approx(lightest * 0.6 / np.sqrt(2))
@@ -236,7 +232,7 @@ def test_limits_make_the_set_bounded() -> None:
         assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or best.fun == 0
 
 
-def test_reach_is_where_membership_ends() -> None:
+def test_the_maximum_scaling_is_where_membership_ends() -> None:
     state, contacts = stance("talos", 2, 0.3)
     wrenches = wrench_set(state, contacts, max_normal_force=400.0)
     start = wrenches.rays @ np.full(wrenches.rays.shape[1], 30.0)
@@ -249,7 +245,7 @@ def test_reach_is_where_membership_ends() -> None:
 
 
 def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
-    """Without torque about a CoM at the height of the ground, only friction ends it."""
+    """If the CoM is at ground level, only friction limits the push."""
     wrenches = of(
         [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]],
         [UP] * 4,
@@ -270,8 +266,9 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
 
 
 def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
-    """A facet allows μ cos(π/n) and an edge μ; with the edges out of the way, the outer feet carry
-    all.
+    """A facet allows μ cos(π/n), an edge μ.
+
+    If edges face the push, it is limited when the outer feet carry everything.
     """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, mu=0.7)
@@ -357,7 +354,7 @@ def counter_clockwise(polygon: Array) -> bool:
 
 
 def depth(polygon: Array, at: Array) -> float:
-    """How far inside a counter-clockwise polygon a point is, m."""
+    """Return how far inside a counter-clockwise polygon a point is, m."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     inwards = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
     return float(np.min(np.sum(inwards * (at - polygon), axis=1)))
@@ -433,7 +430,7 @@ def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() ->
     assert np.max(wall.support_region()[:, 0]) > 0.5 + 0.1
 
 
-def test_too_steep_a_slope_carries_nobody() -> None:
+def test_too_steep_a_slope_carries_nothing() -> None:
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
         region = of(
@@ -506,8 +503,9 @@ def test_moving_everything_changes_nothing(seed: int) -> None:
 @settings(max_examples=12)
 @given(seeds)
 def test_turning_everything_turns_the_wrenches(seed: int) -> None:
-    """Facets may start elsewhere after the turn, but inner polyhedra stay within outer ones, nearly
-    the same.
+    """The facets may start elsewhere after the rotation.
+
+    Inner polyhedra stay within outer ones, nearly the same.
     """
     rng = np.random.default_rng(seed)
     R = judges.rotation(rng.normal(size=3))

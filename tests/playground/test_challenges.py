@@ -1,6 +1,4 @@
-"""Each challenge has a solution, is not solved by waiting, and has a judge that sees what may not
-be changed.
-"""
+"""Challenges have solutions, are not won by waiting, and notice changes of locked settings."""
 
 from __future__ import annotations
 
@@ -56,7 +54,7 @@ SOLUTIONS: dict[str, list[tuple[float, Act]]] = {
 
 
 def play(challenge: Challenge, script: list[tuple[float, Act]], seconds: float = 8.0) -> Judge:
-    """Run a challenge as the page does, slice by slice, without a page."""
+    """Run a challenge slice by slice, as the page does."""
     session, judge = Session(GO2, challenge.start), challenge.judge()
     waiting, pushes = list(script), []
     while session.sim.time < seconds and not judge.won:
@@ -85,20 +83,20 @@ def play(challenge: Challenge, script: list[tuple[float, Act]], seconds: float =
     return judge
 
 
-def test_there_are_ten() -> None:
+def test_there_are_ten_challenges() -> None:
     assert [challenge.title for challenge in CHALLENGES] == list(SOLUTIONS) and len(
         CHALLENGES
     ) == 10
 
 
 @pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
-def test_a_card_can_be_solved(challenge: Challenge) -> None:
+def test_a_challenge_can_be_solved(challenge: Challenge) -> None:
     judge = play(challenge, SOLUTIONS[challenge.title])
     assert judge.won and judge.message.startswith("Solved"), judge.message
 
 
 @pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
-def test_nobody_wins_by_waiting(challenge: Challenge) -> None:
+def test_waiting_does_not_win(challenge: Challenge) -> None:
     judge = play(challenge, [], 3.0)
     assert not judge.won and judge.message
 
@@ -108,7 +106,7 @@ def test_nobody_wins_by_waiting(challenge: Challenge) -> None:
     [challenge for challenge in CHALLENGES if "mass" in challenge.locked],
     ids=lambda challenge: challenge.title,
 )
-def test_what_may_not_be_changed_is_seen(challenge: Challenge) -> None:
+def test_a_changed_locked_setting_is_noticed(challenge: Challenge) -> None:
     judge = play(challenge, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[challenge.title]], 2.0)
     assert not judge.won and "mass" in judge.message
 
@@ -126,14 +124,14 @@ NEARLY = {
 
 
 @pytest.mark.parametrize("title", NEARLY)
-def test_nearly_is_not_enough(title: str) -> None:
+def test_a_near_solution_does_not_win(title: str) -> None:
     challenge = next(challenge for challenge in CHALLENGES if challenge.title == title)
     judge = play(challenge, NEARLY[title], 4.0)
     assert not judge.won, judge.message
 
 
 CHEATS = {
-    "on grippy ground": ("On ice", [(0.0, change(friction=(0.7, 1.0))), (0.5, push(10.0, 0.0))]),
+    "on rough ground": ("On ice", [(0.0, change(friction=(0.7, 1.0))), (0.5, push(10.0, 0.0))]),
     "on level ground": (
         "Down an icy slope",
         [
@@ -149,8 +147,11 @@ CHEATS = {
         "The weakest side",
         [(0.0, change(torque_fraction=0.5)), (0.3, push(190.0, 90.0))],
     ),
-    "past the number": ("How many facets?", [(0.1 * i, change(facets=3 + i)) for i in range(14)]),
-    "without weight for a while": (
+    "a slider through all numbers": (
+        "How many facets?",
+        [(0.1 * i, change(facets=3 + i)) for i in range(14)],
+    ),
+    "less weight for a while": (
         "Stand on two feet",
         [
             (0.0, change(com_shift=(-0.02, 0.0, 0.0))),
@@ -162,7 +163,7 @@ CHEATS = {
 
 
 @pytest.mark.parametrize("how", CHEATS)
-def test_nobody_wins_by_a_trick(how: str) -> None:
+def test_a_trick_does_not_win(how: str) -> None:
     title, script = CHEATS[how]
     judge = play(
         next(challenge for challenge in CHALLENGES if challenge.title == title), script, 7.0
@@ -193,7 +194,7 @@ def test_a_push_of_300_n_counts_in_every_direction() -> None:
         assert judge.message.startswith("Standing")
 
 
-def test_a_start_is_a_setting_that_the_card_itself_allows() -> None:
+def test_initial_settings_are_settings() -> None:
     for challenge in CHALLENGES:
         assert isinstance(challenge.start, Settings) and all(
             hasattr(challenge.start, name) for name in challenge.locked

@@ -1,6 +1,4 @@
-"""What a controller assumes of (7), judged by Pinocchio's own dynamics of another model and by what
-the plan does.
-"""
+"""Model mismatch, compared with Pinocchio's dynamics of another model and with the plan."""
 
 from __future__ import annotations
 
@@ -8,8 +6,10 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import refused
 
 import floatbase as fb
+from floatbase.errors import InputError
 from floatbase.playground import ModelMismatch
 from floatbase.qp import solve
 
@@ -70,7 +70,7 @@ def test_mass_and_the_parts_of_h_are_those_of_another_model(seed: int) -> None:
     )
 
 
-def test_the_truth_is_the_default_and_changes_nothing() -> None:
+def test_the_default_is_exact_and_changes_nothing() -> None:
     state = moving()
     controller = judges.controller_of("go2")
     qp, eom = controller.qp(state), fb.equations_of_motion(state, controller.contacts)
@@ -78,13 +78,13 @@ def test_the_truth_is_the_default_and_changes_nothing() -> None:
     assert not ModelMismatch(drift=False).is_exact
 
 
-def test_a_forgotten_drift_plans_contacts_that_accelerate_by_it() -> None:
+def test_without_drift_the_plan_keeps_a_qdd_zero() -> None:
     eom, x = solved(ModelMismatch(drift=False), moving())
     assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
-    assert np.abs(eom.b).max() > 0.1  # m/s²: there was something to forget
+    assert np.abs(eom.b).max() > 0.1  # m/s²: the neglected drift
 
 
-def test_an_ignored_contact_pushes_nobody_in_the_plan() -> None:
+def test_an_ignored_contact_exerts_no_force_in_the_plan() -> None:
     eom, x = solved(ModelMismatch(ignored_contacts=["FR_foot"]), moving())
     part = eom.contacts.force_slice("FR_foot")
     others = np.array(x["forces"])
@@ -94,12 +94,12 @@ def test_an_ignored_contact_pushes_nobody_in_the_plan() -> None:
     )
 
 
-def test_without_the_zeros_of_s_the_joints_obey_and_the_base_need_not() -> None:
+def test_without_the_zeros_of_s_only_the_joint_rows_hold() -> None:
     eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
     assert np.linalg.norm(missing[:3]) > 0.5 * eom.robot.weight, (
-        "motors of the base should carry it: torques cost"
+        "the base motors should carry the base, because torques cost"
     )
 
 
@@ -133,3 +133,12 @@ def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]
     carried = forces.reshape(-1, 3)[:, 2].sum()
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
+
+
+def test_a_name_given_alone_is_refused_with_the_list_to_give() -> None:
+    refused(
+        lambda: ModelMismatch(ignored_contacts="FR_foot"),
+        InputError,
+        "ignored_contacts",
+        'such as ["FR_foot"]',
+    )

@@ -1,6 +1,4 @@
-"""Terms of (7) switched off in the world: judged by Newton's law of the whole robot and by closed
-forms.
-"""
+"""Perturbed physics, compared with Newton's law for the whole robot and with closed forms."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ def in_the_air(sim: PerturbedSimulation, omega: float = 0.0) -> None:
     sim.reset(state.replace(q=q, v=v))
 
 
-def test_as_it_is_made_it_is_the_simulation() -> None:
+def test_without_perturbation_it_equals_the_simulation() -> None:
     plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
@@ -44,7 +42,7 @@ def test_as_it_is_made_it_is_the_simulation() -> None:
     assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
 
 
-def test_without_gravity_it_floats_and_with_it_it_falls() -> None:
+def test_the_robot_falls_with_gravity_and_floats_without_it() -> None:
     for gravity in (True, False):
         sim = PerturbedSimulation(GO2, perturbation=Perturbation(gravity=gravity))
         in_the_air(sim)
@@ -53,7 +51,7 @@ def test_without_gravity_it_floats_and_with_it_it_falls() -> None:
         assert sim.state.com_velocity[2] == pytest.approx(-0.2 * G * gravity, abs=1e-3)
 
 
-def test_the_ground_carries_the_mass_that_the_world_has() -> None:
+def test_the_ground_carries_the_actual_mass() -> None:
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(mass=1.2))
     record = standing(sim)
     assert record.outcome == "completed"
@@ -64,7 +62,7 @@ def test_the_ground_carries_the_mass_that_the_world_has() -> None:
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
 
 
-def test_a_foot_that_the_ground_does_not_touch_carries_nothing() -> None:
+def test_a_disabled_contact_carries_nothing() -> None:
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(disabled_contacts=["FL_foot"]))
     record = standing(sim, seconds=0.1)
     assert not record.measured.reshape(len(record), -1, 3)[:, 0].any()
@@ -72,9 +70,7 @@ def test_a_foot_that_the_ground_does_not_touch_carries_nothing() -> None:
 
 
 def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
-    """M q̈ = 0 with M q̈ + h: without gravity and torques all velocities stay what they are, and
-    else they do not.
-    """
+    """Without gravity, torques and velocity forces, all velocities are constant."""
     change = {}
     for kept in (True, False):
         sim = PerturbedSimulation(
@@ -90,15 +86,13 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
 
 
 def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes() -> None:
-    """(7) is written in them: with M q̈ = 0 a base that turns flies around a bend, and does not go
-    straight on.
-    """
+    """With M q̈ = 0 in the base's own axes, a rotating base flies along a curve."""
     sim = PerturbedSimulation(
         GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False)
     )
     in_the_air(sim)
     v = np.random.default_rng(1).normal(size=GO2.nv)
-    v[:6] = 1.0, 0.0, 0.5, 0.2, 0.0, 1.0  # it turns across its way, whatever the joints do
+    v[:6] = 1.0, 0.0, 0.5, 0.2, 0.0, 1.0  # the base rotates about an axis across its path
     sim.reset(sim.state.replace(v=v))
     for _ in range(200):
         sim.step(np.zeros(12))
@@ -108,9 +102,7 @@ def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes(
 
 
 def test_adhesion_lets_the_ground_pull() -> None:
-    """Pulled up with 1.5 weights by a controller whose feet may pull, feet with adhesion stay;
-    without them they do not.
-    """
+    """Feet with adhesion stay on the ground although the robot is pulled up with 1.5 weights."""
     up = 1.5 * GO2.weight
     nets = {}
     for adhesion_force in (0.0, GO2.weight):
@@ -129,10 +121,8 @@ def test_adhesion_lets_the_ground_pull() -> None:
     assert nets[GO2.weight] < -0.2 * GO2.weight
 
 
-def test_magnets_pull_from_the_first_touch_on() -> None:
-    """Newton's law of the whole robot at every timestep of a landing: nothing pulls that the
-    measured forces do not have.
-    """
+def test_adhesion_acts_from_the_first_touch() -> None:
+    """Newton's law holds at each timestep of a landing; measured forces include adhesion."""
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=GO2.weight))
     state = GO2.standing()
     q, v = np.array(state.q), np.zeros(GO2.nv)
@@ -144,10 +134,10 @@ def test_magnets_pull_from_the_first_touch_on() -> None:
     assert np.any(record.measured[0] == 0.0) and np.any(record.measured[-1] != 0.0)
     assert (
         np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight
-    )  # one magnet is a whole weight
+    )  # the adhesion of one foot is a whole weight
 
 
-def test_motors_of_the_base_carry_it() -> None:
+def test_motors_of_the_base_lift_it() -> None:
     sim = PerturbedSimulation(GO2)
     in_the_air(sim)
     R = sim.state.frame_pose("base").rotation
@@ -159,7 +149,7 @@ def test_motors_of_the_base_carry_it() -> None:
     assert not sim.base_wrench.any()
 
 
-def test_friction_changes_while_it_runs() -> None:
+def test_friction_can_change_during_a_run() -> None:
     sim = PerturbedSimulation(GO2, 0.8)
     assert standing(sim, seconds=0.2).outcome == "completed"
     sim.perturbation = Perturbation(friction=0.05)
@@ -174,7 +164,7 @@ def test_friction_changes_while_it_runs() -> None:
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 
 
-def test_a_copy_is_on_its_own_and_mistakes_are_told() -> None:
+def test_copies_are_independent_and_wrong_input_is_refused() -> None:
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(velocity_forces=False))
     other = copy.copy(sim)
     other.perturbation = Perturbation(mass=2.0)

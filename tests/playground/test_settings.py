@@ -27,15 +27,15 @@ from floatbase.playground import (
 
 GO2 = judges.load("go2")
 EACH = {
-    "as it begins": Settings(),
-    "believed otherwise": Settings(
+    "default": Settings(),
+    "another model": Settings(
         friction=(0.5, 0.9), slope=(8.0, 10.0), mass=(1.2, 1.0), bandwidth=(8.0, 12.0)
     ),
-    "another world": Settings(
+    "another reality": Settings(
         mass=(1.0, 1.2), actual_off=("velocity", "cones"), friction=(0.6, 0.4)
     ),
     "another stance": Settings(com_shift=(-0.05, -0.03, -0.01), lifted_feet=("FL_foot",), facets=6),
-    "another program": Settings(
+    "another quadratic program": Settings(
         weights=(2.0, 10.0, 0.1), torque_fraction=0.8, min_normal_force=5.0
     ),
     "it nods": Settings(nod=0.2),
@@ -43,8 +43,8 @@ EACH = {
     "it steps": Settings(steps_when_pushed=True),
     "terms off": Settings(assumed_off=("velocity", "drift", "cones"), actual_off=("velocity",)),
     "motors of the base": Settings(assumed_off=("zeros",), actual_off=("zeros",)),
-    "a leg unfelt": Settings(assumed_off=("forces",), actual_off=("forces",), leg="FR_foot"),
-    "it trots otherwise": Settings(
+    "a leg ignored": Settings(assumed_off=("forces",), actual_off=("forces",), leg="FR_foot"),
+    "it crawls with a mismatch": Settings(
         gait="crawl", mass=(1.1, 1.0), assumed_off=("drift",), facets=5, start_time=0.2
     ),
     "it steps on a slope": Settings(steps_when_pushed=True, slope=(2.0, 3.0)),
@@ -59,7 +59,7 @@ SECONDS = 1.0  # of the program's three: the push is over, a trot is under way
 
 
 def run_of(code: str) -> fb.Rollout:
-    """The rollout of a program, of `SECONDS` instead of 3 s."""
+    """Return the rollout of a program, for `SECONDS` instead of 3 s."""
     names: dict[str, Any] = {}
     assert code.count(", controller, 3, ") == 1
     exec(code.replace(", controller, 3, ", f", controller, {SECONDS}, "), names)
@@ -68,7 +68,7 @@ def run_of(code: str) -> fb.Rollout:
 
 
 def assert_same_run(robot: fb.Robot, settings: Settings, push: fb.Push | None = None) -> None:
-    """The program of a session makes what the session has, bit for bit."""
+    """Check that the program of a session reproduces it exactly."""
     session = Session(robot, settings)
     here = fb.rollout(
         session.sim, session.controller, SECONDS, [] if push is None else [push],
@@ -96,10 +96,10 @@ def test_the_program_of_an_arm_and_of_a_biped_makes_the_same_run(name: str) -> N
 @pytest.mark.parametrize(
     "names", [("it's", 'a "quoted" \\ foot'), ("__import__('os')", "'); 1/0; ('")]
 )
-def test_names_of_feet_are_written_as_texts_and_run_nothing(
+def test_names_of_feet_are_quoted_in_the_program(
     names: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a robot from a file, whose feet have other names."""
+    """The robot comes from a file in which the feet have unusual names."""
     urdf = judges.load("solo12").urdf
     for old, new in zip(("FL_FOOT", "HR_FOOT"), names, strict=True):
         urdf = urdf.replace(f'"{old}"', quoteattr(new))
@@ -119,10 +119,8 @@ def test_a_robot_of_the_catalogue_is_loaded_by_its_name() -> None:
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_changes_lead_where_a_beginning_with_them_leads(name: str) -> None:
-    """On its feet and at rest, a session that is changed has the controller, world and actuators of
-    one that begins so.
-    """
+def test_changing_settings_equals_starting_with_them(name: str) -> None:
+    """A session at rest that is changed equals one that starts with these settings."""
     changed, begun = Session(GO2), Session(GO2, EACH[name])
     changed.change(**{field: getattr(EACH[name], field) for field in Settings.__dataclass_fields__})
     assert changed.refusal == ""
@@ -135,21 +133,21 @@ def test_changes_lead_where_a_beginning_with_them_leads(name: str) -> None:
 
 REFUSED = {
     "a polyhedron with two facets": {"facets": 2, "mass": (1.0, 1.3)},
-    "a leg that is none, in another world": {
+    "an unknown leg, another reality": {
         "slope": (10.0, 10.0), "friction": (0.5, 0.5), "assumed_off": ("forces",), "leg": "paw",
     },
-    "a leg that is none, on weak actuators": {
+    "an unknown leg, weak actuators": {
         "actual_off": ("forces",), "leg": "paw", "bandwidth": (5.0, 5.0), "mass": (1.0, 2.0),
     },
-    "a foot that is none": {"lifted_feet": ("paw",), "mass": (1.0, 1.3), "bandwidth": (9.0, 9.0)},
-    "a gait of others": {"gait": "walk", "friction": (0.2, 0.2)},
+    "an unknown foot": {"lifted_feet": ("paw",), "mass": (1.0, 1.3), "bandwidth": (9.0, 9.0)},
+    "a gait of other robots": {"gait": "walk", "friction": (0.2, 0.2)},
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("first", ["as it begins", "it trots", "motors of the base"])
+@pytest.mark.parametrize("first", ["default", "it trots", "motors of the base"])
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_refused_change_leaves_everything_as_it_was(first: str, name: str) -> None:
-    """A session that refused goes on as one that was not asked does, also after a reset."""
+    """After a refused change, a session continues as one without the request does."""
     asked, other = Session(GO2, EACH[first]), Session(GO2, EACH[first])
     for session in (asked, other):
         session.observe(fb.rollout(session.sim, session.controller, 0.1, control_period=PERIOD))
@@ -167,7 +165,7 @@ def test_a_refused_change_leaves_everything_as_it_was(first: str, name: str) -> 
     assert asked.change(facets=5) is False and asked.refusal == ""
 
 
-def test_a_walk_goes_on_where_its_velocity_or_gait_changes() -> None:
+def test_a_walk_continues_when_its_velocity_or_gait_changes() -> None:
     session = Session(GO2, Settings(gait="trot"))
     walk = session.walk
     session.change(velocity=(0.2, 0.0, 0.1))
@@ -194,18 +192,18 @@ def test_a_walk_goes_on_where_its_velocity_or_gait_changes() -> None:
         ("actual_off", "gravity"), ("start_time", np.inf),
     ],
 )  # fmt: skip
-def test_settings_that_cannot_be_are_refused_by_name(field: str, value: object) -> None:
+def test_invalid_settings_are_refused_by_name(field: str, value: object) -> None:
     with pytest.raises(FloatbaseError, match=field):
         Settings(**{field: value})
 
 
-def test_a_robot_without_the_feet_for_a_gait_is_told_so() -> None:
+def test_a_gait_for_another_number_of_feet_is_refused() -> None:
     for settings in (Settings(gait="trot"), Settings(steps_when_pushed=True)):
         with raises(InputError, "ur5", "feet", 2, 4):
             Session(judges.load("ur5"), settings)
 
 
-def test_motors_of_the_base_that_are_taken_away_push_no_more() -> None:
+def test_removed_motors_of_the_base_push_no_more() -> None:
     session = Session(GO2, Settings(assumed_off=("zeros",), actual_off=("zeros",)))
     fb.rollout(session.sim, session.controller, 0.1, control_period=4e-3)
     assert session.sim.base_wrench[2] > 0.5 * GO2.weight
@@ -213,28 +211,26 @@ def test_motors_of_the_base_that_are_taken_away_push_no_more() -> None:
     assert not session.sim.base_wrench.any()
 
 
-@pytest.mark.parametrize("believed", ["gravity", "forces", "velocity"])
-def test_motors_of_the_base_do_not_mend_what_else_a_controller_mistakes(believed: str) -> None:
-    session = Session(GO2, Settings(assumed_off=(believed,), actual_off=("zeros",), leg="FR_foot"))
+@pytest.mark.parametrize("off", ["gravity", "forces", "velocity"])
+def test_motors_of_the_base_do_not_correct_other_mismatches(off: str) -> None:
+    session = Session(GO2, Settings(assumed_off=(off,), actual_off=("zeros",), leg="FR_foot"))
     fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
     assert np.abs(session.sim.base_wrench).max() < 1e-6 * GO2.weight
 
 
-def test_motors_of_the_base_do_nothing_unless_the_controller_believes_in_them() -> None:
-    """With them and without gravity in its plan's torques, the base carries itself: joints need
-    next to nothing.
-    """
+def test_motors_of_the_base_act_only_if_the_controller_assumes_them() -> None:
+    """With motors of the base in the controller's model, the base carries itself."""
     used = {}
-    for believed in ((), ("zeros",)):
-        session = Session(GO2, Settings(assumed_off=believed, actual_off=("zeros",)))
+    for off in ((), ("zeros",)):
+        session = Session(GO2, Settings(assumed_off=off, actual_off=("zeros",)))
         assert isinstance(session.controller, BaseMotors)
         record = fb.rollout(session.sim, session.controller, 0.4, control_period=4e-3)
         assert record.outcome == "completed"
-        used[believed] = float(np.abs(session.sim.base_wrench).max())
+        used[off] = float(np.abs(session.sim.base_wrench).max())
     assert used[()] < 1e-6 * GO2.weight < 0.5 * GO2.weight < used[("zeros",)]
 
 
-def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
+def test_gravity_has_no_arrow_when_it_is_switched_off() -> None:
     session = Session(GO2)
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
     assert list(term_arrows("gravity", record, 1e-3, 0.4)) == [
@@ -246,11 +242,11 @@ def test_gravity_has_no_arrow_where_the_world_has_none() -> None:
     (word,) = term_arrows("velocity", record, 1e-3, 0.4).values()
     assert word.shape.name == "C q̇ ≈ 0"
     assert term_arrows("zeros", record, 1e-2, 0.4, ("zeros",)), (
-        "torques are there with motors of the base, too"
+        "there are torques with motors of the base, too"
     )
 
 
-def test_arrows_of_masses_are_those_of_the_world() -> None:
+def test_arrows_have_the_actual_mass() -> None:
     session = Session(GO2, Settings(mass=(1.0, 1.5)))
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
     lengths = [
@@ -263,7 +259,7 @@ def test_arrows_of_masses_are_those_of_the_world() -> None:
     assert lengths[0] == pytest.approx(1e-3 * GO2.weight)
 
 
-def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> None:
+def test_the_velocity_and_acceleration_of_nodding_are_its_derivatives() -> None:
     path, h = nodding_rotation(np.eye(3), 0.3, begin=1.0), 1e-4
     assert np.allclose(path(0.5)[0], np.eye(3), atol=1e-12)
     for t in (1.4, 2.0, 7.3):
@@ -273,15 +269,15 @@ def test_nodding_has_the_velocity_and_acceleration_that_differences_have() -> No
         assert np.allclose((w1 - w0) / (2 * h), alpha, atol=1e-3)
 
 
-def test_settings_are_values_with_numbers_of_six_digits() -> None:
+def test_settings_are_values_rounded_to_six_digits() -> None:
     assert replace(Settings(), gait="trot") == Settings(gait="trot") != Settings()
     assert Settings(weights=(10.0**0.5, 1, 1), lifted_feet=["a", "a"]) == Settings(
         weights=(3.16228, 1.0, 1.0), lifted_feet=("a",)
     )
 
 
-def test_what_is_being_changed_counts_as_set(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A slider that moves while the session changes keeps what another one has set."""
+def test_settings_being_applied_count_as_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slider that moves while the session changes keeps what another slider has set."""
     playground = Playground(GO2)
     try:
         change, seen = playground.session.change, []

@@ -1,5 +1,6 @@
-"""Rollouts through actuators: what is kept, what memory they have, and when a slow force loop lets
-go2 fall (App. B).
+"""Rollouts through actuators: their records, the actuators' state, and falls with slow force loops.
+
+The actuators are those of App. B.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def controller() -> fb.WholeBodyController:
 
 @dataclass
 class Lag:
-    """Hands on a part of the torques, and keeps what it was called with."""
+    """Actuators that pass on a fraction of the torques and record their calls."""
 
     part: float = 0.5
     calls: list[tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=list)
@@ -47,7 +48,7 @@ def sim() -> fb.Simulation:
 def stand(
     sim: fb.Simulation, bandwidth: float, pushes: tuple[fb.Push, ...] = (), duration: float = 3.0
 ) -> fb.Rollout:
-    """go2 through force loops of a bandwidth, Hz, set out with the torques it stands with."""
+    """Let go2 stand with force loops of a bandwidth [Hz], which start at the standing torques."""
     sim.reset()
     q, v = sim.q, sim.v
     actuators = HydraulicActuators(sim.robot, Hydraulics(loop_bandwidth=bandwidth))
@@ -56,7 +57,7 @@ def stand(
 
 
 def sway(rollout: fb.Rollout) -> float:
-    """How far the centre of mass strays from where it was, m."""
+    """Return the largest distance of the centre of mass from its initial position [m]."""
     return float(np.max(np.linalg.norm(rollout.com - rollout.com[0], axis=1)))
 
 
@@ -88,7 +89,7 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
 
 
 def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation) -> None:
-    """Actuators that give nothing let the robot fall as a limp one does."""
+    """With actuators that give no torque, the robot falls like a limp one."""
 
     def limp(q: np.ndarray, v: np.ndarray, t: float) -> SimpleNamespace:
         return SimpleNamespace(tau=np.zeros(12))
@@ -115,7 +116,7 @@ def test_joints_without_limits_reach_the_actuators_as_angles() -> None:
 
 
 def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None:
-    """Two rollouts of 0.05 s are one of 0.1 s."""
+    """Two rollouts of 0.05 s equal one of 0.1 s."""
     records = []
     for parts in ((0.1,), (0.05, 0.05)):
         sim.reset()
@@ -131,12 +132,11 @@ def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None
 # step of 1 ms resolves
 @pytest.mark.parametrize("name", [name for name in judges.ROBOTS if name != "g1"])
 def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
-    """0.5 s: from 10 ms on every joint is within 5 % of its torque limit of the desired torque, and
-    within 0.1 % at the end.
+    """Every joint is within 5 % of its torque limit of the desired torque from 10 ms on.
 
-    (In the first millisecond the ground gives way, and anymal_kinova's arm is told to swing: 15 %.)
-
-    The oil's spring turns less than 1.75 rad in a step of 1 ms, on every joint by itself.
+    At the end, after 0.5 s, it is within 0.1 %. (In the first millisecond the contacts give way,
+    and the desired motion of anymal_kinova's arm begins: 15 %.) On every joint by itself, the oil
+    spring's phase advances by less than 1.75 rad in a step of 1 ms.
     """
     robot = judges.load(name)
     state = robot.standing()
@@ -160,9 +160,7 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
 def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
     sim: fb.Simulation,
 ) -> None:
-    """50 Hz, 0.5 s: centre of mass within 0.3 mm, feet within 0.2 mm; torques within 0.2 N·m of the
-    desired ones.
-    """
+    """Within 0.5 s at 50 Hz: CoM within 0.3 mm, feet within 0.2 mm, torques within 0.2 N·m."""
     rollout = stand(sim, 50.0, duration=0.5)
     assert rollout.outcome == "completed"
     assert sway(rollout) < 3e-4
@@ -175,7 +173,7 @@ def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
 def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(
     sim: fb.Simulation,
 ) -> None:
-    """12 mm both, the same to 0.1 mm, when 30 N push for 0.2 s."""
+    """A push of 30 N for 0.2 s moves both by 12 mm, with a difference of at most 0.1 mm."""
     sim.reset()
     ideal = fb.rollout(sim, controller(), 0.6, PUSH)
     hydraulic = stand(sim, 50.0, PUSH, 0.6)
@@ -187,15 +185,16 @@ def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torque
 def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
     sim: fb.Simulation,
 ) -> None:
-    """Above the 0.84 Hz below which a task, all else ideal, grows because its torque lags."""
+    """This is above 0.84 Hz, below which the lag alone makes an otherwise ideal task unstable."""
     assert growth(0.85) < 0.0 < growth(0.83)
     assert stand(sim, 1.0, PUSH).outcome == "fell"
     assert stand(sim, 1.5, PUSH, duration=2.5).outcome == "completed"
 
 
 def growth(bandwidth: float) -> float:
-    """Largest growth rate, 1/s, of a task ẍ = -H (20 ẋ + 100 x) behind the loop's H(s) = ω (s +
-    ω_i) / (s² + ω s + ω ω_i).
+    """Return the largest growth rate [1/s] of a task ẍ = -H (20 ẋ + 100 x) behind a loop.
+
+    The loop is H(s) = ω (s + ω_i) / (s² + ω s + ω ω_i).
     """
     w = 2.0 * np.pi * bandwidth
     task, lag = np.array([20.0, 100.0]), w * np.array([1.0, 0.05 * w])
@@ -206,9 +205,7 @@ def growth(bandwidth: float) -> float:
 def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(
     sim: fb.Simulation,
 ) -> None:
-    """A spool of 1 Hz hardly moves: the torques lag, but each joint stands on a stiff spring of
-    oil.
-    """
+    """A valve of 1 Hz hardly moves: the torques lag, but stiff springs of oil hold the joints."""
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))
     actuators.reset(controller()(sim.q, sim.v).tau, sim.q[7:])

@@ -1,4 +1,4 @@
-"""Between our convention for a state and MuJoCo's."""
+"""Conversion of states and models between our convention and MuJoCo's."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
 
 
 def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_freely() -> None:
-    """MuJoCo calls the ground "world" and would weld that link to it: ur5's own URDF, unbolted."""
+    """MuJoCo would weld a link named "world" to the ground; ur5's own URDF has one."""
     arm = judges.load("ur5")
     loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)
     assert loose.base == "world"
@@ -105,15 +105,13 @@ def test_welded_links_move_as_one_body_whatever_each_of_them_is(name: str, feet:
     judge = judges.Mujoco(state.robot).move_to(state)
     size = np.sqrt(
         state.M.diagonal()
-    )  # each entry beside its own joints', or a shank's would not show beside the trunk's
+    )  # each entry relative to its own joints', or a shank's would not show next to the trunk's
     assert np.max(np.abs(state.M - judge.M) / np.outer(size, size)) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 
 
 def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_path: Path) -> None:
-    """<inertial> may have an rpy of its own, on the link that hands its inertia on and on the one
-    that takes it.
-    """
+    """<inertial> may be rotated (rpy) both in a fused link and in the link that it is fused to."""
 
     def link(name: str, inertia: str, rpy: str) -> str:
         return (

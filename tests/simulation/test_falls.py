@@ -1,5 +1,6 @@
-"""A fall ends on the ground: no part of the body in it, nothing changed before it, and a live
-picture draws it to the end.
+"""Falls end on the ground: no link is below it, and nothing before the fall changes.
+
+A live run shows them to the end.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ import floatbase as fb
 from floatbase.playground import Perturbation, PerturbedSimulation
 from floatbase.simulation import LiveSimulation
 
-# m below the ground, at most: a contact that carries a robot gives by less than a millimetre
+# m below the ground, at most: a contact that supports a robot yields by less than a millimetre
 DEPTH = 5e-3
 PERIOD = 2e-3
 SETTLING_TIME = 2.0  # s
-SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against its brakes
+SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against the joint damping
 ROW_NAMES = ("time", "q", "v", "tau", "tau_desired", "planned", "measured", "foot_positions")
 
 
@@ -34,8 +35,9 @@ def pushed(
     settling_time: float = SETTLING_TIME,
     sim: fb.Simulation | None = None,
 ) -> fb.Rollout:
-    """A standing robot pushed with a force, N, for 0.1 s; towards: degrees, from forwards to the
-    left.
+    """Simulate a standing robot that is pushed for 0.1 s.
+
+    The direction `towards` is in degrees, from forwards to the left.
     """
     robot, angle = judges.load(name), np.deg2rad(towards)
     push = fb.Push([force * np.cos(angle), force * np.sin(angle), 0.0], start=0.05)
@@ -46,9 +48,7 @@ def pushed(
 
 
 def lowest(state: fb.State) -> dict[str, float]:
-    """Lowest point of the corners of all shapes of the URDF's collisions, by joint, m over level
-    ground; by Pinocchio alone.
-    """
+    """Return the lowest corner of each joint's collision shapes [m], by Pinocchio alone."""
     robot = state.robot
     folders = [str(folder) for folder in robot.package_dirs]
     shapes = pin.buildGeomFromUrdfString(
@@ -81,8 +81,8 @@ def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards: float) -> 
     assert record.outcome in ("fell", "controller failed")
     low = lowest(record.final)
     assert min(low.values()) > -DEPTH, low
-    assert record.final.q[2] < 0.5 * record.q[0, 2]  # it lies
-    assert np.abs(record.final.v).max() < SLOW  # and rests
+    assert record.final.q[2] < 0.5 * record.q[0, 2]  # it lies on the ground
+    assert np.abs(record.final.v).max() < SLOW  # at rest
 
 
 @pytest.mark.parametrize("name", ["talos", "anymal_kinova"])
@@ -146,7 +146,7 @@ def test_a_controller_that_fails_at_once_lets_the_robot_lie_down() -> None:
 
 
 def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
-    """Torques, forces and times are those of whole ticks, whatever was begun."""
+    """Torques, forces and times are those of complete control steps."""
 
     class Breaks:
         def __init__(self) -> None:
@@ -194,9 +194,7 @@ def test_links_touch_from_a_fall_to_the_next_reset() -> None:
 
 
 def test_forces_are_those_at_the_feet_whatever_else_touches() -> None:
-    """A robot that lies carries part of its weight with other links, so less with its feet; none
-    pulls.
-    """
+    """A lying robot's feet support only part of its weight, as other links touch; none pulls."""
     record = pushed("go2", 400.0, 180.0)
     pressing = record.measured.reshape(len(record), -1, 3)[-1, :, 2]
     assert pressing.min() >= 0.0 and pressing.sum() < 0.9 * record.robot.weight
@@ -220,9 +218,7 @@ def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_fe
 
 
 def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
-    """State, clock, forces and places of the feet are the same with links that touch, and without
-    them again.
-    """
+    """Switching link collisions on and off changes neither state, time, forces nor feet."""
     sim = fb.Simulation(judges.load("go2"))
     for _ in range(50):
         sim.step(np.full(12, 0.5))
@@ -235,7 +231,7 @@ def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
         assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)
         after = sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()
         assert after[0] == before[0] and np.array_equal(after[1], before[1])
-        assert np.allclose(after[2], before[2], atol=2e-3)  # those are of a timestep before
+        assert np.allclose(after[2], before[2], atol=2e-3)  # forces are one timestep old
         assert sim.contact_forces().shape == (4, 3) and np.all(sim.contact_forces()[:, 2] >= 0.0)
 
 
@@ -275,7 +271,7 @@ def test_a_copy_of_a_robot_that_lies_moves_alone(
 
 
 def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
-    """The same URDF, its files nowhere: built all the same, with hulls of boxes and cylinders."""
+    """Without mesh files, the robot is built with the hulls of boxes and cylinders."""
     robot = judges.load("anymal_kinova")
     bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
     sims = [fb.Simulation(one) for one in (bare, robot)]
@@ -319,7 +315,7 @@ def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(
     until(lambda: not run.is_simulating)
     run.close()
     assert [status for status, _ in told] == ["running", "fell"]
-    fell = told[1][1]  # slices when it was told
+    fell = told[1][1]  # slices when the fall was reported
     assert len(slices) > fell + 3
     assert all(record.outcome == "fell" for record in slices[fell - 1 :])
     assert len({record.controller_off_time for record in slices[fell - 1 :]}) == 1
@@ -330,7 +326,7 @@ def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(
 
 
 def fall_and_wait(run: LiveSimulation, slices: list[fb.Rollout]) -> int:
-    """A push that topples it, and the slices when it draws on after the fall."""
+    """Push until the robot falls and another slice is shown; return the number of slices."""
     run.push(FALL)
     until(lambda: run.status == "fell")
     count = len(slices)

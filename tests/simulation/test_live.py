@@ -1,4 +1,4 @@
-"""A run in the background: it goes on, it takes pushes, and whatever stops it is said."""
+"""Runs in the background: they continue, take pushes, and report why they stopped."""
 
 from __future__ import annotations
 
@@ -94,9 +94,7 @@ def test_what_stopped_a_run_is_told_in_one_sentence(status: str, reason: str, li
 
 
 class Held:
-    """Takes slices as `show`, and keeps the run in the middle of one after `hold`, so that nothing
-    is left to chance.
-    """
+    """A `show` that holds the run in the middle of a slice after `hold`, for certain timing."""
 
     def __init__(self) -> None:
         self.slices: list[fb.Rollout] = []
@@ -111,7 +109,7 @@ class Held:
             assert self.go_on.wait(15.0)
 
     def hold(self, outcome: str | None = None) -> None:
-        """Keep the next slice with that outcome, or with any."""
+        """Hold the next slice with the given outcome, or with any."""
         self.outcome = outcome
         self.inside.clear()
         self.go_on.clear()
@@ -158,7 +156,7 @@ def test_a_push_after_a_reset_that_is_still_to_come_acts(
     assert [(p.start, p.force[1]) for p in held.slices[count].pushes] == [(0.0, 30.0)]
 
 
-HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: down, a push that no controller stands
+HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: a downward push that no controller withstands
 
 
 def test_the_same_push_after_a_fall_has_the_same_result_every_time(
@@ -172,7 +170,7 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(
         run.close()
         assert run.status == "fell"
         last = next(i for i, record in enumerate(slices) if i >= count and record.outcome == "fell")
-        falls.append(slices[count : last + 1])  # without those in which it lies down
+        falls.append(slices[count : last + 1])  # without those after the fall
     for fall in falls:
         assert fall[0].time[0] == 0.0
         assert [(p.start, *p.force) for p in fall[0].pushes] == [(0.0, *HARD[0])]
@@ -183,13 +181,13 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(
 def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
     run: LiveSimulation, slices: list[fb.Rollout]
 ) -> None:
-    """The next thread waits for the last one, which is kept here while it tells of the fall."""
+    """The next thread waits for the last one, which is held here while it reports the fall."""
     go_on = threading.Event()
     run.on_status(lambda status: status == "fell" and go_on.wait(15.0))
     run.push(*HARD)
     until(lambda: run.status == "fell")
     count = len(slices)
-    run.start()  # resets; the push comes before the thread can have done so
+    run.start()  # resets; the push is requested before the thread can have reset
     run.push([0.0, 30.0, 0.0])
     go_on.set()
     until(lambda: len(slices) > count)
@@ -205,7 +203,7 @@ def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(
         assert held.inside.wait(15.0)
 
     def go_on() -> float:
-        """The time at which the next slice begins."""
+        """Return the time at which the next slice begins."""
         count = len(held.slices)
         held.go_on.set()
         until(lambda: len(held.slices) > count)
@@ -281,7 +279,7 @@ def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
     until(lambda: run.status == "idle")
     assert slices
     before = slices[-1].time[-1]
-    run.start()  # it goes on from there
+    run.start()  # continues from there
     until(lambda: run.status == "idle" and slices[-1].time[-1] > before)
     run.close()
 
@@ -301,7 +299,7 @@ def test_a_push_is_on_record_until_it_has_been_seen(
 
 def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.Rollout]) -> None:
     class Delay:
-        """Gives the torques desired a step ago."""
+        """Actuators that give the torques desired one step earlier."""
 
         def __init__(self) -> None:
             self.reset()
@@ -346,7 +344,7 @@ def test_another_world_controller_and_period_are_taken_between_slices(
 
     run.call_soon(change)
     until(lambda: run.sim is ice)
-    count = len(slices)  # the slice at that time may be one of before
+    count = len(slices)  # the present slice may have begun before
     until(lambda: len(slices) > count + 1 and slices[-1].time[-1] > 0.1)
     assert np.allclose(np.diff(slices[-1].time), 5e-3)
     assert seen[0] is not threading.main_thread()

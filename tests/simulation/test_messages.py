@@ -1,4 +1,4 @@
-"""What the physics and the loop refuse: the type of each error, and the names and numbers in it."""
+"""Errors of simulations and rollouts: their types, and the names and numbers in their messages."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
             "controller",
             "gain",
         ),
-        # go2 and solo12 have equally many joints: nothing but the robot itself tells them apart
+        # go2 and solo12 have the same number of joints: only the robots themselves differ
         (
             lambda: fb.rollout(fb.Simulation(SOLO), judges.controller_of("go2"), 0.01),
             InputError,
@@ -150,6 +150,13 @@ def test_what_a_simulation_was_made_with_cannot_be_set(name: str) -> None:
             setattr(sim, name, getattr(sim, name))
 
 
+@pytest.mark.parametrize("name", ["mu", "link_colisions"])
+def test_a_simulation_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+    for sim in (SIM, copy.deepcopy(SIM)):
+        with raises(AttributeError, name):
+            setattr(sim, name, True)
+
+
 def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
     sim = fb.Simulation(GO2)
     sim.model.opt.timestep = 0.002
@@ -168,6 +175,6 @@ def test_a_push_that_does_not_act_in_a_rollout_is_said(
         fb.rollout(sim, limp, 0.02)
         fb.rollout(
             copy.copy(sim), limp, 0.01, [idle, near]
-        )  # of a copy: sim itself stays where it is
+        )  # a copy, so that sim itself does not move
     with warns(SimulationWarning, *numbers):
         fb.rollout(sim, limp, 0.01, [idle])

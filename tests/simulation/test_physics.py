@@ -1,4 +1,4 @@
-"""The physics: gravity, pushes, motors, ground and measured forces obey Newton's laws."""
+"""Gravity, pushes, motors, ground and measured forces obey Newton's laws."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ G = np.array([0.0, 0.0, -9.81])
 
 
 def flying(name: str, seed: int | None = None, height: float = 5.0, speed: float = 0.3) -> State:
-    """A robot well above the ground, at rest or tumbling, its joints away from their limits (which
-    take energy).
+    """Return a robot high above the ground, at rest or tumbling, away from its joint limits.
+
+    The joint limits dissipate energy.
     """
     robot = judges.load(name)
     state = robot.standing() if seed is None else robot.random_state(seed, speed)
@@ -33,14 +34,14 @@ def flying(name: str, seed: int | None = None, height: float = 5.0, speed: float
 
 
 def energy(state: State) -> float:
-    """½ vᵀ M v + m g z, J, with M from the judge."""
+    """Return ½ vᵀ M v + m g z [J], with M from the judge."""
     robot = state.robot
     M = judges.mujoco_of(robot.name).move_to(state).M
     return float(0.5 * state.v @ M @ state.v) + robot.weight * float(state.com[2])
 
 
 def angular_momentum(state: State) -> np.ndarray:
-    """About the centre of mass, N·m·s, world."""
+    """Return the angular momentum about the centre of mass, world frame [N·m·s]."""
     model = state.robot.model
     return np.array(
         pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v).angular
@@ -76,9 +77,7 @@ def test_motors_change_neither_momentum_of_a_robot_in_the_air(name: str) -> None
 
 
 def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str) -> None:
-    """Halving the timestep halves what is lost: nothing else (damping, friction, armature) takes
-    energy.
-    """
+    """Halving the timestep halves the energy error: damping, friction and armature add nothing."""
     start, lost = flying(name, seed=1, speed=0.2), []
     for timestep in (4e-4, 2e-4):
         sim = fb.Simulation(start.robot, timestep=timestep)
@@ -97,7 +96,7 @@ def test_the_work_of_the_motors_is_what_the_energy_gains(name: str) -> None:
     robot = start.robot
     gentle = (
         500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
-    )  # N·m for 500 rad/s²: no joint comes to its limits
+    )  # N·m for 500 rad/s²: no joint reaches its limits
     tau = rng.uniform(-0.3, 0.3, robot.d) * np.minimum(
         np.minimum(robot.torque_limits, 0.01 * robot.weight), gentle
     )
@@ -138,8 +137,9 @@ def test_a_push_acts_in_its_own_steps_and_no_others() -> None:
 
 
 def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_between_steps() -> None:
-    """A free ball, whose momentum MuJoCo's steps keep to rounding: shorter than a step, over many,
-    and both at once.
+    """Pushes of a free ball: shorter than a step, over many steps, and both at once.
+
+    MuJoCo's steps conserve its momentum up to rounding.
     """
     inertia = '<mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     ball = fb.load_urdf(
@@ -160,9 +160,7 @@ def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_betw
 
 
 def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -> None:
-    """Angular momentum about the CoM grows by (p - com) × F dt, wherever on the robot the frame
-    lies.
-    """
+    """Angular momentum about the CoM grows by (p - com) × F dt, for frames all over the robot."""
     robot = judges.load(name)
     start = flying(name, seed=3, speed=0.2).replace(v=np.zeros(robot.nv))
     force = np.array([20.0, -10.0, 15.0])
@@ -202,10 +200,8 @@ def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name: str) -> None:
 def test_absurd_torques_are_cut_at_the_limit_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where a motor has no limit MuJoCo drops all controls when one is beyond 1e10: limits must
-    come first.
-    """
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it stands
+    """MuJoCo drops all controls if one without a limit exceeds 1e10, so limits must come first."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log to the working directory
     robot = judges.load("go2")
     speeds = []
     for size in (1.0, 1e12):
@@ -233,9 +229,7 @@ def test_each_motor_turns_its_own_joint(name: str) -> None:
 
 
 def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:
-    """Newton over a push and a recovery: Σ (forces + weight + push) dt = m Δv_com, each in the
-    world frame.
-    """
+    """Σ (forces + weight + push) dt = m Δv_com over a push and a recovery, in the world frame."""
     robot = judges.load(name)
     start = robot.standing()
     sim = fb.Simulation(robot)
@@ -256,7 +250,7 @@ def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:
 
 
 def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
-    """Push down over one foot: that foot carries more."""
+    """The foot below a downward push has a larger force."""
     robot = judges.load("go2")
     start = robot.standing()
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(start))
@@ -273,9 +267,7 @@ def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
 def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it() -> (
     None
 ):
-    """A robot whose joints are held slides on a slope of tan θ > μ and stays on one of tan θ < μ:
-    Coulomb's law.
-    """
+    """A robot with fixed joints slides if tan θ > μ, and stays if tan θ < μ: Coulomb's law."""
     robot = judges.load("go2")
     slid = {}
     for mu in (0.15, 0.5):
@@ -283,7 +275,7 @@ def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_o
         start, ground = on_slope(robot, angle), Ground(mu=mu, normal=slope_normal(angle))
         sim = fb.Simulation(robot, ground)
         sim.reset(start)
-        # the controller plans within 0.4: true where it stays, an illusion where it slides
+        # the controller plans with 0.4, which is right if the robot stays and wrong if it slides
         contacts = fb.Contacts.points(robot, mu=0.4, normals=ground.normal)
         controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start))
         record = fb.rollout(sim, controller, 0.3)
@@ -296,7 +288,7 @@ def slope_normal(angle: float) -> np.ndarray:
 
 
 def on_slope(robot: fb.Robot, angle: float) -> State:
-    """The standing robot turned with the ground about the world's y axis."""
+    """Return the standing robot, rotated with the ground about the world's y axis."""
     q = robot.standing().q.copy()
     R = judges.rotation([0.0, angle, 0.0])
     q[:3] = R @ q[:3]
@@ -348,9 +340,7 @@ def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -
 
 
 def test_feet_near_the_ground_get_no_force() -> None:
-    """MuJoCo lists a contact without a force for each ball that is nearer to the ground than its
-    gap.
-    """
+    """MuJoCo lists a contact without a force for a ball closer to the ground than its gap."""
     sim = fb.Simulation(judges.load("go2"))
     sim.model.geom_gap[:] = 0.05
     state = sim.robot.standing()

@@ -1,6 +1,4 @@
-"""The push recovery: what bisection finds on the physics, its mirror, and theory's curves by other
-means.
-"""
+"""Push recovery: the bisection, its symmetry, and the theoretical bounds by other methods."""
 
 from __future__ import annotations
 
@@ -62,7 +60,7 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
     feet, com = recovery.contacts.positions(state), state.com
     height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
     omega = np.sqrt(robot.gravity / height)
-    # an impulse moves the capture point to the border; a push for ever tips the robot over it
+    # an impulse moves the capture point to the edge; a constant push tips the robot over the edge
     for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
         moved = (
             com[:2]
@@ -71,22 +69,21 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
         )
         beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
         assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
-    # between them: the pendulum on the border, s away, pushed for a while, has its capture point
-    # there at the end
+    # in between: a pendulum with its centre of pressure at the edge, at distance s, has its capture
+    # point there at the end of the push
     border = replace(recovery, duration=1e2).capture_point_bound * height / robot.weight
     transition = expm(
         recovery.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]])
     )
     x = transition[:, 2:] * (recovery.capture_point_bound / robot.mass - omega**2 * border)
     assert np.allclose(x[0] + x[1] / omega, border, rtol=1e-9)
-    # one foot carries nothing, two at the front only while a push of the right size holds the rest
-    # up
+    # one foot alone cannot support the robot; two front feet can only with a push of the right size
     for few in (recovery.contacts.only("FL_foot"), recovery.contacts.only("FL_foot", "FR_foot")):
         falling = replace(recovery, contacts=few)
         assert not falling.capture_point_bound.any() and not falling.static_bound.any()
 
-    # (20)(21) a steady push F at height z tips the robot over an edge at a distance l when F z > m
-    # g l, if it does not slide
+    # (20), (21): a constant push F at height z tips the robot over an edge at a distance l if F z >
+    # m g l and it does not slide
     slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])
     base = state.frame_pose("base").translation
     lever = (base[2] - feet[:, 2].mean()) * recovery.unit_vectors[:, :2] @ hull.equations[:, :2].T
@@ -97,8 +94,8 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
     assert np.allclose(
         recovery.static_bound, tips, rtol=1e-3
-    )  # the feet are level to a part of a millimetre
-    assert np.all(recovery.static_bound < recovery.pushes)  # a push that ends can be larger
+    )  # the feet are level to a fraction of a millimetre
+    assert np.all(recovery.static_bound < recovery.pushes)  # a short push can be larger
 
 
 def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:

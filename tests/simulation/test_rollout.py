@@ -1,4 +1,4 @@
-"""The one loop: its clock, its record, and how it says that something went wrong."""
+"""Rollouts: time, record, and reports of errors."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_robot_that_stands_on_its_back_has_fallen(sim: fb.Simulation) -> None:
 def test_a_physics_that_explodes_has_diverged(
     sim: fb.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it stands
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log to the working directory
     sim.reset(sim.robot.standing().replace(v=np.full(18, 1e7)))
     record = fb.rollout(sim, limp, 1.0)
     assert record.outcome == "diverged"
@@ -263,7 +263,7 @@ def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners() -> None:
     flat = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), fb.standing_tasks(start))
 
     class Points:
-        """The flat-footed controller, seen as one that speaks of two points."""
+        """The flat-footed controller, with two point contacts as its stance."""
 
         contacts = fb.Contacts.points(robot)
 
@@ -354,7 +354,7 @@ def test_a_robot_starts_with_every_foot_on_a_slope(normal: tuple[float, float, f
 
 
 class Switching:
-    """Stands on four feet, from 0.1 s to 0.2 s with one foot up, then on four again."""
+    """A controller that stands on four feet, but on three from 0.1 s to 0.2 s."""
 
     def __init__(self, lifted: str = "FL_foot"):
         robot = judges.load("go2")
@@ -378,9 +378,7 @@ class Switching:
 
 
 def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
-    """Planned forces are 0 where the stance has no contact, measured ones are what the physics has
-    there.
-    """
+    """Outside the stance, planned forces are 0, but measured forces are as in the simulation."""
     record = fb.rollout(sim, Switching(), 0.3, control_period=0.002)
     assert record.outcome == "completed"
     assert record.contacts.names == ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
@@ -392,11 +390,11 @@ def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
     assert np.all(np.abs(record.force("FL_foot", "planned")[~up, 2]) > 0.0)
     assert np.all(record.force("FL_foot")[60:95] == 0.0)  # in the air
     assert record.foot_positions[95, 0, 2] > 0.002
-    for i in (20, 70):  # each row's plan is the plan of its own stance
+    for i in (20, 70):  # each row has the plan of its own stance
         command = Switching()(record.q[i], record.v[i], float(record.time[i]))
         present = slice(
             3 * (4 - len(record.contacts_at(i))), None
-        )  # FL, the first one, comes and goes
+        )  # FL, the first one, is not always in the stance
         assert np.allclose(record.planned[i][present], command.forces, atol=1e-9)
 
 

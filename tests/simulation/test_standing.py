@@ -1,4 +1,4 @@
-"""Closed loop: robots stand on MuJoCo's floor under our controller and recover from pushes."""
+"""Closed loop: robots stand in MuJoCo under our controller and recover from pushes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from floatbase.dynamics import contact_space
 
 @cache
 def stood(name: str, duration: float, push: bool = False) -> fb.Rollout:
-    """A robot that stands, at 1 kHz; with a push of 30 N for 0.1 s after 0.5 s where that is
-    requested.
-    """
+    """Simulate a standing robot at 1 kHz; if requested, with a push of 30 N for 0.1 s at 0.5 s."""
     robot, controller = judges.load(name), judges.controller_of(name)
     pushes = [fb.Push([15.0, 26.0, 0.0], start=0.5, duration=0.1)] if push else []
     return fb.rollout(fb.Simulation(robot), controller, duration, pushes)
@@ -81,9 +79,10 @@ def test_under_the_push_the_ground_pushes_back() -> None:
 
 @pytest.mark.parametrize(("backend", "period"), [("compiled", 0.001), ("reference", 0.005)])
 def test_solo8_pushed_out_of_its_singular_stance_stands_on(backend: str, period: float) -> None:
-    """Beside the symmetric stance J has singular values that are small and of no use, and rows that
-    are inconsistent by the noise of q and v. It does not come back: once it leans, its contacts
-    hold the lean (J has one rank more).
+    """Near the symmetric stance, J has small singular values that are useless.
+
+    Noise of q and v makes some of its rows inconsistent there. The robot does not return: once it
+    leans, its contacts maintain the lean, because the rank of J is larger by one.
     """
     robot = judges.load("solo8")
     standing = robot.standing()

@@ -1,6 +1,4 @@
-"""A sweep gives one table: whatever the number of workers, wherever they are, and however often it
-was killed.
-"""
+"""A sweep gives one table, for any number of workers, anywhere, and however often it was killed."""
 
 from __future__ import annotations
 
@@ -42,7 +40,7 @@ print(table.shape, *table.columns)
 
 
 def spectrum(n: int, scale: float) -> dict[str, Any]:
-    """Floats that depend on the last bits, an array, and an error of its own at two points."""
+    """Return floats that depend on the last bits, and an array; raise an error at two points."""
     matrix = scale * np.vander(np.linspace(0.1, 1.7, 40), 40)[:, -20:]
     if n == 3:
         raise ValueError(f"no {n} here")
@@ -54,14 +52,14 @@ def spectrum(n: int, scale: float) -> dict[str, Any]:
 
 
 def assert_same_results(*tables: pd.DataFrame) -> None:
-    """Tables equal to the last bit, but for the processes that made them."""
+    """Check that tables are equal to the last bit, except for their process ids."""
     for table in tables[1:]:
         first, other = (each.drop(columns="process") for each in (tables[0], table))
         assert_frame_equal(first, other, check_exact=True)
 
 
 def assert_marked(table: pd.DataFrame) -> None:
-    """The whole table of `SCRIPT`."""
+    """Check the complete table of `SCRIPT`."""
     assert list(table.columns) == ["i", "result", "error"] and table["error"].isna().all()
     assert (
         table["result"].tolist() == [i / 7 for i in range(60)] and (table["i"] == table.index).all()
@@ -80,7 +78,7 @@ def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
 
 @pytest.mark.front_end
 def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
-    """Killed at a random moment: the points in flight are computed twice, and no others."""
+    """After a kill at a random time, only the points in progress are computed again."""
     after = np.random.default_rng(0).integers(2, 45)
     (tmp_path / "script.py").write_text(SCRIPT)
     command = [sys.executable, "script.py"]
@@ -93,18 +91,16 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
         running.kill()
     assert after <= rows.read_bytes().count(b"\n") < 61
     with rows.open("ab") as file:
-        file.write(b'{"point": 59, "i"')  # what a line is when the power goes
+        file.write(b'{"point": 59, "i"')  # an incomplete line, as after a power failure
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert said == "(60, 3) i result error\n"
     assert_marked(read_sweep(rows))
     assert (
         rows.read_bytes().count(b"\n") == 61
-    )  # no point has two lines, nothing is left of the torn one
+    )  # no point has two lines, and the incomplete line is gone
     calls = (tmp_path / "calls").read_text().split()
     assert set(calls) == {str(i) for i in range(60)}
-    assert (
-        len(calls) - 60 <= 2 * 2
-    )  # for each of two workers the point that it was at, and the next
+    assert len(calls) - 60 <= 2 * 2  # for each of two workers, its present point and the next
 
 
 def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
@@ -180,7 +176,7 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
             by_client = fb.sweep(power, GRID, setup=setup, cluster=client, progress=False)
             with raises(InputError, "result", "object"):
                 fb.sweep(lambda n: object(), {"n": [1, 2]}, cluster=client, progress=False)
-            cluster.scheduler.allowed_failures = 0  # else it tries three times more
+            cluster.scheduler.allowed_failures = 0  # otherwise it retries three times
             with raises(SimulationError, "KilledWorker"):
                 fb.sweep(
                     lambda n: os.kill(os.getpid(), 9), {"n": [1]}, cluster=client, progress=False

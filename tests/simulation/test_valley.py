@@ -1,6 +1,4 @@
-"""A ground of several planes: robots stand in a valley, one even with its centre of mass beside its
-feet.
-"""
+"""Ground of several planes: robots stand in a valley, even with the CoM not above their feet."""
 
 from __future__ import annotations
 
@@ -14,15 +12,13 @@ import floatbase as fb
 from floatbase.friction import wrench_set
 from floatbase.simulation import Ground
 
-LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
-# part of the weight: what one second of standing leaves of planned forces against measured ones
+LENGTHS = 1e-9  # m: error of Newton's method, and rounding
+# fraction of the weight: difference of planned and measured forces after one second of standing
 STEADY = 0.01
 
 
 def sides(degrees: float) -> tuple[np.ndarray, np.ndarray]:
-    """Normals of the two sides of a valley along x: of the left one, which falls to the right, and
-    of the right one.
-    """
+    """Return the normals of a valley along x: of its left side, which falls to the right, first."""
     angle = np.deg2rad(degrees)
     return np.array([0.0, -np.sin(angle), np.cos(angle)]), np.array(
         [0.0, np.sin(angle), np.cos(angle)]
@@ -30,9 +26,7 @@ def sides(degrees: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def with_feet(robot: fb.Robot, base: Sequence[float], centres: dict[str, np.ndarray]) -> fb.State:
-    """The state with a level base there, m, and the feet's centres at given places, by Newton's
-    method.
-    """
+    """Return the state with a level base at a position, and given feet [m], by Newton's method."""
     q = robot.standing().q.copy()
     q[:3], q[3:7] = base, [0.0, 0.0, 0.0, 1.0]
     for _ in range(50):
@@ -52,7 +46,7 @@ def with_feet(robot: fb.Robot, base: Sequence[float], centres: dict[str, np.ndar
 
 
 def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options: int) -> fb.Rollout:
-    """A second of standing in a state."""
+    """Simulate a second of standing in a state."""
     sim.reset(state)
     record = fb.rollout(
         sim, fb.WholeBodyController(sim.robot, contacts, fb.standing_tasks(state), **options), 1.0
@@ -95,9 +89,7 @@ def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
 
 
 def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() -> None:
-    """The lower feet push the upper ones outwards, into their slope: seen from above the CoM is not
-    between the feet.
-    """
+    """The lower feet push the upper ones into the slope; the CoM is not between the feet."""
     robot, (left, right) = judges.load("go2"), sides(40.0)
     slope, y_high, y_low = np.tan(np.deg2rad(40.0)), 0.16, -0.06
     centres, normals = {}, {}

@@ -1,4 +1,4 @@
-"""What a walk plans, in the picture; the camera that follows it; and its gait diagram."""
+"""Gait overlay, the camera that follows a walk, and the gait diagram."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SWING, START = 0.2, 0.3  # s
 
 @pytest.fixture(scope="module")
 def walked(go2: Robot) -> tuple[Rollout, Walk]:
-    """go2 trots for four swings, and two feet are in the air where the record ends."""
+    """Return a trot of go2 with four swings; two feet are in the air at the end of the record."""
     contacts = Contacts.feet(go2, mu=0.6)
     walk = Walk(go2, contacts, Gait.trot(go2, swing=SWING, start=START), velocity=(0.2, 0.0))
     push = fb.Push([0.0, 40.0, 0.0], start=0.5)
@@ -41,7 +41,7 @@ def walked(go2: Robot) -> tuple[Rollout, Walk]:
 
 @pytest.fixture(scope="module")
 def biped() -> tuple[Rollout, Walk]:
-    """talos, turning left, with one foot in the air where the record ends."""
+    """Return a walk of talos that turns left; one foot is in the air at the end of the record."""
     robot = fb.load("talos")
     walk = Walk(
         robot,
@@ -54,7 +54,7 @@ def biped() -> tuple[Rollout, Walk]:
 
 
 def vertices(item: Item) -> np.ndarray:
-    """Vertices of an item, (n, 3), m, world."""
+    """Return the vertices of an item, (n, 3), in the world frame [m]."""
     (packed,) = item.shape.data["geometries"]
     raw = packed["data"]["attributes"]["position"]
     unit = np.frombuffer(
@@ -105,13 +105,13 @@ def test_a_line_follows_the_swing_to_its_foothold(
         for point, at in ((line[0], path.start), (line[-1], path.end)):
             np.testing.assert_allclose(point, at + ground, atol=POINTS * size)
         middle, *_ = path((path.lift_off + path.touchdown) / 2.0)
-        # the ground is level but for how feet come down, so the curve leans by what the ends differ
-        # in height
+        # feet touch down at slightly different heights, so the curve leans by the difference of its
+        # ends
         leans = abs(path.end[2] - path.start[2]) + POINTS * size
         np.testing.assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
 
 
-def test_a_swing_aimed_elsewhere_costs_no_new_shape(
+def test_a_swing_with_a_new_target_costs_no_new_shape(
     viewer: Viewer, walked: tuple[Rollout, Walk]
 ) -> None:
     run, walk = walked
@@ -151,14 +151,16 @@ def test_a_stored_step_is_drawn_as_it_was_planned(
         np.testing.assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
-def test_before_its_first_tick_a_walk_has_nothing_to_draw(
+def test_a_walk_has_no_marks_before_its_first_control_step(
     viewer: Viewer, go2: Robot, standing: State
 ) -> None:
     walk = Walk(go2, Contacts.feet(go2), Gait.trot(go2))
     assert viewer.walk_overlay(walk, standing) == {} and walk.time is None
 
 
-def test_soles_are_outlined_where_and_as_they_will_stand(biped: tuple[Rollout, Walk]) -> None:
+def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
+    biped: tuple[Rollout, Walk],
+) -> None:
     run, walk = biped
     viewer = Viewer(run.robot)
     try:
@@ -182,7 +184,7 @@ def test_soles_are_outlined_where_and_as_they_will_stand(biped: tuple[Rollout, W
         viewer.close()
 
 
-def test_marks_have_legends_of_their_own_and_no_colour_of_a_force_or_a_cone(
+def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(
     viewer: Viewer, walked: tuple[Rollout, Walk]
 ) -> None:
     run, walk = walked
@@ -202,9 +204,7 @@ def test_marks_have_legends_of_their_own_and_no_colour_of_a_force_or_a_cone(
     assert len(kinds) == 4 and not {MEASURED, PLANNED, *CONE.values()} & set(kinds.values())
 
 
-def test_what_cannot_be_drawn_is_refused_by_name(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_invalid_overlays_are_refused_by_name(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
     run, walk = walked
     refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
     refused(
@@ -273,7 +273,7 @@ def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Roll
     }
 
 
-def test_a_followed_place_goes_straight_ways_and_leaves_out_the_steps() -> None:
+def test_a_followed_path_is_smooth_without_the_sway_of_steps() -> None:
     t = np.linspace(0.0, 4.0, 121)
     straight = np.stack([0.3 * t, -0.1 * t, np.full_like(t, 0.3)], axis=1)
     np.testing.assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
@@ -297,7 +297,7 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     )  # the same lines
 
 
-def test_a_gait_diagram_has_the_stances_and_the_measured_contacts(
+def test_a_gait_diagram_shows_stances_and_measured_contacts(
     walked: tuple[Rollout, Walk],
 ) -> None:
     run, _ = walked
@@ -320,7 +320,7 @@ def test_a_gait_diagram_has_the_stances_and_the_measured_contacts(
     plt.close("all")
 
 
-def test_normal_forces_are_those_of_each_foot_beside_the_gait(biped: tuple[Rollout, Walk]) -> None:
+def test_normal_forces_are_plotted_for_each_foot(biped: tuple[Rollout, Walk]) -> None:
     run, _ = biped
     _, grid = plt.subplots(3, 1, sharex=True)
     plots.plot_gait(run, grid[0])

@@ -1,6 +1,4 @@
-"""Light meshes: their size, their likeness to the originals, and what robots without them are shown
-with.
-"""
+"""Light meshes: their size, their similarity to the originals, and what is shown without them."""
 
 from __future__ import annotations
 
@@ -90,9 +88,11 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     assert np.linalg.norm(calf - foot, axis=1).min() < REACH
 
 
-def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
-    """The same text under another name, of other masses or with legs further apart, has them. One
-    of the same name with other feet, with a joint more, or another robot altogether, has not.
+def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
+    """Light meshes are found for the same visuals, whatever the name of the robot.
+
+    Another name, other masses and legs further apart keep them. Other feet, another joint or
+    another robot with the same name do not.
     """
     urdf = load("go2").urdf
     light = [mesh.vertices for mesh in robot_meshes(load("go2"))]
@@ -118,7 +118,7 @@ def test_light_meshes_are_those_of_a_urdf_and_not_of_a_name() -> None:
     assert len(robot_meshes(other)) < len(light)
 
 
-def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut() -> None:
+def test_the_base_of_a_floating_arm_moves_with_it() -> None:
     arm = load("ur5")
     bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
     loose = with_floating_base(arm)
@@ -128,7 +128,7 @@ def test_the_base_of_an_arm_moves_with_it_when_its_bolts_are_cut() -> None:
         np.testing.assert_array_equal(free[joint + 1].vertices, mesh.vertices)
 
 
-def test_what_a_locked_joint_moved_hangs_on_the_joint_above() -> None:
+def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
     arm = load("ur5")
     stiff = load("ur5", locked=["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"])
     meshes = robot_meshes(stiff)

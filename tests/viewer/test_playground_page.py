@@ -1,5 +1,6 @@
-"""The playground in a browser: every control to both ends, the challenges, the texts; and as a
-notebook shows it.
+"""The playground in a browser: every control at both ends, the challenges and the texts.
+
+It is also tested as a notebook shows it.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def opened(page, field: Playground) -> None:
     page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")
 
 
-def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Playground) -> None:
+def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> None:
     opened(page, field)
     page.evaluate(ENDS)
     for count in ("#panel input[type=checkbox]", "#board button", "#panel .buttons button"):
@@ -73,7 +74,7 @@ def test_every_control_goes_to_both_ends_and_the_page_lives_on(page, field: Play
     page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
 
 
-def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -> None:
+def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
     number = next(
         i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?"
     )
@@ -88,12 +89,8 @@ def test_a_challenge_is_begun_and_solved_and_tells_so(page, field: Playground) -
     picture(page, "playground_solved")
 
 
-def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(
-    page, field: Playground
-) -> None:
-    """Its plan lacks 0.5 m g, which only kp times the error in height makes up for: it sinks by 0.5
-    g / kp = 49 mm.
-    """
+def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: Playground) -> None:
+    """The plan lacks 0.5 m g. The CoM task makes up for it at an error of 0.5 g / kp = 49 mm."""
     opened(page, field)
 
     def sunk() -> float:
@@ -110,12 +107,12 @@ def test_a_lie_about_the_mass_lets_it_sink_and_the_truth_lifts_it_again(
     page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function(
-        "document.querySelector('#panel p.plot').textContent.includes('difference of')"
+        "document.querySelector('#panel p.plot').textContent.includes('difference between')"
     )
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
 
-def test_in_a_notebook_it_shows_itself_and_runs() -> None:
+def test_a_notebook_shows_and_runs_the_playground() -> None:
     shown = playground("solo12")
     try:
         assert "image/png" in shown._repr_mimebundle_()[0]
@@ -126,7 +123,7 @@ def test_in_a_notebook_it_shows_itself_and_runs() -> None:
 
 
 def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
-    """The push puts the robot back on its feet, and a judge begins with it."""
+    """The push puts the robot back on its feet, which starts a new judge."""
     field.start_challenge(
         next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side")
     )
@@ -137,7 +134,7 @@ def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None
         until(lambda seen=size: f"{0.1 * seen:.1f} N·s toppled" in field.judge.message)
 
 
-def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None:
+def test_challenges_can_be_changed_during_a_run(field: Playground) -> None:
     for challenge in (CHALLENGES[0], None, *CHALLENGES[6:9], None):
         field.start_challenge(challenge)
         before = field.session.sim.time
@@ -147,7 +144,7 @@ def test_a_challenge_is_chosen_and_left_while_it_runs(field: Playground) -> None
     assert field.run.error is None
 
 
-def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Playground) -> None:
+def test_a_paused_challenge_continues_with_run(field: Playground) -> None:
     number, challenge = next(
         (i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused
     )
@@ -163,7 +160,7 @@ def test_a_challenge_that_asks_for_it_begins_paused_and_goes_on_by_run(field: Pl
     until(lambda: field.session.sim.time > 0.2)
 
 
-def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(
+def test_reset_everything_includes_the_push_the_speed_and_the_terms(
     page, field: Playground
 ) -> None:
     first = (field.force, field.towards)
@@ -204,7 +201,7 @@ def test_all_as_at_first_is_the_push_the_speed_and_what_is_shown_too(
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
-def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(
+def test_an_unknown_setting_is_refused_and_the_run_continues(
     field: Playground,
 ) -> None:
     with raises(TypeError, "frction"):
@@ -214,7 +211,7 @@ def test_a_name_that_is_no_setting_is_told_to_the_caller_and_the_run_goes_on(
     assert field.session.settings.facets == 6 and field.run.status == "paused"
 
 
-def test_an_arm_is_set_back_as_it_was_at_first() -> None:
+def test_reset_everything_works_for_an_arm() -> None:
     arm = Playground(fb.load("ur5"))
     try:
         arm.start().reset_all()
@@ -224,7 +221,7 @@ def test_an_arm_is_set_back_as_it_was_at_first() -> None:
         arm.close()
 
 
-def test_on_a_phone_the_panel_lies_below_and_the_robot_is_seen(page, field: Playground) -> None:
+def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field: Playground) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     opened(page, field)
     page.wait_for_function("viewer.camera.zoom > 0.3 && viewer.camera.zoom < 1")
@@ -232,7 +229,7 @@ def test_on_a_phone_the_panel_lies_below_and_the_robot_is_seen(page, field: Play
     picture(page, "playground_phone")
 
 
-def test_the_true_slope_is_drawn_whatever_is_believed(field: Playground) -> None:
+def test_the_actual_slope_is_drawn(field: Playground) -> None:
     field.set(slope=(0.0, 20.0))
     until(
         lambda: (

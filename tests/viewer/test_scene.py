@@ -1,6 +1,4 @@
-"""The picture of a state, read from the scene's own commands rather than from the code that drew
-them.
-"""
+"""Pictures of a state, read from the commands of the scene and not from the code that drew them."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ from floatbase.viewer.scene.colours import (
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
-    """Placements in the scene, by what follows `start` in the path."""
+    """Return the transforms in the scene by the rest of the path after `start`."""
     return {
         path.removeprefix(start): np.reshape(command["matrix"], (4, 4)).T
         for (path, kind, _), command in viewer.window.scene.commands().items()
@@ -38,7 +36,7 @@ def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
 
 
 def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
-    """Colours set in the scene, without the alpha."""
+    """Return the colours set in the scene, without opacity."""
     return {
         path.removeprefix(start).removesuffix("/surface").removesuffix("/sides"): tuple(
             command["value"][:3]
@@ -56,7 +54,7 @@ def material(viewer: Viewer, path: str) -> dict[str, Any]:
     return viewer.window.scene.commands()[path, "set_object", ""]["object"]["materials"][0]
 
 
-def test_every_joint_stands_where_the_state_says(viewer: Viewer, go2: Robot) -> None:
+def test_every_joint_is_where_the_state_says(viewer: Viewer, go2: Robot) -> None:
     state = go2.random_state(3)
     viewer.show(state)
     placed = matrices(viewer, "/meshcat/robot/")
@@ -102,7 +100,7 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
         np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_a_cone_says_where_its_force_is(
+def test_the_colour_of_a_cone_shows_where_its_force_is(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
@@ -146,7 +144,7 @@ def test_a_cone_without_a_force_is_grey_and_faint(
 
 
 def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
-    """Normal of the ground in the scene, and a point of it."""
+    """Return the normal of the ground in the scene, and a point on it."""
     ground = matrices(viewer, "/meshcat/ground")[""]
     return ground[:3, 2], ground[:3, 3]
 
@@ -176,9 +174,7 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(
         assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
 
 
-def test_the_ground_is_level_where_contacts_do_not_say_otherwise(
-    go2: Robot, standing: State
-) -> None:
+def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing: State) -> None:
     slope = np.array([0.6, 0.0, 0.8])
     ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
     viewer = Viewer(go2)
@@ -201,7 +197,7 @@ def test_the_ground_is_level_where_contacts_do_not_say_otherwise(
     viewer.close()
 
 
-def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2: Robot) -> None:
+def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> None:
     ground = Ground(normal=[[0.0, -0.4, 1.0], [0.1, 0.4, 1.0]], offset=[0.1, 0.0])
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
@@ -220,7 +216,7 @@ def test_a_valley_is_drawn_where_it_is_and_nothing_of_a_side_below_the_other(go2
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
-def test_polyhedra_light_the_facets_that_are_reached(
+def test_polyhedra_highlight_their_active_facets(
     go2: Robot, standing: State, contacts: Contacts
 ) -> None:
     viewer = Viewer(go2, facets=4)
@@ -239,7 +235,7 @@ def test_polyhedra_light_the_facets_that_are_reached(
     viewer.close()
 
 
-def test_what_is_not_passed_is_not_drawn(
+def test_only_given_items_are_drawn(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     viewer.show(standing, com=False)
@@ -303,7 +299,7 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
 
 
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
-def test_a_scene_is_that_of_the_last_picture_however_paths_are_spelt(
+def test_a_scene_shows_the_last_picture_however_paths_are_spelt(
     pictures: list[Picture],
 ) -> None:
     assert scene_after(pictures) == scene_after(pictures[-1:])
@@ -318,7 +314,7 @@ def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> No
     assert viewer.window.scene.commands() == before
 
 
-def test_an_interrupted_picture_is_drawn_afresh(
+def test_an_interrupted_picture_is_drawn_again(
     viewer: Viewer, standing: State, contacts: Contacts
 ) -> None:
     viewer.show(standing)
@@ -349,7 +345,7 @@ def legend(viewer: Viewer) -> list[str]:
     return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
-def test_the_legend_names_what_is_shown(
+def test_the_legend_explains_what_is_shown(
     viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
 ) -> None:
     viewer.show(
@@ -404,7 +400,7 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     ]
 
 
-def test_a_called_camera_is_sent_again_but_nothing_else_moves_it(
+def test_only_a_call_of_camera_moves_the_camera_again(
     viewer: Viewer, go2: Robot, standing: State
 ) -> None:
     def looked() -> int:

@@ -1,4 +1,4 @@
-"""Marks, props and figures: their numbers, from the items themselves, and their pictures."""
+"""Markers, props and figures: their numbers, from the items themselves, and their pictures."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from floatbase.viewer.scene.colours import (
     ],
     ids=["ball", "rod", "cylinder", "cone"],
 )
-def test_closed_meshes_face_outwards_and_hold_their_volume(
+def test_closed_meshes_face_outwards_and_have_their_volume(
     mesh: geometry.Mesh, volume: float
 ) -> None:
     vertices, faces = mesh
@@ -51,7 +51,7 @@ def test_closed_meshes_face_outwards_and_hold_their_volume(
 @pytest.mark.parametrize(
     "direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)]
 )
-def test_frame_along_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
+def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
     turned = geometry.rotation_with_z_axis(direction)
     np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
@@ -98,7 +98,7 @@ NAN = float("nan")
         (lambda: props.bolts([0, 0, 0], 0.0), "radius", 0),
     ],
 )
-def test_what_cannot_be_drawn_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_invalid_shapes_are_refused_by_name(case: tuple[Any, ...]) -> None:
     draw, *named = case
     refused(draw, InputError, *named)
 
@@ -108,7 +108,7 @@ def test_a_push_ends_where_it_acts() -> None:
     np.testing.assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
 
 
-def test_two_points_have_no_support_region() -> None:
+def test_two_points_have_no_support_polygon() -> None:
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
     assert set(markers.support_region(square, 0.0)) == {""}
     assert markers.support_region(square[:2], 0.0) == {}
@@ -124,7 +124,7 @@ def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
     np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
 
 
-def test_a_turntables_mark_turns_to_the_left_and_its_top_is_where_it_was_put() -> None:
+def test_a_turntable_turns_to_the_left_below_its_given_top() -> None:
     table = props.turntable([1, 0, 0.5], 0.4, np.pi / 2).matrix
     np.testing.assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
     np.testing.assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
@@ -143,7 +143,7 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
     assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
 
 
-def test_braces_lower_a_part_of_a_label() -> None:
+def test_braces_make_a_subscript_in_a_label() -> None:
     images = [
         shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"]
         for text in ("fc", "f{c}")
@@ -175,7 +175,7 @@ DEFICIENCIES = {
 }
 
 
-def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
+def test_colours_are_distinct_for_colour_blind_readers() -> None:
     for name, deficiency in DEFICIENCIES.items():
         for one, other in [
             (MEASURED, PLANNED),
@@ -190,7 +190,7 @@ def test_the_colour_code_is_readable_for_the_colour_blind() -> None:
             ), name
 
 
-def test_the_compass_is_plotted_and_drawn_to_scale(
+def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
     viewer: Viewer, standing: State, contacts: Contacts
 ) -> None:
     wrenches = wrench_set(standing, contacts)
@@ -230,7 +230,7 @@ def test_the_compass_is_plotted_and_drawn_to_scale(
 
 
 @pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
-def test_prices_stand_at_the_middle_of_their_facets(
+def test_multipliers_are_at_the_middle_of_their_facets(
     viewer: Viewer, go2: Robot, standing: State, facets: int, turn: float
 ) -> None:
     slopes = {foot.frame: [0.2, -0.1 if foot.frame[1] == "L" else 0.3, 1.0] for foot in go2.feet}
@@ -275,9 +275,7 @@ def test_prices_stand_at_the_middle_of_their_facets(
         viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
 
-def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(
-    viewer: Viewer, standing: State
-) -> None:
+def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: State) -> None:
     contacts = Contacts.points(standing.robot)
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
@@ -289,7 +287,7 @@ def test_a_price_that_is_nearly_nothing_beside_another_gets_no_label(
 
 
 def test_figure_1_adds_up() -> None:
-    """f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
+    """The force f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
     right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
     drawn = right.renderer.picture
     feet = [item.matrix[:3, 2] for path, item in drawn.items() if path.startswith("measured/")]

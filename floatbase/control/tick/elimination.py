@@ -92,19 +92,19 @@ def equalities(A, b, M, h, J, base, lengths, B):
 
 
 @jit_allocating
-def independent_rows(A, b, v, rows, right):
+def independent_rows(A, b, v, rows, rhs):
     """Write orthonormal rows (r, nv) equivalent to A q̈ = b along the directions that A resolves.
 
     The rule is that of `build_qp`. Returns r, or -1 if rows of A q̈ = b disagree by more than the
-    contacts' motion A v explains. rows, right: (m, nv), (m,), receive the rows and their right-hand
-    sides first.
+    contacts' motion A v explains. rows, rhs: (m, nv), (m,), whose first r entries receive the rows
+    and their right-hand sides.
     """
     U, s, Vt = np.linalg.svd(A, False)
     r = 0
     while r < s.size and s[r] > CONSTRAINT_RANK_TOLERANCE * s[0]:
         r += 1
     U = np.ascontiguousarray(U[:, :r])
-    rows[:r], right[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
+    rows[:r], rhs[:r] = Vt[:r], np.dot(U.T, b) / s[:r]
     gap, motion = b - np.dot(U, np.dot(U.T, b)), np.dot(A, v)
     tolerance = INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * np.max(np.abs(motion))
     return -1 if np.max(np.abs(gap)) > tolerance else r

@@ -132,15 +132,15 @@ def centre_of_mass(bodies: Bodies):
 
 
 @jit
-def copy_rows(numbers, first, rows, columns, out, row):
-    """Copy a table (rows, columns) from `numbers` into out (·, columns), and return where it ends.
+def copy_rows(numbers, first, n_rows, n_columns, out, row):
+    """Copy a table (n_rows, n_columns) from `numbers` into `out`, and return where it ends.
 
     first: index in `numbers` where the table starts. row: first row of `out` to fill.
     """
-    for i in range(rows):
-        for c in range(columns):
-            out[row + i, c] = numbers[first + i * columns + c]
-    return first + rows * columns
+    for i in range(n_rows):
+        for c in range(n_columns):
+            out[row + i, c] = numbers[first + i * n_columns + c]
+    return first + n_rows * n_columns
 
 
 @jit

@@ -164,13 +164,13 @@ def make_tick(digest):
             A, b, M_rows, h, J_points, base, float_workspace, B, pivots
         )
         if motion_pivot <= DEPENDENT_ROW:
-            rows, right = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
-            m = independent_rows(A, b, v, rows, right)
+            rows, rhs = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
+            m = independent_rows(A, b, v, rows, rhs)
             if m < 0:
                 return INACCURATE
             B, pivots = B[: m + base], pivots[: m + base]
             _, smallest_pivot = eliminate(
-                rows[:m], right[:m], M_rows, h, J_points, base, float_workspace, B, pivots
+                rows[:m], rhs[:m], M_rows, h, J_points, base, float_workspace, B, pivots
             )
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE

@@ -170,9 +170,9 @@ def _thrusts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="01.1",
-        statement="The wall pushes on the arm with f_r at `tool`, both given relative to the "
-        "base. With which moment, shape (3,), N·m, do the bolts balance it? The weight, which "
-        "the bolts carry anyway, does not count.",
+        statement="The wall pushes on the arm with f_r at `tool`, both given in the frame of "
+        "the base. With which moment, shape (3,), N·m, do the bolts balance it? The weight, "
+        "which the bolts carry anyway, does not count.",
         stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
         solution="bolts_moment = -np.cross(tool, f_r)",
         judge=NumericJudge(
@@ -277,7 +277,7 @@ EXERCISES = (
                 "mu_twice": lambda: 0.7 * _carried_by_friction(),
             },
             hints={
-                "g_is_10": "That takes g as 10 m/s²; the physics here has 9.81.",
+                "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
                 "weight": "That is the weight. A horizontal force has to come from friction.",
                 "one_foot": "That is the limit of one foot. Four feet share the force.",
                 "four_weights": "All four feet together carry the weight once, not four times.",

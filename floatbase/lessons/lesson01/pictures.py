@@ -274,5 +274,5 @@ def _play_record(
     """Play a record as 30 pictures per second; picture: (state, row of the record) -> `Picture`."""
     rows = recording.sampled_rows(record.time, 30.0)
     pictures = [picture(record.state(int(i)), int(i)) for i in rows]
-    view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="where it was first")
+    view.play_pictures(record.time[rows], pictures, speed=speed, ghost_name="initial state")
     return view.camera(look)

@@ -327,7 +327,7 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         gone = states[-1].q[:2] - states[0].q[:2]
         slip = max(float(np.abs(rolling_wheel().slip(state)).max()) for state in states)
         return (
-            f"in the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as "
+            f"at the end: {gone[0]:+.2f} m ahead, <b>{gone[1]:+.2f} m to the left</b>, heading as "
             f"before; "
             f"largest slip on the way {abs(slip):.3f} m/s"
         )

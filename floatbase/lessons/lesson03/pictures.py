@@ -184,7 +184,7 @@ def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[s
         np.where(np.abs(A) > 1e-9, size, np.nan), cmap="viridis", aspect="auto", vmin=-3, vmax=1.5
     )
     figure.colorbar(
-        shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="size, as a power of ten", shrink=0.8
+        shown, ax=left, ticks=[-3, -2, -1, 0, 1], label="magnitude, as a power of ten", shrink=0.8
     )
     _name_blocks(left, rows, columns)
     values = np.linalg.svd(A, compute_uv=False)

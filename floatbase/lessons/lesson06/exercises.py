@@ -99,7 +99,7 @@ def _out_of_balance(f: Array) -> Verdict | None:
     carried = weight * np.array([0.0, 0.0, 1.0])
     missing = float(np.linalg.norm(f.sum(axis=0) - carried))
     sums = {
-        ("nobody", "The forces do not carry the robot yet."): 0.0 * n,
+        ("no_force", "The forces do not carry the robot yet."): 0.0 * n,
         (
             "sign",
             "The sign is wrong. λ is the force of the ground on the robot, and it pushes upwards.",
@@ -185,7 +185,7 @@ def _forces() -> list[Example]:
     squeeze[[7, 10]] = 1.0, -1.0
     return [
         *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
-        (np.zeros(12), "nobody"), (-smallest, "sign"),
+        (np.zeros(12), "no_force"), (-smallest, "sign"),
         (np.tile(weight * n[2] * n / 4, 4), "slides"),
         (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
         (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"),

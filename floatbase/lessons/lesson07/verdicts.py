@@ -134,7 +134,7 @@ def _tried() -> Array:
 
 
 def _agrees(rows: Array, slope: float) -> bool:
-    """Return whether constraints allow exactly the forces with |f_x|, |f_y| ≤ slope f_z.
+    """Return whether constraints allow exactly the forces with `|f_x|, |f_y| ≤ slope f_z`.
 
     Forces close to the border do not count: rounding a number to two digits may move it.
     """
@@ -226,44 +226,44 @@ def judge_design(given: Array) -> Verdict:
     away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
     strayed = 1e3 * record.slip().max()
     end = rounded(round(away[-1], 1), "mm", floor=0.5)
-    told = (
+    text = (
         f"x_c moves by {rounded(away.max(), 'mm')} at most, {end} at the end; a foot moves by "
         f"{rounded(strayed, 'mm')}"
     )
     if away.max() > AWAY and away[-1] > BACK:
         return Verdict(
             False,
-            f"The robot goes too far and stays there: {told}. How does each gain affect e?",
+            f"The robot goes too far and stays there: {text}. How does each gain affect e?",
             "stays_away",
         )
     if away[-1] > BACK:
         return Verdict(
             False,
-            f"The robot returns too slowly: {told}. A damper without a spring does not know the "
+            f"The robot returns too slowly: {text}. A damper without a spring does not know the "
             f"place.",
             "creeps",
         )
     if away.max() > AWAY and strayed > STRAYED:
         return Verdict(
             False,
-            f"The robot goes too far, and a foot slips: {told}. A spring pulls hardest at the far "
+            f"The robot goes too far, and a foot slips: {text}. A spring pulls hardest at the far "
             f"end, a damper earlier.",
             "too_far_and_strays",
         )
     if away.max() > AWAY:
         return Verdict(
             False,
-            f"The robot goes too far: {told}. When does braking help most, early or late in the "
+            f"The robot goes too far: {text}. When does braking help most, early or late in the "
             f"push?",
             "too_far",
         )
     if strayed > STRAYED:
         return Verdict(
-            False, f"A foot slips: {told}. The robot pulls back harder than necessary.", "strays"
+            False, f"A foot slips: {text}. The robot pulls back harder than necessary.", "strays"
         )
     return Verdict(
         True,
-        f"In simulation: {told}. The damping brakes while the push still acts. Then the spring "
+        f"In simulation: {text}. The damping brakes while the push still acts. Then the spring "
         f"only has to bring the robot back.",
     )
 

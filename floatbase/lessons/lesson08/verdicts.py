@@ -208,52 +208,54 @@ def judge_crawl(given: Array) -> Verdict:
             "too_short",
         )
     if forwards < 0:
-        return Verdict(False, "The speed must be positive, for forwards.", "backwards")
+        return Verdict(
+            False, "The speed must not be negative: the crawl goes forwards.", "backwards"
+        )
     record = lasting_or_verdict(lambda: run_crawl(swing, pause, forwards))
     if isinstance(record, Verdict):
         return record
     far = 1e3 * float((record.com[-1] - record.com[0])[0])
     inside, pressed = 1e3 * smallest_support_margin(record), float(record.measured[:, 2::3].max())
-    told = (
+    text = (
         f"{far:.0f} mm in {CRAWL_DURATION:g} s, margin at least {inside:.0f} mm, at most "
         f"{pressed:.0f} N at a foot"
     )
     if far < FAR and inside < INSIDE:
         return Verdict(
             False,
-            f"The crawl is too slow and too close to the edge: {told}. Speed and pause are two "
+            f"The crawl is too slow and too close to the edge: {text}. Speed and pause are two "
             f"different numbers.",
             "slow_and_near",
         )
     if far < FAR:
         return Verdict(
             False,
-            f"The crawl is too slow: {told}. Speed costs little: the other numbers hardly change "
+            f"The crawl is too slow: {text}. Speed costs little: the other numbers hardly change "
             f"with it.",
             "slow",
         )
     if inside < INSIDE and pressed > PRESSED:
         return Verdict(
             False,
-            f"The crawl is too close to the edge, and a foot stamps: {told}. Both need more time.",
+            f"The crawl is too close to the edge, and a foot stamps: {text}. Both need more time.",
             "near_and_stamps",
         )
     if inside < INSIDE:
         return Verdict(
             False,
-            f"The crawl is too close to the edge: {told}. The centre of mass shifts while all feet "
+            f"The crawl is too close to the edge: {text}. The centre of mass shifts while all feet "
             f"are on the ground.",
             "near",
         )
     if pressed > PRESSED:
         return Verdict(
             False,
-            f"A foot stamps: {told}. How fast does a foot move in a step of that length?",
+            f"A foot stamps: {text}. How fast does a foot move in a step of that length?",
             "stamps",
         )
     return Verdict(
         True,
-        f"In simulation: {told}. Pauses give margin, and slow swings give quiet feet. The price is "
+        f"In simulation: {text}. Pauses give margin, and slow swings give quiet feet. The price is "
         f"longer steps.",
     )
 

@@ -159,41 +159,47 @@ def _judge_record(record: Rollout, seconds: float) -> Verdict:
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
-    told = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
-    told += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
-    told += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
+    text = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
+    text += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
+    text += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
     if min(ahead, behind) < 1.0:
         return Verdict(
-            False, f"The robot tips: {told}. At an edge, the sole cannot push any harder.", "tips"
+            False,
+            f"The robot tips: {text}. At an edge, the sole cannot push any harder.",
+            "tips",
         )
     if ahead < EDGE and abs(short) > NEAR:
         return Verdict(
             False,
-            f"Too close to the toes, and the lean does not reach its goal: {told}.",
+            f"Too close to the toes, and the lean does not reach its goal: {text}.",
             "toes_and_short",
         )
     if ahead < EDGE:
         return Verdict(
             False,
-            f"Too close to the toes: {told}. Braking pushes there. How does it depend on the time?",
+            f"Too close to the toes: {text}. Braking pushes there. How does it depend on the time?",
             "toes",
         )
     if short > NEAR:
         return Verdict(
-            False, f"The lean does not reach its goal: {told}. Another task holds it back.", "short"
+            False,
+            f"The lean does not reach its goal: {text}. Another task holds it back.",
+            "short",
         )
     if short < -NEAR:
         return Verdict(
-            False, f"The lean goes too far: {told}. Nothing brakes the rest of the body.", "beyond"
+            False,
+            f"The lean goes too far: {text}. Nothing brakes the rest of the body.",
+            "beyond",
         )
     if seconds > QUICK:
         slow = rounded(seconds, "s", digits=3)
         return Verdict(
             False,
-            f"Everything is right, but the lean takes {slow}: {told}. It can be faster.",
+            f"Everything is right, but the lean takes {slow}: {text}. It can be faster.",
             "slow",
         )
-    return Verdict(True, f"In simulation: {told}.")
+    return Verdict(True, f"In simulation: {text}.")
 
 
 def _leans() -> list[Example]:

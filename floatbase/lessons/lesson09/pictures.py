@@ -145,7 +145,7 @@ def show_sole(
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
     possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
-    told = (
+    summary = (
         "corner forces exist"
         if possible
         else f"impossible with corner forces: {_violated_limits(limits, w)}"
@@ -155,7 +155,7 @@ def show_sole(
         if possible
         else f"closest forces: off by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
     )
-    return _slice(limits, w, told, nearest)
+    return _slice(limits, w, summary, nearest)
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:

@@ -81,14 +81,15 @@ def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callab
         state = arm_state(tuple(JOINT_VELOCITY))
         v = state.v
 
-        def change(way: Array) -> Array:
+        def inertia_derivative(direction: Array) -> Array:
             after, before = (
-                state.replace(q=state.integrate(s * STEP * way)).M for s in (1.0, -1.0)
+                state.replace(q=state.integrate(s * STEP * direction)).M for s in (1.0, -1.0)
             )
             return np.asarray((after - before) / (2.0 * STEP))
 
-        gradient = np.array([v @ change(unit) @ v for unit in np.eye(6)])
-        return np.asarray(rate * change(v) @ v + slope * gradient + gravity * arm_state().h)
+        gradient = np.array([v @ inertia_derivative(unit) @ v for unit in np.eye(6)])
+        rate_force = rate * inertia_derivative(v) @ v
+        return np.asarray(rate_force + slope * gradient + gravity * arm_state().h)
 
     return force
 

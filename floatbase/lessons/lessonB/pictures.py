@@ -88,13 +88,13 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         GREYS[0],
     )
     view.draw(picture)
-    told = (
+    summary = (
         f"lever <b>{rounded(1000 * bench.lever, 'mm', floor=0.05)}</b>; possible: "
         f"{least:.0f} to {most:.0f} N·m; "
     )
     if not least <= torque <= most:
-        return f"{told}<b>{torque:.0f} N·m is more than the supply allows here</b>"
-    return f"{told}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
+        return f"{summary}<b>{torque:.0f} N·m is more than the supply allows here</b>"
+    return f"{summary}for {torque:.0f} N·m <b>A {a / BAR:.0f} bar, B {b / BAR:.0f} bar</b>"
 
 
 def _towards(gamma: float) -> Array:

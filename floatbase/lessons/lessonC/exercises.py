@@ -108,11 +108,11 @@ def _judge_guess(answer: Any) -> Verdict:
             "The motors are far from their limits here. What does a push do to the feet?",
             "motors",
         )
-    told = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
-    told += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
+    faults = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
+    faults += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
     return Verdict(
         False,
-        f"With your list, {' and '.join(told)}. Correct the guess as the solver would, and check "
+        f"With your list, {' and '.join(faults)}. Correct the guess as the solver would, and check "
         f"again.",
         "corrections",
     )
@@ -157,7 +157,7 @@ ROW_TO_DROP = '''def row_to_drop(W, prices):
     return W[int(np.argmin(prices))]'''
 
 
-def _steps() -> list[Example]:
+def _longest_step_examples() -> list[Example]:
     def step(
         slack: Callable[..., Any] = lambda x, G, h: np.round(h - G @ x, 9),
         counts: Callable[..., Any] = lambda room, speed: speed > 1e-6,
@@ -297,7 +297,7 @@ EXERCISES = (
         stub=LONGEST_STEP_STUB,
         solution=LONGEST_STEP,
         judge=judge_step,
-        examples=_steps,
+        examples=_longest_step_examples,
         explanation="Constraint i allows a step of length slack / speed, if the step approaches "
         "it at all. The smallest of these lengths decides, or 1 if none is smaller.",
     ),

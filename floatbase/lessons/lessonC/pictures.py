@@ -82,7 +82,7 @@ class ActiveSetGame(widgets.VBox):
 
     def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
         self._puzzles, self._at = tuple(puzzles), 0
-        self._picture, self._told = widgets.HTML(), widgets.HTML()
+        self._picture, self._message = widgets.HTML(), widgets.HTML()
         self.rows = {str(name): self._button(str(name)) for name in corner_table().inequality_names}
         self.next = widgets.Button(
             description="next bowl", layout=widgets.Layout(width="8em", flex="0 0 auto")
@@ -91,7 +91,7 @@ class ActiveSetGame(widgets.VBox):
         buttons = widgets.HBox(
             [*self.rows.values(), self.next], layout=widgets.Layout(flex_flow="row wrap")
         )
-        super().__init__([self._picture, buttons, self._told])
+        super().__init__([self._picture, buttons, self._message])
         self._start_puzzle()
 
     @property
@@ -102,7 +102,7 @@ class ActiveSetGame(widgets.VBox):
     @property
     def message(self) -> str:
         """Comment on the constraints that are on, as HTML."""
-        return str(self._told.value)
+        return str(self._message.value)
 
     def _button(self, name: str) -> widgets.Button:
         made = widgets.Button(description=name, layout=widgets.Layout(width="8em", flex="0 0 auto"))
@@ -161,7 +161,7 @@ class ActiveSetGame(widgets.VBox):
         self._picture.value, faults = self._current_view()
         self.solved = not faults
         clicks = f"{self.clicks} click{'' if self.clicks == 1 else 's'}"
-        self._told.value = (
+        self._message.value = (
             f"bowl {self._at + 1} of {len(self._puzzles)}, {clicks}: {_describe_faults(faults)}"
         )
 

@@ -109,11 +109,11 @@ def judge_step(answer: Any) -> Verdict:
                 )
             length, row = given
             if not isinstance(length, int | float | np.number) or not np.isfinite(length):
-                told = (
+                text = (
                     f"The length is {length!r}, but it must be a number from 0 to 1. Did you "
                     f"divide by a speed of zero?"
                 )
-                return Verdict(False, told, "no_length")
+                return Verdict(False, text, "no_length")
             if length < 0:
                 return Verdict(
                     False, f"A length is negative ({length:.2g}). {way.text}", "negative"

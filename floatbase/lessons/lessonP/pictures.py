@@ -27,16 +27,16 @@ def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> 
     Axes
         The axes.
     """
-    believed, true = (sorted({pair[i] for pair in records}) for i in (0, 1))
+    assumed, actual = (sorted({pair[i] for pair in records}) for i in (0, 1))
     _, axis = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
-    fell = np.array([[records[b, t].outcome != "completed" for t in true] for b in believed])
+    fell = np.array([[records[b, t].outcome != "completed" for t in actual] for b in assumed])
     axis.imshow(fell, cmap="Greys", vmin=0.0, vmax=2.0, origin="lower")
-    for i, b in enumerate(believed):
-        for j, t in enumerate(true):
+    for i, b in enumerate(assumed):
+        for j, t in enumerate(actual):
             words = f"{records[b, t].time[-1]:.1f} s" if fell[i, j] else "stands"
             axis.text(j, i, words, ha="center", va="center", fontsize="small")
-    axis.set_xticks(range(len(true)), [f"{x:g}" for x in true])
-    axis.set_yticks(range(len(believed)), [f"{x:g}" for x in believed])
+    axis.set_xticks(range(len(actual)), [f"{x:g}" for x in actual])
+    axis.set_yticks(range(len(assumed)), [f"{x:g}" for x in assumed])
     axis.set(xlabel=f"{name}, actual", ylabel=f"{name}, assumed")
     return axis
 

@@ -195,12 +195,12 @@ def record_box(
     """
     robot, fault = fb.load("go2"), injected_fault.kind
     mu = injected_fault.size if fault == "friction" else MU
-    told = (
+    assumed = (
         tilted(twist.normal, injected_fault.size, injected_fault.heading)
         if fault == "normal"
         else twist.normal
     )
-    contacts = fb.Contacts.points(robot, MU, normals=told)
+    contacts = fb.Contacts.points(robot, MU, normals=assumed)
     state = standing_on(robot, twist.normal)
     mismatch = ModelMismatch(
         mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift"

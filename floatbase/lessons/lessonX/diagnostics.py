@@ -131,7 +131,7 @@ def ground_normal(box: BlackBox) -> Array:
 
 
 def sliding_friction_ratios(box: BlackBox, normal: npt.ArrayLike) -> Array:
-    """Return |λt| / λn of each foot in each row in which it is loaded and slides.
+    """Return `|λt| / λn` of each foot in each row in which it is loaded and slides.
 
     Every second row is examined.
 

@@ -32,7 +32,7 @@ KICK_SEED = 5  # seed of the box of exercise X.1
 # seeds from which the last exercise takes one fault each
 _UNSEEN_SEEDS = (20611, 20612, 20613, 102, 20615, 20616)
 _FAULTLESS_SEED = 20617  # seed of its two robots without a fault
-_KICK_FORCE = 20.0  # N: a larger residual is a kick and not a numerical error of the simulation
+_KICK_FORCE = 20.0  # N: a larger residual is a kick and not a jump of the simulation itself
 
 
 # X.1 ----------------------------------------------------------------------------------------------
@@ -65,7 +65,7 @@ def _impulse() -> Array:
     return np.asarray(push.force * push.duration)
 
 
-def _momentum() -> Array:
+def _momentum_change() -> Array:
     """Return the change of the robot's momentum during the kick."""
     box, (push,) = kicked_box(), faultless_cases(KICK_SEED)[1].pushes
     first, last = (
@@ -89,7 +89,7 @@ def _kicks() -> dict[str, Callable[[], Any]]:
             )
         ),
         "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
-        "momentum": _momentum,
+        "momentum": _momentum_change,
     }
 
 
@@ -114,20 +114,20 @@ def _judge_report(answer: Any) -> Verdict:
             False, 'The first line must give the seed of the boxes, as in "seed 7".', "no_seed"
         )
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
-    told = {name: line for name, line in lines.items() if line.strip(" ?.")}
-    return _report_of(int(seed[1]), told)
+    reports = {name: line for name, line in lines.items() if line.strip(" ?.")}
+    return _report_of(int(seed[1]), reports)
 
 
-def _report_of(seed: int, told: dict[str, str]) -> Verdict:
-    """Judge the lines about the boxes of a seed; told: name of a box -> its line."""
+def _report_of(seed: int, reports: dict[str, str]) -> Verdict:
+    """Judge the lines about the boxes of a seed; reports: name of a box -> its line."""
     cases = {case.name: case for case in random_cases(seed)}
-    if unknown := sorted(set(told) - set(cases)):
+    if unknown := sorted(set(reports) - set(cases)):
         return Verdict(
             False,
             f"There is no box {unknown[0]}. The boxes are A to F, each on its own line.",
             "no_such_box",
         )
-    if not told:
+    if not reports:
         return Verdict(
             False,
             'There is no line yet. A line names a fault and its evidence, such as "A: mass 0.93".',
@@ -135,7 +135,7 @@ def _report_of(seed: int, told: dict[str, str]) -> Verdict:
         )
     boxes = {box.name: box for box in black_boxes(seed)}
     verdicts = {
-        name: judge_line(cases[name], boxes[name], line) for name, line in sorted(told.items())
+        name: judge_line(cases[name], boxes[name], line) for name, line in sorted(reports.items())
     }
     wrong = [f"{name}: {verdict.text}" for name, verdict in verdicts.items() if not verdict.right]
     solved = [name for name, verdict in verdicts.items() if verdict.right]
@@ -186,7 +186,9 @@ def _judge_program(answer: Any) -> Verdict:
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
     """Return what is wrong with a program's answer about a box, or None."""
     what = (
-        f"a robot with {case.injected_fault.kind}" if case.injected_fault.kind else "a sound robot"
+        f"a robot with {case.injected_fault.kind}"
+        if case.injected_fault.kind
+        else "a robot without a fault"
     )
     what += " that was kicked over" if case.pushes else ""
     try:

@@ -1,4 +1,4 @@
-"""Lesson X: a program that finds the fault in a black box, the solution of exercise X.3."""
+"""Lesson X: find the fault in a black box, the solution of exercise X.3."""
 
 from itertools import combinations
 
@@ -34,29 +34,29 @@ def plan_fault(box: BlackBox) -> str:
 
 def motor_fault(box: BlackBox) -> str:
     """Check whether the joints got the commanded torques."""
-    got, told = required_forces(box)[:, 6:], box.tau[:-1]
-    off = np.median(abs(told - got), axis=0)
+    got, commanded = required_forces(box)[:, 6:], box.tau[:-1]
+    off = np.median(abs(commanded - got), axis=0)
     if off.max() < 0.5:  # N·m
         return ""
     constants = range(0, 120, 2)  # ms
     period = box.time[1] - box.time[0]
-    late = [np.median(abs(lagged(told, period, ms) - got)) for ms in constants]
+    late = [np.median(abs(lagged(commanded, period, ms) - got)) for ms in constants]
     if min(late) < 0.3 * late[0]:
         return f"slow motors {constants[np.argmin(late)]} ms"
-    return swapped_joints(box, got, told, off)
+    return swapped_joints(box, got, commanded, off)
 
 
 def swapped_joints(
     box: BlackBox,
     got: np.ndarray,
-    told: np.ndarray,
+    commanded: np.ndarray,
     off: np.ndarray,
 ) -> str:
-    """Find two joints that got each other's commands, within the limits of their motors."""
+    """Find two joints that got each other's commands, within torque limits."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
     for i, j in combinations(range(len(names)), 2):
-        crossed = np.clip(told[:, [j, i]], -limits[[i, j]], limits[[i, j]])
+        crossed = np.clip(commanded[:, [j, i]], -limits[[i, j]], limits[[i, j]])
         left = np.median(abs(crossed - got[:, [i, j]]), axis=0)
         share = left.sum() / (off[i] + off[j])
         if share < best:
@@ -66,8 +66,8 @@ def swapped_joints(
 
 def ground_fault(box: BlackBox) -> str:
     """Check whether the ground is what the controller assumed."""
-    normal, told = ground_normal(box), box.contacts.normals[0]
-    angle = np.rad2deg(np.arccos(min(1.0, normal @ told)))
+    normal, assumed = ground_normal(box), box.contacts.normals[0]
+    angle = np.rad2deg(np.arccos(min(1.0, normal @ assumed)))
     if angle > 5:
         return f"normal {angle:.1f}°"
     used = sliding_friction_ratios(box, normal)

@@ -72,12 +72,12 @@ def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str
     i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
     view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
     gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
-    told = ", ".join(
+    gap_text = ", ".join(
         f"{name[:2]} {gap:.0f}" for name, gap in zip(box.contacts.names, gaps, strict=True)
     )
     left = float(np.linalg.norm(missed[i, :3]))
     return (
-        f"planned and measured forces differ by {told} N; "
+        f"planned and measured forces differ by {gap_text} N; "
         f"{left if left >= _MIN_TOLERANCE else 0:.0f} N is missing in (7) on the base"
     )
 
@@ -128,8 +128,11 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
         The drawing and how well the torques agree, as HTML.
     """
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
-    told = box.tau[: len(got)]
-    orders, both = lagged(told, period, ms), np.concatenate([got[:, joint], told[:, joint], [0.0]])
+    commanded = box.tau[: len(got)]
+    orders, both = (
+        lagged(commanded, period, ms),
+        np.concatenate([got[:, joint], commanded[:, joint], [0.0]]),
+    )
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
     drawn = frame.ticks()
     drawn += frame.curve(times, got[:, joint], stroke=hex_code(GREYS[2]), stroke_width=6)

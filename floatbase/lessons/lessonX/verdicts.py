@@ -24,12 +24,12 @@ EVIDENCE = {
 }
 # what speaks against a fault in every box that has another
 COUNTER_EVIDENCE = {
-    "friction": "feet that slide do not get less friction than the controller assumed: |λt| / "
+    "friction": "feet that slide get at least the friction that the controller assumed: |λt| / "
     "λn of the measured forces.",
     "normal": "the feet are in a plane, and its normal is the assumed one.",
     "mass": "with M and h of the data sheet, the plan (q̈, τ, λ) satisfies the first line of (7) "
     "in every row.",
-    "drift": "A q̈ of the plan is b, which is not zero, while all feet hold.",
+    "drift": "in the plan A q̈ equals b, which is not zero, while no foot slips.",
     "slow motors": "no lag brings the commands much closer to the torques that the motion "
     "required.",
     "swapped motors": "no swap of two commands brings them closer to the torques that the "
@@ -141,11 +141,11 @@ def _joints(case: Case, box: BlackBox, line: str) -> Verdict:
             "no_such_joint",
         )
     if len(given) != 2:
-        told = (
+        text = (
             f"swapped motors is right. The evidence must be {EVIDENCE['swapped motors']}, but "
             f"there are {len(given)}."
         )
-        return Verdict(False, told, "not_two_joints")
+        return Verdict(False, text, "not_two_joints")
     if given & right:
         return (
             _RIGHT
@@ -175,8 +175,8 @@ def _friction(case: Case, box: BlackBox) -> _Evidence:
 
 
 def _normal(case: Case, box: BlackBox) -> _Evidence:
-    ground, told = ground_normal(box), box.contacts.normals[0]
-    slope, believed = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, told))
+    ground, assumed = ground_normal(box), box.contacts.normals[0]
+    slope, assumed_slope = (float(np.rad2deg(np.arccos(n[2]))) for n in (ground, assumed))
     known = {
         "radians": (float(np.deg2rad(case.injected_fault.size)), "the answer must be in degrees."),
         "slope": (
@@ -184,7 +184,7 @@ def _normal(case: Case, box: BlackBox) -> _Evidence:
             "that is the slope of the ground. The evidence is the angle to the assumed normal.",
         ),
         "believed": (
-            believed,
+            assumed_slope,
             "that is the assumed slope of the ground. The evidence is the angle to the actual "
             "normal.",
         ),

@@ -27,7 +27,9 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb("#222222")  # and the ZMP, and prices; on a dark background they are light, as text is
+PUSH = _rgb(
+    "#222222"
+)  # also the ZMP and multipliers; on a dark background they are light, like text
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")

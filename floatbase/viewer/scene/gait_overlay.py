@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._geometry import rotation_z
 from floatbase._validation import Array, as_instance, as_number, short_repr
 from floatbase.behaviours import LIPM, StepPlan, Swing, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
@@ -179,7 +180,7 @@ def _footholds_and_swings(
     for name, place in footholds.items():
         foot, path = _foot(state.robot, name), name.replace("/", "_")
         rotation, offset = (
-            _rotation_about_z(yaw + yaw_changes.get(name, 0.0)),
+            rotation_z(yaw + yaw_changes.get(name, 0.0)),
             _offset_to_ground(foot, state.robot.standing()),
         )
         picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
@@ -237,12 +238,6 @@ def _swing_path(swing: Swing, offset: Array) -> Item:
         _unit_swing_path(),
         transform(swing.start + offset, np.stack([x, y, np.cross(x, y)], axis=1), scale),
     )
-
-
-def _rotation_about_z(yaw: float) -> Array:
-    """Return the rotation about z by an angle [rad]."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @lru_cache(maxsize=8)

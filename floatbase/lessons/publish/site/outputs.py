@@ -38,28 +38,28 @@ class PicturePlacer(Protocol):
         """Return HTML for the data of an output that holds a picture, or None."""
 
 
-def run_lessons(lessons: Iterable[Path], kept: Path) -> dict[Path, Any]:
+def run_lessons(lessons: Iterable[Path], cache: Path) -> dict[Path, Any]:
     """Run lessons and return path -> notebook with outputs. Unchanged lessons are not run again.
 
     Parameters
     ----------
     lessons : iterable of Path
         The lessons.
-    kept : Path
+    cache : Path
         Folder of earlier runs, created if necessary. File names contain a digest of the lesson and
         of the package.
     """
-    kept.mkdir(parents=True, exist_ok=True)
+    cache.mkdir(parents=True, exist_ok=True)
     source = _digest_of_package()
     files = {
-        path: kept / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons
+        path: cache / f"{path.stem}-{_digest(path.read_bytes() + source)}.ipynb" for path in lessons
     }
     new = {path: file for path, file in files.items() if not file.exists()}
     with ProcessPoolExecutor(PARALLEL_RUNS, mp_context=get_context("spawn")) as pool:
         for path in pool.map(_run_lesson, new, new.values()):
             print(f"run: {path.name}", flush=True)
     for path, file in files.items():
-        for former in set(kept.glob(f"{path.stem}-*.ipynb")) - {file}:
+        for former in set(cache.glob(f"{path.stem}-*.ipynb")) - {file}:
             former.unlink()
     return {path: read_notebook(file) for path, file in files.items()}
 
