@@ -408,8 +408,8 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Compute every size, rank and dimension of the equations of motion from singular values.
 
     `contact_space` decides the rank of J. The null spaces of B and C come from their own singular
-    values, with the resolved rows and their forces in place of A and J. The dimension of null(Jᵀ)
-    is then added.
+    values. In B and C, the resolved rows and their forces replace A and J, so the dimension of
+    null(Jᵀ) is added.
 
     Parameters
     ----------
