@@ -12,12 +12,12 @@
 Robots        catalogue, load, load_urdf, Robot, State
 Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques
               (14), feasible_space (13)
-Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask,
+Tasks, costs  Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask,
               TorqueTask, standing_tasks
 Control       WholeBodyController (26)(27), QP, solve
 Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_recovery
 Walking       from floatbase.behaviours import Gait, Walk, Stand
-Pictures      Viewer
+3-D viewer    Viewer
 Errors        FloatbaseError, InfeasibleError
 
 Symbols, frames, signs and units: help("floatbase.conventions"). Import all other names from their
