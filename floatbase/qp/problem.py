@@ -2,15 +2,15 @@
 
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
-The g_i(x) = 0 of the course text are the rows of A x - b = 0. Its h_j(x) < 0 are the rows of G x -
-h ≤ 0; we write ≤, which is what the text means, since an active row holds with equality. For
+The g_i(x) = 0 of the course text are the rows of A x - b = 0. Its h_j(x) < 0 are the rows of
+G x - h ≤ 0. We write ≤, which is what the text means, since an active row holds with equality. For
 positive semidefinite H, x is an optimum exactly if there are multipliers ν, one per equality, and
 μ, one per inequality, that satisfy the Karush-Kuhn-Tucker conditions
 
     H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the constraints balance the slope of the objective
     A x = b,  G x ≤ h             feasibility
     μ ≥ 0                         no multiplier is negative: a table top pushes, but never pulls
-    μ_i (G x - h)_i = 0           complementarity: only the rows we rest on have multipliers
+    μ_i (G x - h)_i = 0           complementarity: only the rows we rest on are active
 
 To first order, raising h_i by one unit lowers the objective by μ_i. The same holds for ν_i and b_i,
 but ν_i can have either sign.

@@ -73,7 +73,7 @@ class State(Value):
 
     @classmethod
     def _unchecked(cls, robot: Robot, q: Array, v: Array) -> State:
-        """Make a state from checked arrays that no one else writes to."""
+        """Make a state from checked arrays that nothing else writes to."""
         state = object.__new__(cls)
         vars(state).update(robot=robot, q=frozen(q.view()), v=frozen(v.view()))
         return state
@@ -82,8 +82,8 @@ class State(Value):
     def _data(self) -> pin.Data:
         """Pinocchio's results at (q, v).
 
-        The next state that this thread uses overwrites them. They hold the kinematics. Other
-        results may be added without changing them. Never return it to the user.
+        They hold the kinematics; other results may be added without changing these. Never return
+        them to the user, since the next state that this thread uses overwrites them.
         """
         workspace = self.robot._workspace
         if workspace.state() is not self:
