@@ -245,7 +245,8 @@ class Viewer(Controls, Output):
 
         The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
         force on top of the cone. It tells how much the objective would decrease if its constraint
-        were relaxed by one newton; two significant digits are shown.
+        were relaxed by one newton; two significant digits are shown. To
+        draw the labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
@@ -286,7 +287,8 @@ class Viewer(Controls, Output):
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
         """Make markers for the plan of a `Walk`, for `extra` of `show`.
 
-        They mark the planned footholds, the swing paths, the capture point and the planned ZMP.
+        They mark the planned footholds, the swing paths, the capture point and the planned ZMP. To
+        draw them::
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
