@@ -245,8 +245,7 @@ class Viewer(Controls, Output):
 
         The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
         force on top of the cone. It tells how much the objective would decrease if its constraint
-        were relaxed by one newton; two significant digits are shown. To
-        draw the labels::
+        were relaxed by one newton; two significant digits are shown. To draw the labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
