@@ -47,7 +47,7 @@ _MAX_HEIGHT = 10_000  # pixels
 class Viewer(Controls, Output):
     """A web page in which this process draws a robot.
 
-    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
+    In a notebook, a viewer on the last line of a cell displays itself, wherever the kernel runs:
     its frames use the kernel's own connection, as slider values do. Elsewhere, open `viewer.url` in
     a browser. Only the newest display in a notebook is live; earlier ones show the image with which
     they opened. Give each interactive part its own `Viewer`.
