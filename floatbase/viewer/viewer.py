@@ -47,7 +47,7 @@ _MAX_HEIGHT = 10_000  # pixels
 class Viewer(Controls, Output):
     """A web page in which this process draws a robot.
 
-    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
+    In a notebook, a viewer on the last line of a cell displays itself, wherever the kernel runs:
     its frames use the kernel's own connection, as slider values do. Elsewhere, open `viewer.url` in
     a browser. Only the newest display in a notebook is live; earlier ones show the image with which
     they opened. Give each interactive part its own `Viewer`.
@@ -245,7 +245,7 @@ class Viewer(Controls, Output):
 
         The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
         force on top of the cone. It tells how much the objective would decrease if its constraint
-        were relaxed by one newton; two significant digits are shown.
+        were relaxed by one newton; two significant digits are shown. To draw the labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
@@ -286,7 +286,8 @@ class Viewer(Controls, Output):
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
         """Make markers for the plan of a `Walk`, for `extra` of `show`.
 
-        They mark the planned footholds, the swing paths, the capture point and the planned ZMP.
+        They mark the planned footholds, the swing paths, the capture point and the planned ZMP. To
+        draw them::
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 

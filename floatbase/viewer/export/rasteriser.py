@@ -17,7 +17,7 @@ NEAR_PLANE = 0.05  # m from the camera: anything nearer is not drawn
 _AMBIENT, _DIFFUSE = 0.62, 0.42
 _LIGHT_DIRECTION = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 _MAX_SAMPLES = 1 << 20  # samples at once, so that memory does not grow with the number of triangles
-_MAX_BOX = 32  # pixels: a box around a longer triangle has many pixels outside it
+_MAX_BOX = 32  # pixels: a box around a longer triangle has many pixels outside the triangle
 _BOX_STEP = 8  # pixels: boxes whose sides differ by less are made equal and filled together
 Pixels = npt.NDArray[np.float32]
 

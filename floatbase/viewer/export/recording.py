@@ -298,10 +298,10 @@ def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
 def _item_history(items: dict[int, Item], n: int) -> _ItemHistory:
     """Return one item in n pictures, from the pictures that show it."""
     rows = np.array(sorted(items))
-    held = rows[np.clip(np.searchsorted(rows, np.arange(n), side="right") - 1, 0, None)]
-    matrices = np.array([items[i].matrix for i in rows])[np.searchsorted(rows, held)]
+    shown_rows = rows[np.clip(np.searchsorted(rows, np.arange(n), side="right") - 1, 0, None)]
+    matrices = np.array([items[i].matrix for i in rows])[np.searchsorted(rows, shown_rows)]
     first = items[rows[0]]
-    colours = None if first.colour is None else np.array([items[i].colour for i in held])
+    colours = None if first.colour is None else np.array([items[i].colour for i in shown_rows])
     return _ItemHistory(first, np.isin(np.arange(n), rows), matrices, colours)
 
 

@@ -211,9 +211,9 @@ def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> N
         )
         if far <= NEAR_PLANE or not (size >= 1.0).all() or (size > camera.size).any():
             continue
-        about = item.shape.data["images"][0]["url"]
-        data = np.frombuffer(about["data"].data, np.uint8).reshape(
-            about["height"], about["width"], 2
+        texture = item.shape.data["images"][0]["url"]
+        data = np.frombuffer(texture["data"].data, np.uint8).reshape(
+            texture["height"], texture["width"], 2
         )[::-1]
         made = Image.fromarray(np.ascontiguousarray(data), "LA").resize(
             (round(size[0]), round(size[1]))

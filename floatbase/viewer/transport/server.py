@@ -47,8 +47,7 @@ class Server:
         self.on_stop: list[weakref.WeakMethod[Callable[[], None]]] = []
         self._http: tornado.httpserver.HTTPServer | None = None
         self._loop = asyncio.new_event_loop()
-        # the newest change for which a wake-up was requested, and the newest that a wake-up has
-        # dealt with
+        # newest change for which a wake-up was requested, and newest that a wake-up has handled
         self._requested = self._sent = 0
         self._last_flush = 0.0
         self._timer: asyncio.TimerHandle | None = None
@@ -84,8 +83,7 @@ class Server:
             self.scene.sent_to_all = number
         elif self._requested <= self._sent:
             self.call(self.flush)
-            # after the call: an interrupt between the two causes a second wake-up, not a missing
-            # one
+            # after the call, so an interrupt between them adds a wake-up instead of losing one
             self._requested = number
 
     @property

@@ -170,7 +170,7 @@ class Window:
     def _check_open(self, lost: str) -> None:
         """Raise `ViewerError` if the window is closed."""
         if not self._finalizer.alive:
-            raise ViewerError(f"The viewer is closed, so {lost}. Make a new one.")
+            raise ViewerError(f"The viewer's window is closed, so {lost}. Open a new one.")
 
 
 def _checked_port(port: int) -> int:
