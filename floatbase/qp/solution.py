@@ -22,15 +22,15 @@ class Residuals:
     Parameters
     ----------
     stationarity : float
-        max |H x + g + Aᵀ ν + Gᵀ μ| [units of g].
+        Largest magnitude in H x + g + Aᵀ ν + Gᵀ μ [units of g].
     equality : float
-        max |A x - b| [units of b].
+        Largest magnitude in A x - b [units of b].
     inequality : float
-        max(G x - h, 0) [units of h].
+        Largest positive entry of G x - h, or 0 [units of h].
     complementarity : float
-        max |μ (G x - h)| [units of the objective].
+        Largest magnitude in μ (G x - h), entry by entry [units of the objective].
     dual : float
-        max(-μ, 0) [units of μ].
+        Largest positive entry of -μ, or 0 [units of μ].
     """
 
     stationarity: float
