@@ -42,9 +42,9 @@ class InfeasibleError(FloatbaseError):
     message : str
         Message of the exception.
     constraints : iterable of str, optional
-        Names of a minimal set of constraints in conflict, kept as the attribute `constraints`: if
-        any one of them is removed, the others can be satisfied. Other constraints may be in
-        conflict, too.
+        Names of constraints in conflict, kept as the attribute `constraints`. Solvers of QPs name a
+        minimal set: if any one of them is removed, the others can be satisfied. Other constraints
+        may be in conflict, too.
     """
 
     def __init__(self, message: str, constraints: Iterable[str] = ()):
