@@ -72,7 +72,7 @@ class ViewerError(FloatbaseError):
 
 
 def require(module: str, extra: str) -> ModuleType:
-    """Import an optional dependency, as in `cp = require("cvxpy", extra="course")`.
+    """Import an optional dependency, as in `cp = require("cvxpy", extra="cvxpy")`.
 
     Parameters
     ----------
