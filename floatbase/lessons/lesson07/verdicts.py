@@ -246,8 +246,8 @@ def judge_design(given: Array) -> Verdict:
     if away.max() > AWAY and strayed > STRAYED:
         return Verdict(
             False,
-            f"The robot goes too far, and so does a foot: {text}. A spring pulls hardest at the far "
-            f"end, a damper earlier.",
+            f"The robot goes too far, and so does a foot: {text}. A spring pulls hardest at the "
+            f"far end, a damper earlier.",
             "too_far_and_strays",
         )
     if away.max() > AWAY:

@@ -339,8 +339,8 @@ NOTES = {
     "robust and clear.",
     9: "A point foot exerts a force but no moment. A foot with area, such as that of a humanoid, "
     "exerts both.",
-    10: "Internal forces cancel: the motion of the robot as a whole depends only on the sums of the "
-    "external forces and of their moments.",
+    10: "Internal forces cancel: the motion of the robot as a whole depends only on the sums of "
+    "the external forces and of their moments.",
     11: "A normal is a unit vector that points out of the ground.",
     12: "Solvers start from the solution of the previous control step (warm start).",
     13: "The equations can be reduced first to save time. A fast solver does not need this.",
