@@ -36,10 +36,12 @@ DIRECTIONS = {
 # s: start of a recorded push, and how long the recording goes on from then
 _PUSH_START, _TIME_SEEN = 0.1, 1.5
 _FRAME_RATE = 15.0  # pictures per second of a recorded push
-_SAMPLED_NOTE = "Computed for these positions only. In the live lesson the sliders move "
-"continuously."
-_ONE_AT_A_TIME_NOTE = " Here one slider moves at a time: the others return to their initial "
-"position."
+_SAMPLED_NOTE = (
+    "Computed for these positions only. In the live lesson the sliders move continuously."
+)
+_ONE_AT_A_TIME_NOTE = (
+    " Here one slider moves at a time: the others return to their initial position."
+)
 _OUTCOME_TEXTS = {
     "completed": "it stands",
     "fell": "it falls",

@@ -65,7 +65,7 @@ class Controls:
         column : {"", "model", "reality"}, optional
             Column of the slider in a row of two; the name must end in this word.
         at_most : str, optional
-            Word shown instead of the highest value, such as "perfect".
+            Word shown instead of the highest value, such as "ideal".
 
         Raises
         ------
