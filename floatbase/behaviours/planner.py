@@ -188,9 +188,8 @@ class Planner:
         assert ref.plan is not None
         error = capture_point(state.com, state.com_velocity, self.omega) - ref.plan.dcm(ref.time)
         dead_zone = _DCM_DEAD_ZONE if len(ref.stance) > 2 or self.flat_feet else 0.0
-        for touchdown in {
-            each.path.touchdown for each in ref.swinging.values()
-        }:  # two feet of a trot land together
+        # two feet of a trot land together
+        for touchdown in dict.fromkeys(each.path.touchdown for each in ref.swinging.values()):
             shift = step_adjustment(error, touchdown - ref.time, self.omega, dead_zone)
             com_at_touchdown = state.com[:2] + state.com_velocity[:2] * (touchdown - ref.time)
             for foot, each in ref.swinging.items():

@@ -7,7 +7,10 @@ and thirty pushes each.
 from __future__ import annotations
 
 import copy
+import os
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -585,3 +588,39 @@ def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
     assert (
         np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
     )  # 2 s, in which it speeds up at 1 m/s²
+
+
+SEEDED = """
+import hashlib
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+
+robot = fb.load("go2")
+walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.2), (0.3, 0.0))
+record = fb.rollout(fb.Simulation(robot), walk, 0.8, [fb.Push([0.0, 90.0, 0.0], 0.3)], 2e-3)
+arrays = (record.q, record.tau, record.measured)
+print(*record.contacts.names, *(hashlib.sha256(each.tobytes()).hexdigest() for each in arrays))
+"""
+
+
+def test_a_walk_does_not_depend_on_the_hash_seed() -> None:
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", SEEDED],
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for seed in range(4)
+    }
+    assert len(answers) == 1
+
+
+def test_a_walk_that_is_used_again_gives_the_same_record() -> None:
+    """A worker of a sweep uses one walk for many points, and stops at any stance."""
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.3, 0.0))
+    first, second, third = (run(walk, duration) for duration in (0.6, 0.34, 0.6))
+    assert len(second.contacts_at(-1)) == 2
+    assert third.contacts.names == first.contacts.names
+    for name in ("q", "tau", "measured", "planned"):
+        assert np.array_equal(getattr(third, name), getattr(first, name), equal_nan=True)
