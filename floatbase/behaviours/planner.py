@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_array
-from floatbase.behaviours.footholds import capture_point, step_adjustment
+from floatbase.behaviours.footholds import capture_point, step_adjustment, support_margin
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.lipm import LIPM, ZMPSegment
 from floatbase.behaviours.options import flat_foot_names
@@ -180,6 +180,35 @@ class Planner:
                 ref.swinging[foot] = SwingState(path, end, (yaw, yaw_at(times[1])))
         swings = {foot: each.path for foot, each in ref.swinging.items()}
         return StepPlan(ref.time, stance, dict(ref.feet), dict(ref.footholds), ref.plan, swings)
+
+    def weight_shift(self, gait: Gait, state: State, t: float) -> float:
+        """Return how much later a gait must begin, so that the weight can shift before [s].
+
+        That is 0 if the capture point is above the feet that stand at the first lift-off, or if
+        only two points stand then: such a gait is kept in balance by its steps.
+
+        Parameters
+        ----------
+        gait : Gait
+            Gait without lift-offs before t.
+        state : State
+            The measured state, with all feet on the ground.
+        t : float
+            The time [s].
+        """
+        swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
+        first = min((times[0] for times in swings.values() if times), default=inf)
+        delay = t + _ZMP_SHIFT_TIME - first
+        if delay <= TIME_TOLERANCE:
+            return 0.0
+        swinging = [
+            foot for foot, times in swings.items() if times and times[0] <= first + TIME_TOLERANCE
+        ]
+        points = self.contacts.without(*swinging).positions(state)
+        if len(points) <= 2:
+            return 0.0
+        dcm = capture_point(state.com, state.com_velocity, self.omega)
+        return delay if support_margin(dcm, points[:, :2]) < -_DCM_DEAD_ZONE else 0.0
 
     def adjust_footholds(self, ref: Reference, state: State) -> None:
         """Shift the ends of the swings by the error of the DCM, as far as the legs reach."""

@@ -68,7 +68,8 @@ class Walk:
     gait : Gait
         The contact schedule; at least one foot must stand at any time. It can be set while walking:
         feet no longer lift off by the former gait, and the new gait begins once all feet stand,
-        without its earlier lift-offs.
+        without its earlier lift-offs. It begins up to 0.8 s later if the weight must first shift
+        to the feet that stand at its first lift-off.
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
         and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it stand, set
@@ -114,6 +115,7 @@ class Walk:
     """
 
     __setattr__ = refuse_new_attributes
+    _waits_for_weight = True  # whether a new gait begins later if the weight must first shift
 
     def __init__(
         self,
@@ -318,7 +320,7 @@ class Walk:
         if not self._continues(t):
             self._initialize(state, t)
         ref = self._ref
-        self._update_gait(t)
+        self._update_gait(state, t)
         (ref.position, ref.yaw, ref.velocity), ref.time = self._path_at(t), t
         stance = self._stance_at(t)
         if stance != ref.stance or t >= ref.replan_time:
@@ -363,7 +365,7 @@ class Walk:
             np.array([*self.velocity, self.yaw_rate]) if walking else np.zeros(3), begin, t
         )
 
-    def _update_gait(self, t: float) -> None:
+    def _update_gait(self, state: State, t: float) -> None:
         """Change to a newly requested gait once all feet stand.
 
         Feet that are in the air come down as planned.
@@ -372,7 +374,10 @@ class Walk:
         if ref.requested_gait is not None and vars(self._gait) == vars(ref.requested_gait):
             return
         if not ref.swinging:
-            ref.requested_gait, ref.gait, ref.replan_time = self._gait, self._gait.starting_at(t), t
+            gait = self._gait.starting_at(t)
+            if self._waits_for_weight and (delay := self._planner.weight_shift(gait, state, t)):
+                gait = replace(gait, start=gait.start + delay)
+            ref.requested_gait, ref.gait, ref.replan_time = self._gait, gait, t
         elif ref.gait.stop is None or ref.gait.stop > t:
             ref.requested_gait, ref.gait = None, replace(ref.gait, stop=t)
 

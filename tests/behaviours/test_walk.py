@@ -449,6 +449,20 @@ def test_another_gait_takes_over_when_all_feet_stand() -> None:
     assert standing[0] == 4 and set(standing) == {3, 4}
 
 
+@pytest.mark.parametrize(("name", "velocity"), [("go2", 0.1), ("solo12", 0.0)])
+def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(
+    name: str, velocity: float
+) -> None:
+    """The body was shifted for another foot; both robots fell within 0.5 s."""
+    walk = walk_of(name, Gait.crawl, (velocity, 0.0))
+    sim = fb.Simulation(walk.robot)
+    fb.rollout(sim, walk, 2.5, control_period=PERIOD)
+    walk.gait = Gait.crawl(walk.robot, start=sim.time)
+    assert fb.rollout(sim, walk, 1.5, control_period=PERIOD).outcome == "completed"
+    lift_offs = [step.time for step in walk.history if step.time > 2.5 and len(step.stance) == 3]
+    assert lift_offs[0] == pytest.approx(3.3, abs=2 * PERIOD)
+
+
 def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.2, 0.0))
     sim = fb.Simulation(walk.robot)
