@@ -16,6 +16,7 @@ from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.lipm import LIPM, ZMPSegment
 from floatbase.behaviours.options import flat_foot_names
 from floatbase.behaviours.reference import Reference, SwingState, rotated_by_yaw, yaw_of
+from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY
 from floatbase.behaviours.swing import Swing
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
@@ -37,6 +38,7 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # fraction of its nominal distance from the middle that a foot keeps on its side: legs must not
 # cross
 _MIN_SIDE_FRACTION = 0.25
+_MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
 
 
 @dataclass(frozen=True)
@@ -284,15 +286,19 @@ class Planner:
         phases: Sequence[Phase],
         foothold: Callable[[str, float], npt.ArrayLike],
     ) -> list[Array]:
-        """Return the middle of the standing feet in each phase, (2,) [m], and set new footholds."""
+        """Return the planned ZMP of each phase, (2,) [m], and set new footholds.
+
+        It is in the middle of the standing feet. A robot with more than four feet keeps the middle
+        of all its feet if that is inside the support polygon, because the other point would sway
+        the body from side to side: a tripod has two feet on one side and one on the other.
+        """
         feet, centres = dict(ref.feet), []
         for begin, end, names in phases:
             stance = [
                 name for name in self.contacts.names if name in names or name not in ref.gait.feet
             ]
-            centres.append(
-                np.mean([self._foot_centre(name, feet[name], ref.yaw) for name in stance], axis=0)
-            )
+            points = [self._foot_centre(name, feet[name], ref.yaw) for name in stance]
+            centre, before = np.mean(points, axis=0), dict(feet)
             for foot in ref.gait.feet:
                 times = ref.gait.swing_at(foot, begin)
                 if times is not None:
@@ -302,6 +308,11 @@ class Planner:
                     ref.footholds.setdefault(foot, ref.on_ground(foot, position))
                     if abs(times[1] - end) < 2.0 * TIME_TOLERANCE:
                         feet[foot] = ref.on_ground(foot, position)
+            if len(feet) > MAX_FEET_WITH_SWAY and len(points) > 2:
+                middle = np.mean([before[foot] + feet[foot] for foot in feet], axis=0)[:2] / 2.0
+                if support_margin(middle, points) > _MIN_STATIC_MARGIN:
+                    centre = middle
+            centres.append(centre)
         return centres
 
     def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:

@@ -7,6 +7,7 @@ and thirty pushes each.
 from __future__ import annotations
 
 import copy
+import itertools
 import os
 import pickle
 import subprocess
@@ -18,11 +19,12 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
-from messages import refused
+from messages import refused, warns
 
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
-from floatbase.errors import InputError
+from floatbase.errors import InputError, SimulationWarning
+from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -638,3 +640,76 @@ def test_a_walk_that_is_used_again_gives_the_same_record() -> None:
     assert third.contacts.names == first.contacts.names
     for name in ("q", "tau", "measured", "planned"):
         assert np.array_equal(getattr(third, name), getattr(first, name), equal_nan=True)
+
+
+@pytest.mark.parametrize("velocity", [(-0.3, 0.0), (0.0, 0.2)])
+def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity: tuple[float, float]) -> None:
+    """With straight knees, solo12 fell within 3 s; half a step was longer than its legs reach."""
+    with warns(SimulationWarning, "solo12", 2.0):
+        walk = walk_of("solo12", Gait.crawl, velocity)
+    assert 0.3 < walk.speed_fraction < 0.6
+    record = run(walk, 6.0)
+    assert record.outcome == "completed"
+    period = walk.gait.period
+    assert np.allclose(
+        speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period),
+        walk.speed_fraction * np.array(velocity),
+        atol=0.02,
+    )
+    walk.velocity = 0.1 * np.array(velocity)
+    assert walk.speed_fraction == 1.0
+
+
+def test_a_low_robot_trots_fast_with_short_swings() -> None:
+    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=0.2), (0.5, 0.0))
+    assert np.allclose(speed(run(walk, 4.0), 2.2, 3.8), [0.5, 0.0], atol=0.02)
+
+
+def hexapod() -> Robot:
+    """Load a robot of 4.5 kg and 13 cm height with six legs, each with joints for yaw, lift and
+    knee.
+    """
+    links, joints = [], []
+
+    def link(name: str, mass: float, x: float, inertia: float) -> None:
+        links.append(
+            f'<link name="{name}"><inertial><origin xyz="{x} 0 0"/><mass value="{mass}"/><inertia '
+            f'ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial>'
+            "</link>"
+        )
+
+    def joint(kind: str, parent: str, child: str, xyz: str, yaw: float = 0.0, z: int = 0) -> None:
+        joints.append(
+            f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/><child '
+            f'link="{child}"/><origin xyz="{xyz}" rpy="0 0 {yaw}"/><axis xyz="0 {1 - z} {z}"/>'
+            '<limit lower="-2.6" upper="2.6" effort="15" velocity="20"/></joint>'
+        )
+
+    link("body", 2.7, 0.0, 0.02)
+    for foot in HEXAPOD_FEET:
+        side, x = (1, -1)[foot[0] == "R"], {"F": 0.2, "M": 0.0, "H": -0.2}[foot[1]]
+        names = [f"{foot}_{part}" for part in ("hip", "thigh", "shank")] + [foot]
+        for name, mass, at in zip(names, (0.1, 0.1, 0.08, 0.02), (0, 0.06, 0.08, 0), strict=True):
+            link(name, mass, at, 1e-4)
+        joint("revolute", "body", names[0], f"{x} {0.1 * side} 0", side * np.pi / 2, 1)
+        for pair, length in zip(itertools.pairwise(names), (0.05, 0.13, 0.17), strict=True):
+            joint("fixed" if pair[1] == foot else "revolute", *pair, f"{length} 0 0")
+    urdf = f'<robot name="hexapod">{"".join(links + joints)}</robot>'
+    posture = [0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0, *([0.0, -0.4, 1.6] * 6)]
+    return fb.load_urdf(urdf, feet=HEXAPOD_FEET, foot_radius=0.015, posture=posture)
+
+
+HEXAPOD_FEET = [f"{side}{row}" for side in "LR" for row in "FMH"]
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.0), (0.0, 0.15)])
+def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
+    """The middle of three feet swayed a low body from side to side, and it fell within 1 s."""
+    robot = hexapod()
+    offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
+    gait = Gait(offsets, period=0.6, swing=0.25, start=0.2)
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, velocity)
+    record = run(walk, 2.6)
+    assert record.outcome == "completed" and tilt(record) < 2.0
+    assert np.ptp(record.com[:, 2]) < 0.02
+    assert np.allclose(speed(record, 1.39, 2.59), velocity, atol=0.02)
