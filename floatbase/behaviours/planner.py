@@ -39,6 +39,7 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # cross
 _MIN_SIDE_FRACTION = 0.25
 _MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
+_BISECTIONS = 10  # until the place of the ZMP is known to 0.1 % of the way
 
 
 @dataclass(frozen=True)
@@ -288,9 +289,9 @@ class Planner:
     ) -> list[Array]:
         """Return the planned ZMP of each phase, (2,) [m], and set new footholds.
 
-        It is in the middle of the standing feet. A robot with more than four feet keeps the middle
-        of all its feet if that is inside the support polygon, because the other point would sway
-        the body from side to side: a tripod has two feet on one side and one on the other.
+        It is in the middle of the standing feet. With more than four feet, it is as near to the
+        middle of all feet as the support polygon allows, because the middle of the standing feet
+        would sway the body: a tripod has two feet on one side and one on the other.
         """
         feet, centres = dict(ref.feet), []
         for begin, end, names in phases:
@@ -310,8 +311,7 @@ class Planner:
                         feet[foot] = ref.on_ground(foot, position)
             if len(feet) > MAX_FEET_WITH_SWAY and len(points) > 2:
                 middle = np.mean([before[foot] + feet[foot] for foot in feet], axis=0)[:2] / 2.0
-                if support_margin(middle, points) > _MIN_STATIC_MARGIN:
-                    centre = middle
+                centre = _nearest_inside(middle, centre, np.array(points))
             centres.append(centre)
         return centres
 
@@ -344,3 +344,20 @@ class Planner:
         """Return the rotation of a foot in the standing posture."""
         rotation: Array = self.standing_state.frame_pose(foot).rotation
         return rotation
+
+
+def _nearest_inside(wanted: Array, centre: Array, feet: Array) -> Array:
+    """Return the point nearest to `wanted`, on the line to `centre`, with `_MIN_STATIC_MARGIN`.
+
+    It is `centre` if that is no farther from the edge of the feet's support polygon.
+    """
+    inside, outside = 1.0, 0.0  # fractions of the way from `wanted` to `centre`
+    if support_margin(wanted, feet) >= _MIN_STATIC_MARGIN:
+        return wanted
+    for _ in range(_BISECTIONS):
+        fraction = (inside + outside) / 2.0
+        if support_margin(wanted + fraction * (centre - wanted), feet) >= _MIN_STATIC_MARGIN:
+            inside = fraction
+        else:
+            outside = fraction
+    return wanted + inside * (centre - wanted)
