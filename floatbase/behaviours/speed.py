@@ -17,19 +17,22 @@ MAX_FEET_WITH_SWAY = 4
 _MAX_EXTENSION = 0.9
 
 
-def speed_fraction(
+def speed_fractions(
     gait: Gait,
     state: State,
     nominal_feet: dict[str, Array],
     flat_feet: set[str],
     reach: float,
     motion: Array,
-) -> float:
-    """Return the largest fraction of a desired motion that the feet can follow, at most 1.
+) -> tuple[float, float]:
+    """Return the largest fractions of a desired motion that the feet can follow, at most 1.
+
+    The first one holds for the first period and the second one from then on.
 
     During its stance, a foot moves from half a step in front of its nominal position to half a step
     behind it. Half a step must be at most `reach`. A ball foot must also stay within the length of
-    its leg, while the body shifts to the middle of the standing feet.
+    its leg, while the body shifts to the middle of the standing feet. In the first period, a foot
+    stays in its nominal position until its first lift-off, while the body accelerates.
 
     Parameters
     ----------
@@ -47,21 +50,27 @@ def speed_fraction(
         Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
     """
     if not motion.any():
-        return 1.0
-    fraction, shifts = 1.0, _weight_shifts(gait, nominal_feet)
+        return 1.0, 1.0
+    first_fraction, fraction = 1.0, 1.0
+    wait, shifts = max(gait.offsets.values()) * gait.period, _weight_shifts(gait, nominal_feet)
     for foot in gait.feet:
         x, y = nominal_feet[foot][:2]
         velocity = motion[:2] + motion[2] * np.array([-y, x])
-        half_step = float(np.linalg.norm(velocity)) * (gait.period - gait.swing) / 2.0
-        if half_step == 0.0:
+        speed, limit = float(np.linalg.norm(velocity)), reach
+        if speed == 0.0:
             continue
-        limit = reach
         if foot not in flat_feet:
-            direction = velocity / np.linalg.norm(velocity)
+            direction = velocity / speed
             shift = float(np.abs(shifts @ direction).max())
-            limit = min(limit, _leg_reach(state, foot, direction) - shift)
-        fraction = min(fraction, max(limit, 0.0) / half_step)
-    return fraction
+            leg_limit = max(_leg_reach(state, foot, direction) - shift, 0.0)
+            limit = min(limit, leg_limit)
+            # at 1 m/s², the distance after `wait` is speed wait - speed² / 2
+            if wait**2 > 2.0 * leg_limit:
+                first_fraction = min(
+                    first_fraction, (wait - sqrt(wait**2 - 2.0 * leg_limit)) / speed
+                )
+        fraction = min(fraction, 2.0 * limit / ((gait.period - gait.swing) * speed))
+    return min(first_fraction, fraction), fraction
 
 
 def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:

@@ -31,7 +31,7 @@ from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains, check_gait_feet, check_options, flat_foot_names
 from floatbase.behaviours.planner import Planner, StepPlan
 from floatbase.behaviours.reference import Motion, Reference, rotated_by_yaw
-from floatbase.behaviours.speed import speed_fraction
+from floatbase.behaviours.speed import speed_fractions
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
@@ -75,7 +75,8 @@ class Walk:
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
         and is approached at 1 m/s². If the legs are too short for its steps, a `SimulationWarning`
-        says so, and the robot walks at the fraction `speed_fraction` of it. At (0, 0) the robot
+        says so, and the robot walks at the fraction `speed_fraction` of it. In its first period, a
+        slow gait may be slower. At (0, 0) the robot
         marches on the spot; to make it stand, set `walk.gait = dataclasses.replace(walk.gait,
         stop=walk.time)`.
     yaw_rate : float, optional
@@ -371,7 +372,7 @@ class Walk:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
         if "_planner" not in vars(self):  # the constructor is still checking its arguments
             return
-        self._speed_fraction = speed_fraction(
+        self._first_fraction, self._speed_fraction = speed_fractions(
             self._gait,
             self._standing_state,
             self._planner.nominal_feet,
@@ -397,8 +398,10 @@ class Walk:
         """
         ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
         walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)
+        first = t < ref.gait.start + ref.gait.period
         return ref.predict(
-            self._speed_fraction * np.array([*self.velocity, self.yaw_rate])
+            (self._first_fraction if first else self._speed_fraction)
+            * np.array([*self.velocity, self.yaw_rate])
             if walking
             else np.zeros(3),
             begin,
