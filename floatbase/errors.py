@@ -31,7 +31,7 @@ class RobotWarning(UserWarning):
 
 
 class SimulationWarning(UserWarning):
-    """A part of the input of a rollout has no effect; the message says which part and why."""
+    """A part of the input of a rollout or of a walk has no effect; the message says why."""
 
 
 class InfeasibleError(FloatbaseError):

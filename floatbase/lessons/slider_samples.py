@@ -67,7 +67,7 @@ def sample_values(
     far = [float(x) for x in inner if min(abs(x - bound) for bound in fixed) > _MIN_GAP * between]
     snapped = {low + step * round((x - low) / step) for x in far}
     digits = max(0, 2 - math.floor(math.log10(step)))
-    return tuple(sorted({*(round(float(x), digits) for x in snapped), *map(float, fixed)}))
+    return tuple(sorted({round(float(x), digits) for x in snapped} | set(map(float, fixed))))
 
 
 def _round_spacings(width: float, step: float) -> list[float]:

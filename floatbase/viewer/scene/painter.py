@@ -173,7 +173,8 @@ class Painter:
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
         computed |= {"_ghost_shapes", "_scale_bars"}
-        other.__dict__.update({name: self.__dict__[name] for name in computed & set(self.__dict__)})
+        kept = {name: value for name, value in self.__dict__.items() if name in computed}
+        other.__dict__.update(kept)
         return other
 
     def ground_only(self) -> Picture:
