@@ -45,6 +45,7 @@ class Controls:
         section: str = "",
         column: str = "",
         at_most: str = "",
+        on_release: bool = False,
     ) -> None:
         """Add a slider to the panel in the page.
 
@@ -55,12 +56,15 @@ class Controls:
         section: heading that it stands under.
         column: "model" or "reality" for a part of a row of two, whose name ends in that word.
         at_most: a word that stands for its highest value, as "perfect".
+        on_release: whether `changed` is called only when the reader releases the slider.
         """
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
         value, step = as_number("value", value, "", low, high), as_positive("step", step)
-        place = _placement(name, section, column) | (
+        place: dict[str, Any] = _placement(name, section, column) | (
             {"at_most": word} if (word := as_string("at_most", at_most)) else {}
         )
+        if as_bool("on_release", on_release):
+            place["on_release"] = True
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(name, changed, value=value, min=low, max=high, step=step, **place)
 

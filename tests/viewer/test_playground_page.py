@@ -12,6 +12,7 @@ from messages import raises
 from waiting import until
 
 import floatbase as fb
+from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 from floatbase.playground import CHALLENGES, Playground, mean_force_error, playground
 from floatbase.robots import Robot
 
@@ -72,6 +73,43 @@ def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> Non
     )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
     page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
+
+
+def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> None:
+    opened(page, field)
+    box = page.locator("input[aria-label='push [N]']").bounding_box()
+    y = box["y"] + 0.5 * box["height"]
+    page.mouse.move(box["x"] + 0.3 * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.1 * box["width"], y, steps=4)
+    page.wait_for_timeout(300)
+    assert field._last_push is None
+    page.mouse.up()
+    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
+    assert field._last_push.force[0] == field.force > 0.0
+    field._last_push = None
+    page.evaluate("viewer.gui_controllers['push [N]'].setValue(0)")
+    until(lambda: field.force == 0.0, lambda: page.wait_for_timeout(20))
+    assert field._last_push is None
+
+
+@pytest.mark.parametrize("size", [(1200, 700), (390, 780)])
+def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
+    page, field: Playground, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    opened(page, field)
+    assert "Push the robot" in page.evaluate("document.querySelector('#panel p').textContent")
+    page.evaluate("document.querySelectorAll('#panel summary').forEach((one) => one.click())")
+    for way in (0, 300, 600):
+        page.evaluate("(way) => { document.getElementById('panel').scrollTop = way; }", way)
+        hidden = """[...document.querySelectorAll('#panel .head button, #fold')].filter((one) => {
+          const {left, top, width, height} = one.getBoundingClientRect();
+          return document.elementFromPoint(left + width / 2, top + height / 2) !== one;
+        }).map((one) => one.textContent)"""
+        assert page.evaluate(hidden) == []
+    page.locator("#panel .head button", has_text="pause").click()
+    until(lambda: field.run.status == "paused", lambda: page.wait_for_timeout(20))
 
 
 def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
@@ -204,11 +242,63 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(
 def test_an_unknown_setting_is_refused_and_the_run_continues(
     field: Playground,
 ) -> None:
-    with raises(TypeError, "frction"):
+    with raises(UnknownNameError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
     field.set(facets=6)  # while its last slice may still run
     assert field.session.settings.facets == 6 and field.run.status == "paused"
+
+
+def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
+    with raises(InputError, "robot", 5):
+        playground(5)
+    with raises(InputError, "settings", 5):
+        playground("go2", 5)
+    for call in (
+        lambda: field.push("x"),
+        lambda: field.push(10.0, "x"),
+        lambda: field.push(float("nan")),
+        lambda: field.start_challenge(5),
+        lambda: field.show_term([1], True),
+        lambda: field.show_term("nothing", True),
+        lambda: field.show_term("forces", "no"),
+    ):
+        with pytest.raises(FloatbaseError):
+            call()
+    assert field.force == field._default_push and field.challenge is None
+
+
+def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(
+    go2: Robot,
+) -> None:
+    """The physics accepts a slope of 89°, but the picture does not."""
+    paused = Playground(go2)
+    try:
+        before, ground = paused.session.settings, paused.view.painter.ground
+        paused.set(slope=(0.0, 89.0), facets=6)
+        assert "ground" in paused.session.refusal and paused.session.settings == before
+        assert paused.view.painter.ground == ground
+        paused.set(torque_fraction=0.9)
+        assert paused.session.refusal == "" and paused.session.settings.torque_fraction == 0.9
+        paused.start()
+        paused.set(slope=(0.0, 89.0))
+        until(lambda: "ground" in paused.session.refusal and paused.session.sim.time > 0.2)
+        paused.set(friction=(0.7, 0.6))
+        until(lambda: paused.session.settings.friction == (0.7, 0.6))
+        assert paused.run.status == "running" and paused.session.settings.slope == (0.0, 0.0)
+    finally:
+        paused.close()
+
+
+def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: Playground) -> None:
+    field.set(gait="trot", actual_off=("gravity",))
+    until(lambda: field.run.status == "fell")
+    until(lambda: field.outcome.startswith("left the ground"))
+    field.set(actual_off=())
+    field.run.reset()
+    until(lambda: field.run.status == "running" and field.outcome == "")
+    field.push(240.0, 90.0)
+    until(lambda: field.outcome.startswith("fell"))
 
 
 def test_reset_everything_works_for_an_arm() -> None:

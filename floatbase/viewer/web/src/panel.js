@@ -19,6 +19,9 @@ export function createPanel({report: send, redraw}) {
     redraw();
   };
 
+  const head = make("div", {className: "head"}); // stays visible when the panel is scrolled
+  root.append(head);
+
   const isBelow = () => root.offsetWidth >= innerWidth;
   function section(name = "") {
     if (!sections.has(name)) {
@@ -49,7 +52,7 @@ export function createPanel({report: send, redraw}) {
   }
 
   function slider(command) {
-    const {name, at_most} = command;
+    const {name, at_most, on_release: waits} = command;
     const input = make("input", {type: "range"}), shown = make("output");
     const show = (now) => {
       input.value = now;
@@ -67,7 +70,8 @@ export function createPanel({report: send, redraw}) {
     };
     input.setAttribute("aria-label", name);
     remake(command);
-    input.oninput = () => setValue(input.value);
+    input.oninput = () => waits ? show(input.value) : setValue(input.value);
+    if (waits) input.onchange = () => setValue(input.value);
     input.ondblclick = () => setValue(input.dataset.home);
     row(command).append(input, shown);
     return {getValue: () => Number(input.value), show, setValue, remake};
@@ -98,10 +102,10 @@ export function createPanel({report: send, redraw}) {
     const made = make("button", {type: "button", textContent: name});
     const press = () => report(name, null);
     made.onclick = press;
-    const last = section(where).lastElementChild;
+    const place = where ? section(where) : (section(), head), last = place.lastElementChild;
     const line = last?.classList.contains("buttons") ? last : make("div", {className: "buttons"});
     line.append(made);
-    section(where).append(line);
+    place.append(line);
     return {getValue: () => press, show() {}, fire: () => made.click()};
   }
 
@@ -162,7 +166,10 @@ export function createPanel({report: send, redraw}) {
       }
       if (line.textContent !== text) line.textContent = text;
     },
-    addPoint: createPlot((...elements) => section().prepend(...elements)),
+    addPoint: createPlot((...elements) => {
+      section();
+      head.prepend(...elements);
+    }),
   };
 }
 
