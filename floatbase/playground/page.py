@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
@@ -29,6 +30,8 @@ from floatbase.viewer.export.recording import push_at
 
 _SITE_NOTE = "The playground runs only in a live notebook. Here the robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
+_SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
+_MAX_HISTORY = 100  # changes that `undo` remembers
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
 
@@ -83,6 +86,8 @@ class Playground:
         self._last_push: fb.Push | None = None
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self._pause_after_slice = False  # then the user must press run
+        self._history: list[Settings] = []  # what `undo` restores, the last one first
+        self._last_change: tuple[frozenset[str], float] = (frozenset(), -math.inf)  # fields, time
         self._requested: dict[str, Any] = {}
         self._applying: dict[str, Any] = {}  # what is being applied now
         self._lock = threading.Lock()  # protects the requests
@@ -170,6 +175,33 @@ class Playground:
             if name not in SETTING_NAMES:
                 raise unknown_name("setting", name, SETTING_NAMES)
         replace(self.session.settings, **changes)
+        self._remember_before(frozenset(changes))
+        self._request(changes)
+
+    def undo(self) -> None:
+        """Undo the last change of the settings since the last reset of everything.
+
+        Changes of the same fields in quick succession, as while a slider moves, are one change.
+        """
+        present = self.pending_settings
+        while self._history:
+            former = self._history.pop()
+            self._last_change = (frozenset(), -math.inf)
+            if former != present:
+                self._request(asdict(former))
+                self._panel.show_settings(former)
+                return
+
+    def _remember_before(self, fields: frozenset[str]) -> None:
+        """Store the settings before a change of these fields, unless the change continues one."""
+        now = time.monotonic()
+        last_fields, last_time = self._last_change
+        if fields != last_fields or now - last_time > _SAME_CHANGE_TIME:
+            self._history = [*self._history, self.pending_settings][-_MAX_HISTORY:]
+        self._last_change = (fields, now)
+
+    def _request(self, changes: dict[str, Any]) -> None:
+        """Have changes applied by the run before its next slice, or now if it does not run."""
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
@@ -226,6 +258,7 @@ class Playground:
         """Put the robot back on its feet with these settings."""
         with self._lock:
             self._requested = {}
+        self._history, self._last_change = [], (frozenset(), -math.inf)
         self.run.call_soon(lambda: self._start_with(settings))
         self.run.reset()
 

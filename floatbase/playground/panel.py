@@ -96,6 +96,8 @@ class Panel:
         view.add_button("pause", play.run.pause)
         view.add_button("reset", play.run.reset)
         view.add_button("push", play.push)
+        if play.robot.is_floating:
+            view.add_button("undo", play.undo)
         view.add_button("reset everything", play.reset_all)
         view.add_text("invitation", self._invitation)
         view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)

@@ -6,6 +6,7 @@ It is also tested as a notebook shows it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from messages import raises
@@ -99,7 +100,9 @@ def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
 ) -> None:
     page.set_viewport_size({"width": size[0], "height": size[1]})
     opened(page, field)
-    assert "Push the robot" in page.evaluate("document.querySelector('#panel p').textContent")
+    assert "Push the robot" in page.evaluate(
+        "document.querySelector('#panel p:not(.plot)').textContent"
+    )
     page.evaluate("document.querySelectorAll('#panel summary').forEach((one) => one.click())")
     for way in (0, 300, 600):
         page.evaluate("(way) => { document.getElementById('panel').scrollTop = way; }", way)
@@ -247,6 +250,75 @@ def test_an_unknown_setting_is_refused_and_the_run_continues(
     field.run.pause()
     field.set(facets=6)  # while its last slice may still run
     assert field.session.settings.facets == 6 and field.run.status == "paused"
+
+
+def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
+    """Steps of one drag are one change, and a refused change is none."""
+    paused = Playground(go2)
+    try:
+        first = paused.session.settings
+        for value in (0.6, 0.5, 0.4):
+            paused.set(friction=(value, 0.7))
+        paused.set(mass=(1.0, 1.5), facets=6)
+        paused.set(lifted_feet=("paw",))
+        paused.undo()
+        assert paused.session.settings == replace(first, friction=(0.4, 0.7))
+        paused.undo()
+        assert paused.session.settings == first and paused.session.refusal == ""
+        paused.undo()
+        assert paused.session.settings == first
+        paused.set(slope=(0.0, 5.0))
+        paused.reset_all()
+        paused.undo()  # a reset of everything forgets the changes before it
+        until(lambda: paused.session.settings == first)
+    finally:
+        paused.close()
+
+
+def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
+    opened(page, field)
+    for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
+        before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
+        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
+        until(
+            lambda: field.session.settings != field._initial_settings,
+            lambda: page.wait_for_timeout(20),
+        )
+        if keys:
+            page.keyboard.press(keys)
+        else:
+            page.locator("#panel button", has_text="undo").click()
+        until(
+            lambda: field.session.settings == field._initial_settings,
+            lambda: page.wait_for_timeout(20),
+        )
+        page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
+
+
+def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> None:
+    opened(page, field)
+    assert page.evaluate("location.hash") == ""
+    page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
+    page.evaluate("viewer.gui_controllers['stand on FL_foot'].setValue(false)")
+    page.evaluate("viewer.gui_controllers['speed'].setValue(0.5)")
+    page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
+    page.evaluate("viewer.gui_controllers['undo'].fire()")
+    page.wait_for_function("location.hash == '#facets=7'")
+
+    page.goto("about:blank")
+    page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
+    until(
+        lambda: (
+            field.session.settings.gait == "trot" and field.session.settings.friction == (0.7, 0.3)
+        ),
+        lambda: page.wait_for_timeout(20),
+    )
+    page.evaluate("location.hash = '#facets=5'")
+    until(
+        lambda: field.session.settings.facets == 5 and field.session.settings.gait is None,
+        lambda: page.wait_for_timeout(20),
+    )
+    assert field.session.settings.friction == (0.7, 0.7)
 
 
 def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:

@@ -1,7 +1,7 @@
 // The panel beside the picture: controls in sections, a table of pairs, the terms of an equation,
 // texts, and a plot. Every control reports to the window by its name.
 
-import {createReports, kindOf, rowOf, sliderText} from "./controls.js";
+import {createReports, isUndo, kindOf, rowOf, sliderText} from "./controls.js";
 import {element, make} from "./dom.js";
 import {createPlot} from "./plot.js";
 
@@ -21,6 +21,12 @@ export function createPanel({report: send, redraw}) {
 
   const head = make("div", {className: "head"}); // stays visible when the panel is scrolled
   root.append(head);
+
+  addEventListener("keydown", (event) => {
+    if (!controls.undo || !isUndo(event)) return;
+    event.preventDefault();
+    controls.undo.fire();
+  });
 
   const isBelow = () => root.offsetWidth >= innerWidth;
   function section(name = "") {
@@ -102,6 +108,7 @@ export function createPanel({report: send, redraw}) {
     const made = make("button", {type: "button", textContent: name});
     const press = () => report(name, null);
     made.onclick = press;
+    if (name === "undo") made.title = "key: Ctrl+Z";
     const place = where ? section(where) : (section(), head), last = place.lastElementChild;
     const line = last?.classList.contains("buttons") ? last : make("div", {className: "buttons"});
     line.append(made);

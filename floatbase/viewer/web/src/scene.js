@@ -1,6 +1,7 @@
 // The scene of a page: meshcat's viewer with our commands. It draws the frames that it is given,
 // wherever they come from.
 
+import {createAddress} from "./address.js";
 import {createCamera} from "./camera.js";
 import {element} from "./dom.js";
 import {createInteraction} from "./interaction.js";
@@ -11,14 +12,20 @@ import {createPanel} from "./panel.js";
 import {createPlayer} from "./player.js";
 import {createTheme} from "./theme.js";
 
-// config: {backgrounds, shades}, see theme.js. Throws where the browser has no WebGL.
+// config: {mode, backgrounds, shades}, see page.js and theme.js. Throws where the browser has no
+// WebGL.
 export function createScene(config) {
   const viewer = createViewer(element("meshcat-pane"));
   let send = () => {};
   const player = createPlayer(viewer);
   const panel = createPanel({
-    report: (message) => send(message), redraw: () => viewer.set_dirty(),
+    report(message) {
+      send(message);
+      address?.changed();
+    },
+    redraw: () => viewer.set_dirty(),
   });
+  const address = config.mode === "live" ? createAddress(panel.controls) : null;
   const camera = createCamera(viewer, panel);
   const theme = createTheme(viewer, config);
   const legend = createLegend(camera, theme.colour);
@@ -43,8 +50,14 @@ export function createScene(config) {
       meshcat(command);
       player.load(command);
     },
-    set_control: panel.addControl,
-    set_control_value: panel.setValue,
+    set_control(command) {
+      panel.addControl(command);
+      address?.added(command);
+    },
+    set_control_value(command) {
+      panel.setValue(command);
+      address?.changed();
+    },
     set_text: panel.setText,
     add_plot_point: panel.addPoint,
   };
