@@ -168,7 +168,10 @@ class Panel:
     @property
     def _invitation(self) -> str:
         """First sentences of the panel: what to do."""
-        first = "Push the robot: move and release the slider “push”."
+        first = (
+            "Push the robot: move and release the slider “push”, or drag the robot with the Shift "
+            "key held."
+        )
         if not self._playground.robot.is_floating:
             return first
         return (

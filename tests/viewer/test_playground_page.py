@@ -94,6 +94,34 @@ def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> 
     assert field._last_push is None
 
 
+def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) -> None:
+    opened(page, field)
+    page.wait_for_timeout(500)
+    # the middle of the base on the page, and the same point moved in the direction of +y
+    pixels = """(ahead) => {
+      const {Vector3} = MeshCat.THREE, {camera, renderer, scene_tree} = viewer;
+      const robot = scene_tree.find(['meshcat', 'robot']).object;
+      const at = new MeshCat.THREE.Box3().setFromObject(robot).getCenter(new Vector3());
+      at.y += 0.05;
+      at.z -= ahead;
+      const {x, y} = at.project(camera);
+      const {left, top, width, height} = renderer.domElement.getBoundingClientRect();
+      return [left + width * (1 + x) / 2, top + height * (1 - y) / 2];
+    }"""
+    (x, y), (ahead_x, ahead_y) = page.evaluate(pixels, 0.0), page.evaluate(pixels, 0.2)
+    view = page.evaluate("viewer.camera.position.toArray()")
+    page.keyboard.down("Shift")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(ahead_x, ahead_y, steps=5)
+    assert field._last_push is None
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
+    assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
+    assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)
+
+
 @pytest.mark.parametrize("size", [(1200, 700), (390, 780)])
 def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
     page, field: Playground, size: tuple[int, int]

@@ -80,7 +80,9 @@ export function createPanel({report: send, redraw}) {
     if (waits) input.onchange = () => setValue(input.value);
     input.ondblclick = () => setValue(input.dataset.home);
     row(command).append(input, shown);
-    return {getValue: () => Number(input.value), show, setValue, remake};
+    return {
+      getValue: () => Number(input.value), getMax: () => Number(input.max), show, setValue, remake,
+    };
   }
   function checkbox(command) {
     const {name, value} = command;

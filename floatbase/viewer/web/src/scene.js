@@ -4,6 +4,7 @@
 import {createAddress} from "./address.js";
 import {createCamera} from "./camera.js";
 import {element} from "./dom.js";
+import {createDrag} from "./drag.js";
 import {createInteraction} from "./interaction.js";
 import {createLegend} from "./legend.js";
 import {splitFrame} from "./loader.js";
@@ -31,6 +32,7 @@ export function createScene(config) {
   const legend = createLegend(camera, theme.colour);
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
+  createDrag(viewer, panel.controls);
   new ResizeObserver(([{target}]) => {
     element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
   }).observe(element("title"));
