@@ -34,7 +34,7 @@ export function createDrag(viewer, controls) {
     event.preventDefault();
     const {BufferGeometry, Line, LineBasicMaterial, Plane, Vector3} = three(), at = hit.point;
     const material = new LineBasicMaterial({color: 0xd55e00, depthTest: false});
-    const line = new Line(new BufferGeometry().setFromPoints([at, at]), material);
+    const line = new Line(new BufferGeometry(), material);
     line.renderOrder = 1;
     viewer.scene.add(line);
     begun = {at, line, plane: new Plane(new Vector3(0, 1, 0), -at.y), push: null};
@@ -48,7 +48,8 @@ export function createDrag(viewer, controls) {
     begun.push = pushOf(end.clone().sub(begun.at), full, controls[FORCE].getMax());
     controls[FORCE].show(begun.push.force);
     controls[DIRECTION].show(begun.push.towards);
-    begun.line.geometry.setFromPoints([begun.at, end]);
+    const ends = [begun.at, end].map((point) => viewer.scene.worldToLocal(point.clone()));
+    begun.line.geometry.setFromPoints(ends);
     viewer.set_dirty();
   }
   function finish(push) {
