@@ -1,28 +1,37 @@
 """floatbase: control of floating-base robots, as a course and as a library.
 
-    import floatbase as fb
-
-    robot = fb.load("go2")  # fb.catalogue() lists the available robots
-    state = robot.standing()
-    contacts = fb.Contacts.points(robot, mu=0.7)
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    command = controller(state.q, state.v)  # .tau, .qdd, .forces, .active
-    run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
-
-Robots        catalogue, load, load_urdf, Robot, State
-Dynamics      Contacts, equations_of_motion (7), forces_from_torques (9), accelerations_from_torques
-              (14), feasible_space (13)
-Costs         Affine, Quadratic, CoMTask, FrameTask, OrientationTask, PostureTask, ForceTask,
-              TorqueTask, standing_tasks
-Control       WholeBodyController (26)(27), QP, solve
-Simulation    Simulation, Ground, Push, rollout, Rollout, sweep, push_recovery
-Walking       from floatbase.behaviours import Gait, Walk, Stand
-Pictures      Viewer
-Errors        FloatbaseError, InfeasibleError
+Robots
+    `catalogue`, `load`, `load_urdf`, `Robot`, `State`
+Dynamics
+    `Contacts`, `equations_of_motion` (7), `forces_from_torques` (9), `accelerations_from_torques`
+    (14), `feasible_space` (13)
+Tasks and costs
+    `Affine`, `Quadratic`, `CoMTask`, `FrameTask`, `OrientationTask`, `PostureTask`, `ForceTask`,
+    `TorqueTask`, `standing_tasks`
+Control
+    `WholeBodyController` (26) (27), `QP`, `solve`
+Simulation
+    `Simulation`, `Ground`, `Push`, `rollout`, `Rollout`, `sweep`, `push_recovery`
+Walking
+    `from floatbase.behaviours import Gait, Walk, Stand`
+3-D viewer
+    `Viewer`
+Errors
+    `FloatbaseError`, `InfeasibleError`
 
 Symbols, frames, signs and units: help("floatbase.conventions"). Import all other names from their
 packages, as in `from floatbase.friction import FrictionPolyhedron`. MuJoCo and the viewer are
 imported on first use.
+
+Examples
+--------
+>>> import floatbase as fb
+>>> robot = fb.load("go2")  # fb.catalogue() lists the available robots
+>>> state = robot.standing()
+>>> contacts = fb.Contacts.points(robot, mu=0.7)
+>>> controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
+>>> command = controller(state.q, state.v)  # .tau, .qdd, .forces, .active
+>>> run = fb.rollout(fb.Simulation(robot), controller, duration=2.0)
 """
 
 from __future__ import annotations

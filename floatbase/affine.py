@@ -271,7 +271,7 @@ class Quadratic(Value):
     g : array_like, shape (n,)
         Gradient at x = 0.
     c : float, optional
-        Cost at x = 0, in the unit of the cost; dimensionless in most uses.
+        Cost at x = 0 [unit of the cost].
 
     Raises
     ------

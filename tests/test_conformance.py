@@ -12,6 +12,7 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
 from datetime import datetime
 from functools import cache, partial
 from importlib import import_module
@@ -127,11 +128,11 @@ def right() -> dict[str, Any]:
         "StepPlan": walk.history[0],
         "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": UP,
-        "npt.ArrayLike": UP, "Target": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
-        "Sequence[Task]": controller().tasks, "Sequence[MotionConstraint]": tuple(contacts),
+        "npt.ArrayLike": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
+        "Sequence[Task]": controller().tasks,
         "Sequence[str]": ["a", "b"],
-        "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2, "Mapping": {"a": 0.0},
-        "A": np.eye(12), "H": np.eye(12), "G": np.eye(12), "b": ZERO, "g": ZERO, "h": ZERO,
+        "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2,
+        "A": np.eye(12), "b": ZERO,
         "x": ZERO, "r": ZERO,
         "N": np.eye(12)[:, :3], "tau": ZERO, "tau_desired": ZERO, "q_joints": state.q[7:],
         "v_joints": ZERO,
@@ -142,19 +143,17 @@ def right() -> dict[str, Any]:
         np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
-        "points": contacts.positions(state), "max_normal_force": np.full(4, 200.0), "a": 10.0,
-        "torque_limits": np.full(12, 20.0), "corners": talos.feet[0].corners,
+        "points": contacts.positions(state), "a": 10.0,
         "flat_feet.robot": talos,
         "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"),
         "force": np.array([0.1, 0.0, 1.0]),
-        "cost": fb.Quadratic.zero(space.dimension), "cost_on_qdd": fb.Quadratic.zero(18),
+        "cost": fb.Quadratic.zero(space.dimension),
         "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO),
         "parts": fb.Affine(np.eye(12), ZERO),
-        "cones": values()["WrenchSet"].cones, "kinds": qp.inequality_names[0].kind,
+        "kinds": qp.inequality_names[0].kind,
         "qp_plots.feasible_polygon.qp": table_top(),
         "qp_plots.plot.qp": table_top(), "block": "tau",
-        "segments": [(0.0, 1.0, np.zeros(2), np.ones(2))],
-        "LIPM.com": np.zeros(2), "nominal_foothold": np.zeros(2),
+        "nominal_foothold": np.zeros(2),
         "neutral_point.velocity": np.zeros(2), "dcm_error":
         np.zeros(2),
         "point": np.zeros(2), "support_margin.feet": np.eye(2), "places": np.zeros((2, 3)),
@@ -162,11 +161,9 @@ def right() -> dict[str, Any]:
         "times": (0.0, 0.1), "moving_frame.acceleration": lambda t: UP,
         "angles": lambda t: np.array([0.1 * t, 0.2 * t]), "duration": 0.002, "dt": 1e-3,
         "alpha": 0.1, "rate": 30.0,
-        "high": 1.0, "low": 0.0, "lift_off": 0.0, "omega": 5.0,
+        "high": 1.0, "low": 0.0, "omega": 5.0,
         "view_from_rotating_frame.omega": UP,
-        "LinearInequality.coefficients":
-        (np.eye(18), np.ones(18)),
-        "row": 0, "i": 0, "period": 1.0, "swing": 0.25, "kind": "planned", "load.name": "go2",
+        "row": 0, "i": 0, "kind": "planned", "load.name": "go2",
         "solver": "daqp",
         "status": "inside", "root": "/robot", "lesson": "07",
         "path": "floatbase-view.html",
@@ -298,9 +295,11 @@ def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
 
 
 def found_for(callee: Callee, parameter: inspect.Parameter) -> Any:
-    """The right argument for a parameter: under callee and parameter, the parameter's name, or its
-    annotation.
+    """The right argument for a parameter: the field of that name of the class's own value, or from
+    the table, under callee and parameter, the parameter's name, or its annotation.
     """
+    if is_dataclass(callee.call) and hasattr(right().get(callee.name), parameter.name):
+        return getattr(right()[callee.name], parameter.name)
     first, *_, last = callee.name.split(".") * 2
     name, kind = parameter.name, str(parameter.annotation).split(" | ")[0]
     keys = (

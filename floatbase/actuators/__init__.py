@@ -1,5 +1,6 @@
-"""Hydraulic actuators between the torque that a controller desires and the one that a joint gets
-(App. B of the course text).
+"""Actuator models between the torque a controller requests and the torque a joint gets.
+
+[FBR]_, App. B.
 """
 
 from floatbase.actuators.hydraulic_actuators import HydraulicActuators, HydraulicState

@@ -1,5 +1,6 @@
-"""App. B: the force loop that drives the cylinders, so that one layer up the torque can be taken
-for granted.
+"""Hydraulic actuators with a force loop that makes each joint follow a desired torque.
+
+[FBR]_, App. B.
 """
 
 from __future__ import annotations
@@ -14,27 +15,31 @@ from floatbase.actuators.hydraulics import CylinderGeometry, Cylinders, Hydrauli
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
-_MAX_STEP = 2e-4  # s, of the oil's integration: torques come out within 1 % of the limit at 0.2 ms
-# s in one call: torques and velocities that stay the same for longer are a slip of units
+# s, substep for the oil: at 0.2 ms, torques are accurate to 1 % of the torque limit
+_MAX_STEP = 2e-4
+# s, longest step: constant torques and velocities for longer indicate a wrong unit
 _MAX_DURATION = 10.0
-# of a step: 1 ms is 5 steps of 0.2 ms, whatever the last digit of the quotient
+# fraction of a substep: 1 ms is 5 substeps of 0.2 ms, even if the quotient is rounded
 _STEP_ROUNDING = 1e-9
-# of the loop's bandwidth: the integral's corner frequency; it costs the loop 3° of phase
+# corner frequency of the integral, as a fraction of the loop bandwidth; it costs 3° of phase
 _INTEGRAL_FRACTION = 0.05
-# of the crank: a shorter lever asks for forces beyond all pressure, whatever the torque
+# shortest lever, as a fraction of the crank: below it, any torque needs an impossible pressure
 _MIN_LEVER_FRACTION = 1e-9
-_StateArrays = tuple[
-    Array, Array, Array
-]  # the parts of a `HydraulicState`, between the steps of the integration
+_StateArrays = tuple[Array, Array, Array]  # the parts of a `HydraulicState`, between substeps
 
 
 @dataclass(frozen=True, eq=False)
 class HydraulicState(Value):
-    """What d cylinders and their loops remember.
+    """State of d hydraulic cylinders and their force loops.
 
-    opening: (d,), of the valves, -1 to 1.
-    pressures: (2, d) Pa over the air outside, chambers A and B.
-    integral: (d,) N·s, the loops' sums of errors.
+    Parameters
+    ----------
+    opening : array_like, shape (d,)
+        Valve openings, -1 to 1, dimensionless.
+    pressures : array_like, shape (2, d)
+        Gauge pressures of the chambers A and B [Pa].
+    integral : array_like, shape (d,)
+        Integrals of the force errors in the loops [N·s].
     """
 
     opening: Array
@@ -47,27 +52,45 @@ class HydraulicState(Value):
 
 
 class HydraulicActuators:
-    """App. B: a hydraulic cylinder on every joint of a robot, each with a force loop. Usable as
-    `actuators` in `rollout`.
+    """Hydraulic cylinders with force loops, one on every joint of a robot.
 
-    The loop desires Ḟ = ω (e + ω_i ∫e dt) with e = F_desired - F, ω = 2π times the loop's bandwidth
-    and ω_i a twentieth of it, and gives the valve the opening for it (`Cylinders.opening_for`); the
-    integral rests while the valve is all open. The torque follows up to the loop's bandwidth, as
-    long as that lies below the valve's.
+    Use them as `actuators` in `rollout`.
 
-    Sizes: each cylinder is HyQ's, scaled until the supply pressure gives the robot's torque limit
-        at the lever's best angle
-    and in the weaker direction, rod going in. Friction of the pistons is left out. A load that
-    pulls the rod out fast starves chamber A: its oil boils, and torque is missing until the chamber
-    is full again.
+    Each loop commands Ḟ = ω (e + ω_i ∫e dt), where e = F_desired - F, ω is 2π times the bandwidth
+    of the loop, and ω_i is a twentieth of ω. It sets the valve to the opening that gives this Ḟ
+    (`Cylinders.opening_for`). The integral pauses while the valve is fully open. The torque follows
+    up to the bandwidth of the loop, as long as that is below the bandwidth of the valve.
 
-    robot: as from `fb.load`; hydraulics: the cylinder that is scaled, HyQ's by default;
-        max_lever_angle: (d,) rad, the angles at which
-    the levers are longest, those of `robot.standing()` by default. `state` is the present
-    `HydraulicState`, `cylinders` the equations.
-    Source of the loop: Boaventura et al., Model-based hydraulic impedance control for dynamic
-    robots, IEEE T-RO 31, 2015. Raises `InputError` for a joint without a torque limit and for
-    joints that slide.
+    Each cylinder is a scaled version of HyQ's. At the best angle of the lever and in the weaker
+    direction, with the rod retracting, the supply pressure gives the torque limit of the joint.
+    Friction of the pistons is neglected. A load that pulls the rod out quickly starves chamber A.
+    Its oil boils, and torque is missing until the chamber is full again.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as returned by `fb.load`.
+    hydraulics : Hydraulics, optional
+        Cylinder to scale; HyQ's by default.
+    max_lever_angle : array_like, shape (d,), optional
+        Joint angles at which the levers are longest [rad]; those of `robot.standing()` by default.
+
+    Attributes
+    ----------
+    state : HydraulicState
+        Present state.
+    cylinders : Cylinders
+        Equations of the cylinders.
+
+    Raises
+    ------
+    InputError
+        If a joint has no torque limit, or if a joint is prismatic.
+
+    Notes
+    -----
+    [FBR]_, App. B. HyQ: [Semini2011]_. The loop follows Boaventura et al., Model-based hydraulic
+    impedance control for dynamic robots, IEEE T-RO 31, 2015.
     """
 
     def __init__(
@@ -86,16 +109,16 @@ class HydraulicActuators:
             kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
             if not kind.startswith("JointModelR"):
                 raise InputError(
-                    f"{joint} of {robot.name} slides ({kind}); hydraulic actuators here turn "
-                    f"joints by a crank."
+                    f"{joint} of {robot.name} is prismatic ({kind}). Hydraulic actuators need a "
+                    f"revolute joint, since they act through a crank."
                 )
             if not np.isfinite(limit):
                 raise InputError(
-                    f"{joint} of {robot.name} has no torque limit, so its cylinder has no scale: "
-                    f'load the robot with one, fb.load("{robot.name}", torque_limits=…).'
+                    f"{joint} of {robot.name} has no torque limit, which is needed to scale its "
+                    f'cylinder. Use fb.load("{robot.name}", torque_limits=…).'
                 )
         if max_lever_angle is None:
-            # the difference to the neutral configuration holds the joints' angles, where q has cos
+            # the difference from the neutral configuration holds joint angles even if q holds cos
             # and sin
             max_lever_angle = robot.standing().difference(robot.neutral().q)[robot.nv - robot.d :]
         self.cylinders = Cylinders(
@@ -106,21 +129,26 @@ class HydraulicActuators:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Close the valves, with pressures that give torques tau, (d,) N·m, zero by default, as far
-        as the supply goes.
+        """Close the valves and set the pressures so that the joints get the torques tau.
 
-        q_joints: (d,) rad, `Cylinders.max_lever_angle` by default. A robot that is to stand from
-            the start needs the torques it stands with.
-        The integrals begin empty: torques are off, by what leaks, until they have learned how much
-        that is.
+        The supply pressure limits the torques. The integrals start at zero, so the torques have an
+        error due to leakage until the integrals have compensated for it.
+
+        Parameters
+        ----------
+        tau : array_like, shape (d,), optional
+            Torques [N·m]; zero by default. A robot that should stand from the start needs the
+            torques of its stance.
+        q_joints : array_like, shape (d,), optional
+            Joint angles [rad]; `Cylinders.max_lever_angle` by default.
         """
         cylinders = self.cylinders
         tau = as_array("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
         force = self._desired_forces(
             tau, cylinders.geometry(cylinders.max_lever_angle if q_joints is None else q_joints)
         )
-        # a valve with equal edges holds a force with as much pressure missing at A as there is too
-        # much at B
+        # a valve with equal edges maintains a force if the pressure missing at A equals the excess
+        # at B
         lines = cylinders.hydraulics.supply_pressure + cylinders.hydraulics.tank_pressure
         a = (force + cylinders.areas[1] * lines) / cylinders.areas.sum(axis=0)
         self.state = HydraulicState(
@@ -128,7 +156,18 @@ class HydraulicActuators:
         )
 
     def torques(self, q_joints: npt.ArrayLike) -> Array:
-        """The torques that the oil makes at joint angles, shape (d,) rad: L F, shape (d,), N·m."""
+        """Return the joint torques L F due to the oil.
+
+        Parameters
+        ----------
+        q_joints : array_like, shape (d,)
+            Joint angles [rad].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques [N·m].
+        """
         return self.cylinders.geometry(q_joints).lever * self.cylinders.force(self.state.pressures)
 
     def step(
@@ -138,14 +177,30 @@ class HydraulicActuators:
         v_joints: npt.ArrayLike,
         dt: float,
     ) -> Array:
-        """Let time pass; the joints' torques at its end, shape (d,), N·m.
+        """Advance the actuators by a time step and return the joint torques at its end.
 
-        tau_desired: (d,) N·m.
-        q_joints, v_joints: (d,) rad and rad/s at the start. The oil's spring answers to them and
-            acts on the next ones, which is stable (symplectic Euler) for √(L² k / inertia) dt < 2;
-            at 1 ms the catalogue's robots reach 1.7.
-        dt: s, integrated in equal steps of 0.2 ms at most: the spool exactly, the pressures by
-            linearly implicit Euler.
+        The step is integrated in equal substeps of at most 0.2 ms: the valve spool exactly, the
+        pressures by the linearly implicit Euler method.
+
+        The joints are constant during the step, and the resulting torques act on the next one. With
+        the spring of the oil, this is stable (symplectic Euler) for √(L² k / inertia) dt < 2. At 1
+        ms the robots of the catalogue reach 1.7.
+
+        Parameters
+        ----------
+        tau_desired : array_like, shape (d,)
+            Desired torques [N·m].
+        q_joints : array_like, shape (d,)
+            Joint angles at the start of the step [rad].
+        v_joints : array_like, shape (d,)
+            Joint velocities at the start of the step [rad/s].
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques at the end of the step [N·m].
         """
         cylinders = self.cylinders
         geometry = cylinders.geometry(q_joints)
@@ -168,7 +223,10 @@ class HydraulicActuators:
         return geometry.lever * cylinders.force(self.state.pressures)
 
     def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
-        """The piston forces for joint torques, shape (d,), N, within what supply and tank allow."""
+        """Return the piston forces for joint torques, shape (d,) [N].
+
+        They are limited to what supply and tank allow.
+        """
         min_lever = _MIN_LEVER_FRACTION * self.cylinders.crank
         lever = np.where(np.abs(geometry.lever) < min_lever, min_lever, geometry.lever)
         return np.clip(tau / lever, *self.cylinders.force_limits())
@@ -176,9 +234,7 @@ class HydraulicActuators:
     def _advance(
         self, state: _StateArrays, force: Array, geometry: CylinderGeometry, v: Array, step: float
     ) -> _StateArrays:
-        """Opening, pressures and integral `step` s later when the loop desires `force`, (d,) N, at
-        joint velocities v.
-        """
+        """Return opening, pressures and integral after `step` [s] for desired forces [N]."""
         cylinders, (opening, pressures, integral) = self.cylinders, state
         rate = 2.0 * np.pi * cylinders.hydraulics.loop_bandwidth
         error = force - cylinders.force(pressures)

@@ -1,101 +1,147 @@
-"""App. B: a hydraulic cylinder with its valve, its oil, and the lever to the joint, as equations
-without memory.
+"""Equations of a hydraulic cylinder with its valve, its oil and its lever at the joint.
+
+[FBR]_, App. B.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_instance, as_positive, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_instance,
+    as_positive,
+    checked,
+    read_only,
+)
 from floatbase.errors import InputError
 
-# Pa: below about this drop an orifice's flow grows with the drop rather than with its root
+# Pa: below about this drop, the flow of an orifice is proportional to the drop, not to its root
 _LAMINAR_DROP = 1e5
-# N/s: least change of force by an open valve. Chambers at line pressure have none; they get the
-# valve's all
+# N/s: smallest rate of force of an open valve. At line pressure it would be zero; then the valve
+# opens fully
 _MIN_GAIN = 1e-9
-VACUUM = -101325.0  # Pa over the air outside: oil at this pressure boils and pulls no more
+VACUUM = -101325.0  # Pa, gauge pressure: oil at this pressure boils and cannot pull harder
 _CHAMBER_SIGN = np.array([[1.0], [-1.0]])  # chamber A pushes the rod out, chamber B pulls it in
 
 
+def _positive(default: float, unit: str, allow_zero: bool = False) -> Any:
+    """Declare a field that holds a positive number."""
+    return field(default=default, metadata=checked(as_positive, unit, allow_zero=allow_zero))
+
+
 @dataclass(frozen=True)
-class Hydraulics:
-    """One joint of HyQ, the hydraulic quadruped: cylinder, lever, oil, valve and force loop.
+class Hydraulics(Value):
+    """Parameters of a hydraulic joint: cylinder, lever, oil, valve and force loop.
 
-    bore, rod: m, diameters.
-    crank, base: m, from the joint's axis to the rod's end and to the cylinder's foot.
-    dead_volume: m³, oil in the hose to each chamber.
-    supply_pressure, tank_pressure: Pa over the air outside.
-    bulk_modulus: Pa, β_e.
-    leakage: m³/(s Pa), past the piston.
-    rated_flow, rated_pressure_drop: m³/s through the valve, all open, when its two edges together
-        take that drop, Pa.
-    valve_bandwidth: Hz, where the spool's amplitude has fallen by 3 dB.
-    loop_bandwidth: Hz, of the force loop: turn it down to make the actuator slow.
+    The default values describe one joint of the hydraulic quadruped HyQ.
 
-    Sources: bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz: Semini et
-    al., Design of HyQ, a hydraulically and electrically actuated quadruped robot, Proc. IMechE Part
-    I 225, 2011. The crank follows from them: 160 bar on the bore gives 3217 N, and 145 N·m need 45
-    mm. The others are nominal, not measured on HyQ: a dead volume of 0.4 m of hose of 5 mm, leakage
-    of 0.02 l/min at 160 bar, flow of 7.5 l/min at 70 bar, a loop of a fifth of the valve's. Raises
-    `InputError` for values that make no cylinder.
+    Parameters
+    ----------
+    bore : float
+        Diameter of the piston [m].
+    rod : float
+        Diameter of the rod [m].
+    crank : float
+        Distance from the joint axis to the end of the rod [m].
+    base : float
+        Distance from the joint axis to the foot of the cylinder [m].
+    dead_volume : float
+        Volume of oil in the hose to each chamber [m³].
+    supply_pressure : float
+        Gauge pressure of the supply line [Pa].
+    tank_pressure : float
+        Gauge pressure of the tank line [Pa].
+    bulk_modulus : float
+        Bulk modulus of the oil, β_e [Pa].
+    leakage : float
+        Leakage past the piston per pressure difference [m³/(s Pa)].
+    rated_flow : float
+        Flow through the fully open valve when the pressure drop across its two edges together is
+        the rated one [m³/s].
+    rated_pressure_drop : float
+        Rated pressure drop [Pa].
+    valve_bandwidth : float
+        Frequency at which the amplitude of the spool has dropped by 3 dB [Hz].
+    loop_bandwidth : float
+        Bandwidth of the force loop [Hz]; a lower value makes the actuator slower.
+
+    Raises
+    ------
+    InputError
+        If the values do not describe a possible cylinder.
+
+    Notes
+    -----
+    Bore 16 mm, rod 10 mm, 160 bar, 145 N·m and the Moog E024 valve of 250 Hz are from
+    [Semini2011]_. The crank follows from them: 160 bar on the bore gives 3217 N, so 145 N·m
+    requires 45 mm. The other values are nominal, not measured on HyQ: a dead volume of 0.4 m of
+    hose with a diameter of 5 mm, a leakage of 0.02 l/min at 160 bar, a flow of 7.5 l/min at 70 bar,
+    and a loop bandwidth of a fifth of the valve's.
     """
 
     _example = "Hydraulics(loop_bandwidth=20.0)"
-    bore: float = 0.016
-    rod: float = 0.010
-    crank: float = 0.045
-    base: float = 0.32
-    dead_volume: float = 8e-6
-    supply_pressure: float = 160e5
-    tank_pressure: float = 2e5
-    bulk_modulus: float = 1.3e9
-    leakage: float = 2e-14
-    rated_flow: float = 1.25e-4
-    rated_pressure_drop: float = 70e5
-    valve_bandwidth: float = 250.0
-    loop_bandwidth: float = 50.0
+    bore: float = _positive(0.016, "m")
+    rod: float = _positive(0.010, "m")
+    crank: float = _positive(0.045, "m")
+    base: float = _positive(0.32, "m")
+    dead_volume: float = _positive(8e-6, "m³")
+    supply_pressure: float = _positive(160e5, "Pa")
+    tank_pressure: float = _positive(2e5, "Pa", allow_zero=True)
+    bulk_modulus: float = _positive(1.3e9, "Pa")
+    leakage: float = _positive(2e-14, "m³/(s Pa)", allow_zero=True)
+    rated_flow: float = _positive(1.25e-4, "m³/s")
+    rated_pressure_drop: float = _positive(70e5, "Pa")
+    valve_bandwidth: float = _positive(250.0, "Hz")
+    loop_bandwidth: float = _positive(50.0, "Hz")
 
     def __post_init__(self) -> None:
-        values = {field.name.replace("_", " "): getattr(self, field.name) for field in fields(self)}
-        for name, value in values.items():
-            as_positive(
-                f"{name} of the cylinder", value, allow_zero=name in ("tank pressure", "leakage")
-            )
+        super().__post_init__()
         for small, large in (
             ("rod", "bore"),
             ("crank", "base"),
-            ("tank pressure", "supply pressure"),
+            ("tank_pressure", "supply_pressure"),
         ):
-            if values[small] >= values[large]:
-                size, bound = values[small], values[large]
+            size, bound = getattr(self, small), getattr(self, large)
+            if size >= bound:
                 raise InputError(
-                    f"{small} of the cylinder is {size:g}; it must be less than {large}, {bound:g}."
+                    f"{small} of {self._label()} is {size:g}. It must be less than {large}, which "
+                    f"is {bound:g}."
                 )
         if self.weakest_torque <= 0.0:
             raise InputError(
-                "the tank pressure on the bore holds off the supply on the ring: it must be lower."
+                "tank_pressure on the area of the bore exceeds supply_pressure on the ring area. "
+                "Lower tank_pressure."
             )
+
+    def _label(self) -> str:
+        """Return the name that messages use for the cylinder."""
+        return "the cylinder"
 
     @property
     def areas(self) -> Array:
-        """Piston areas of chamber A (bore) and B (bore less rod), shape (2,), m²."""
+        """Piston areas of chamber A (bore) and chamber B (bore minus rod), shape (2,) [m²]."""
         return read_only(0.25 * np.pi * np.array([self.bore**2, self.bore**2 - self.rod**2]))
 
     @property
     def valve_gain(self) -> float:
-        """C_d w x_max √(2/ρ), m³/(s √Pa): flow per root of drop through one edge, all open; it
-        takes half the rated drop.
+        """Flow per square root of the pressure drop, C_d w x_max √(2/ρ) [m³/(s √Pa)].
+
+        It holds for one fully open edge, which takes half of the rated pressure drop.
         """
         return self.rated_flow / float(np.sqrt(0.5 * self.rated_pressure_drop))
 
     @property
     def weakest_torque(self) -> float:
-        """N·m that the supply gives at the best angle when the rod is pulled in, the weaker way:
-        only the ring pulls.
+        """Torque at the best angle of the lever when the rod retracts, the weaker direction [N·m].
+
+        Only the ring area pulls in this direction.
         """
         bore, ring = self.areas
         return float(ring * self.supply_pressure - bore * self.tank_pressure) * self.crank
@@ -103,13 +149,20 @@ class Hydraulics:
 
 @dataclass(frozen=True, eq=False)
 class CylinderGeometry(Value):
-    """Where d cylinders stand at given joint angles.
+    """Geometry of d cylinders at given joint angles.
 
-    length: (d,) m, ℓ, from foot to rod end.
-    lever: (d,) m, L = dℓ/dq.
-    volumes: (2, d) m³, V of the chambers A and B.
-    compliance: (2, d) m³/Pa, V / β_e.
-    stiffness: (d,) N/m, k = β_e (A_A²/V_A + A_B²/V_B), the spring that closed chambers make.
+    Parameters
+    ----------
+    length : ndarray, shape (d,)
+        Length ℓ from the foot of the cylinder to the end of the rod [m].
+    lever : ndarray, shape (d,)
+        Lever arm L = dℓ/dq [m].
+    volumes : ndarray, shape (2, d)
+        Volumes V of the chambers A and B [m³].
+    compliance : ndarray, shape (2, d)
+        Compliance V / β_e of the chambers A and B [m³/Pa].
+    stiffness : ndarray, shape (d,)
+        Stiffness k = β_e (A_A²/V_A + A_B²/V_B) of the oil in closed chambers [N/m].
     """
 
     length: Array
@@ -121,12 +174,20 @@ class CylinderGeometry(Value):
 
 @dataclass(frozen=True, eq=False)
 class PowerBalance(Value):
-    """Where the power goes, each of shape (d,), W: pump = joint + valve + leakage + stored.
+    """Power flows of d cylinders: pump = joint + valve + leakage + stored.
 
-    pump: what the supply line gives less what the tank line takes.
-    joint: torque times velocity.
-    valve, leakage: heat, never negative.
-    stored: in the compression of the oil, V p ṗ / β_e of both chambers.
+    Parameters
+    ----------
+    pump : ndarray, shape (d,)
+        Power from the supply line minus power into the tank line [W].
+    joint : ndarray, shape (d,)
+        Torque times velocity [W].
+    valve : ndarray, shape (d,)
+        Heat in the valve, never negative [W].
+    leakage : ndarray, shape (d,)
+        Heat due to leakage, never negative [W].
+    stored : ndarray, shape (d,)
+        Power stored in compressed oil, V p ṗ / β_e summed over both chambers [W].
     """
 
     pump: Array
@@ -137,32 +198,46 @@ class PowerBalance(Value):
 
 
 class Cylinders(Value):
-    """App. B: d double-acting cylinders, each on a crank, as equations without memory.
+    """The equations of d double-acting cylinders, each on a crank; they have no internal state.
 
-    For a joint angle q, with γ the angle at the joint between the crank b and the cylinder's foot
-    at distance a:
+    At a joint angle q, γ is the angle at the joint between the crank, of length b, and the line to
+    the foot of the cylinder, at distance a:
 
-        ℓ² = a² + b² - 2 a b cos γ                       the triangle: length of the cylinder
-        L = dℓ/dq = a b sin γ / ℓ,   τ = L F             the same power on both sides: τ q̇ = F ℓ̇
-        F = p_A A_A - p_B A_B                            force of the oil, N, pushing the rod out
-        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber, whose volume V varies with ℓ
+        ℓ² = a² + b² - 2 a b cos γ                       law of cosines: length of the cylinder
+        L = dℓ/dq = a b sin γ / ℓ,   τ = L F             equal power on both sides: τ q̇ = F ℓ̇
+        F = p_A A_A - p_B A_B                            force of the oil, pushing the rod out [N]
+        ṗ = (β_e / V) (Q ∓ A ℓ̇ - c (p - p_other))        each chamber; its volume V depends on ℓ
         Q = C_d w x √(2 Δp / ρ)                          each edge of the valve
-        ẋ = 2π f_valve (u - x)                           the spool; u in [-1, 1] is its command
+        ẋ = 2π f_valve (u - x)                           spool; its command u is in [-1, 1]
 
-    x > 0 joins A to the supply and B to the tank, x < 0 the other way. Where Δp turns round, flow
-    turns round.
-    Source: Merritt, Hydraulic Control Systems, 1967; the triangle is HyQ's.
+    If x > 0, A is connected to the supply and B to the tank; if x < 0, the other way round. If Δp
+    changes its sign, so does the flow.
 
-    hydraulics: the cylinder of scale 1.
-    scale: (d,), each cylinder's torque as a multiple of that one's. Lengths are multiplied by
-        scale^(1/3), hence volumes, flow, leakage and torque by scale.
-    max_lever_angle: (d,) rad, the joint angle at which the lever is longest, L = b, and crank and
-        cylinder stand square. L is zero where they line up. The stroke 2 b lets a joint turn full
-        circle.
+    In the methods, x is the opening of the valves, shape (d,), -1 to 1. Pressures are gauge
+    pressures of the chambers A and B, shape (2, d) [Pa]. The geometry is the result of
+    `geometry(q)`, and v holds the joint velocities, shape (d,) [rad/s].
 
-    In the methods x is the valves' opening, shape (d,), -1 to 1; pressures those of the chambers A
-    and B, shape (2, d), Pa; geometry from `geometry(q)`; v the joints' velocities, shape (d,),
-    rad/s.
+    Parameters
+    ----------
+    hydraulics : Hydraulics
+        Cylinder of scale 1.
+    scale : array_like, shape (d,)
+        Torque of each cylinder relative to that of `hydraulics`, dimensionless. Lengths are
+        multiplied by scale^(1/3), and therefore volumes, flow, leakage and torque by scale.
+    max_lever_angle : array_like, shape (d,)
+        Joint angle at which the lever is longest [rad]. There L = b, and the crank is perpendicular
+        to the cylinder. L is zero where they are aligned. The stroke 2 b allows a full turn of the
+        joint.
+
+    Raises
+    ------
+    InputError
+        If a scale is not positive.
+
+    Notes
+    -----
+    [FBR]_, App. B. Equations: Merritt, Hydraulic Control Systems, 1967. The triangle is that of HyQ
+    [Semini2011]_.
     """
 
     hydraulics: Hydraulics
@@ -181,7 +256,7 @@ class Cylinders(Value):
         as_instance("hydraulics", hydraulics, Hydraulics)
         scale = as_array("scale", scale, (None,))
         if np.any(scale <= 0.0):
-            raise InputError(f"scale of a cylinder is {scale.min():g}; it must be > 0.")
+            raise InputError(f"scale of a cylinder is {scale.min():g}. It must be > 0.")
         vars(self).update(
             hydraulics=hydraulics,
             max_lever_angle=as_array("max_lever_angle", max_lever_angle, scale.shape, "rad"),
@@ -193,7 +268,7 @@ class Cylinders(Value):
             _leakage=hydraulics.leakage * scale,
             _best_gamma=float(
                 np.arccos(hydraulics.crank / hydraulics.base)
-            ),  # γ with crank and cylinder square
+            ),  # γ with the crank perpendicular to the cylinder
         )
 
     @property
@@ -202,12 +277,23 @@ class Cylinders(Value):
         return int(self.crank.size)
 
     def geometry(self, q: npt.ArrayLike) -> CylinderGeometry:
-        """Lengths, levers and chambers at joint angles q, shape (d,), rad."""
+        """Compute lengths, lever arms and chamber volumes.
+
+        Parameters
+        ----------
+        q : array_like, shape (d,)
+            Joint angles [rad].
+
+        Returns
+        -------
+        CylinderGeometry
+            The geometry.
+        """
         gamma = self._best_gamma + as_array("q", q, (self.d,), "rad") - self.max_lever_angle
         length = np.sqrt(
             self.base**2 + self.crank**2 - 2.0 * self.base * self.crank * np.cos(gamma)
         )
-        extension = length - (self.base - self.crank)  # how far the rod is out, from 0 to 2 b
+        extension = length - (self.base - self.crank)  # of the rod, from 0 to 2 b
         volumes = self._dead_volume + self.areas * np.array(
             [extension, 2.0 * self.crank - extension]
         )
@@ -219,41 +305,117 @@ class Cylinders(Value):
         return CylinderGeometry(*map(read_only, (length, lever, volumes, compliance, stiffness)))
 
     def force(self, pressures: Array) -> Array:
-        """F = p_A A_A - p_B A_B, shape (d,), N."""
+        """Return the forces F = p_A A_A - p_B A_B of the oil.
+
+        Parameters
+        ----------
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Forces, positive if they push the rod out [N].
+        """
         forces: Array = self.areas[0] * pressures[0] - self.areas[1] * pressures[1]
         return forces
 
     def force_limits(self) -> Array:
-        """The least and the largest F that supply and tank allow, shape (2, d), N."""
+        """Return the smallest and the largest F that supply and tank allow.
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Smallest forces, then largest forces [N].
+        """
         lines = np.array([[self.hydraulics.tank_pressure], [self.hydraulics.supply_pressure]])
         return np.array([self.force(lines), self.force(lines[::-1])])
 
     def line_pressures(self, x: Array) -> Array:
-        """Pressure of the line that each chamber is open to, shape (2, d), Pa, when the valve opens
-        towards x.
+        """Return the pressure of the line to which each chamber is connected.
+
+        Parameters
+        ----------
+        x : ndarray, shape (d,)
+            Valve openings, of which only the sign matters.
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Pressures for the chambers A and B [Pa].
         """
         return np.where(
             _CHAMBER_SIGN * x >= 0.0, self.hydraulics.supply_pressure, self.hydraulics.tank_pressure
         )
 
     def orifice_flow(self, drop: Array) -> Array:
-        """Flow through an edge, all open, for a drop of pressure, shape (2, d), m³/s: √Δp, but
-        smooth through zero.
+        """Return the flow through a fully open edge: √Δp, smoothed through zero.
+
+        Parameters
+        ----------
+        drop : ndarray, shape (2, d)
+            Pressure drop Δp [Pa].
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Flow, with the sign of the drop [m³/s].
         """
         return self._valve_gain * drop / np.sqrt(np.hypot(drop, _LAMINAR_DROP))
 
     def valve_flows(self, x: Array, pressures: Array) -> Array:
-        """Q into the chambers A and B, shape (2, d), m³/s."""
+        """Return the flows Q from the valve into the chambers.
+
+        Parameters
+        ----------
+        x : ndarray, shape (d,)
+            Valve openings.
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Flows into the chambers A and B [m³/s].
+        """
         return np.abs(x) * self.orifice_flow(self.line_pressures(x) - pressures)
 
     def leakage_flow(self, pressures: Array) -> Array:
-        """Flow past the piston out of the chambers A and B, shape (2, d), m³/s."""
+        """Return the leakage past the piston.
+
+        Parameters
+        ----------
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Flows out of the chambers A and B [m³/s].
+        """
         return self._leakage * (pressures - pressures[::-1])
 
     def pressure_rates(
         self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array
     ) -> Array:
-        """ṗ of the chambers A and B, shape (2, d), Pa/s."""
+        """Return the rates of change ṗ of the pressures.
+
+        Parameters
+        ----------
+        x : ndarray, shape (d,)
+            Valve openings.
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+        geometry : CylinderGeometry
+            Geometry at the joint angles.
+        v : ndarray, shape (d,)
+            Joint velocities [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Rates for the chambers A and B [Pa/s].
+        """
         inflow = (
             self.valve_flows(x, pressures)
             - self.leakage_flow(pressures)
@@ -262,8 +424,23 @@ class Cylinders(Value):
         return inflow / geometry.compliance
 
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
-        """-∂ṗ/∂p of each chamber by itself, shape (2, d), 1/s, never negative: how stiff the oil's
-        equations are.
+        """Return the decay rate -∂ṗ/∂p of each chamber's own pressure.
+
+        It shows how stiff the equations of the oil are.
+
+        Parameters
+        ----------
+        x : ndarray, shape (d,)
+            Valve openings.
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+        geometry : CylinderGeometry
+            Geometry at the joint angles.
+
+        Returns
+        -------
+        ndarray, shape (2, d)
+            Decay rates, never negative [1/s].
         """
         drop = self.line_pressures(x) - pressures
         slope = (
@@ -282,8 +459,32 @@ class Cylinders(Value):
         v: Array,
         step: float,
     ) -> tuple[Array, Array]:
-        """Opening, (d,), and pressures, (2, d) Pa, `step` s later with the valves' inputs u, (d,),
-        -1 to 1: the spool exactly, the pressures by linearly implicit Euler, never below `VACUUM`.
+        """Advance the valve spools and the pressures by a time step.
+
+        The spools are integrated exactly, and the pressures by the linearly implicit Euler method.
+        Pressures never drop below `VACUUM`.
+
+        Parameters
+        ----------
+        opening : ndarray, shape (d,)
+            Valve openings at the start.
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B at the start [Pa].
+        u : ndarray, shape (d,)
+            Valve commands, -1 to 1.
+        geometry : CylinderGeometry
+            Geometry at the joint angles.
+        v : ndarray, shape (d,)
+            Joint velocities [rad/s].
+        step : float
+            Length of the step [s].
+
+        Returns
+        -------
+        opening : ndarray, shape (d,)
+            Valve openings at the end.
+        pressures : ndarray, shape (2, d)
+            Pressures at the end [Pa].
         """
         decay = np.exp(-2.0 * np.pi * self.hydraulics.valve_bandwidth * step)
         new_opening = u + (opening - u) * decay
@@ -295,12 +496,29 @@ class Cylinders(Value):
     def opening_for(
         self, force_rate: Array, pressures: Array, geometry: CylinderGeometry, v: Array
     ) -> Array:
-        """The opening, shape (d,), that makes the force change by force_rate, (d,) N/s, while the
-        joints move with v.
+        """Return the valve opening that changes the force at a given rate while the joints move.
 
-        Ḟ = x g - k ℓ̇ with k the oil's stiffness and g the change of force at the valve all open,
-        so x = (Ḟ + k ℓ̇) / g: it feeds the piston's velocity forward. Leakage is left to the loop's
-        integral. x may be beyond -1 to 1.
+        Parameters
+        ----------
+        force_rate : ndarray, shape (d,)
+            Rate of change Ḟ of the force [N/s].
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+        geometry : CylinderGeometry
+            Geometry at the joint angles.
+        v : ndarray, shape (d,)
+            Joint velocities [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Valve openings, which can lie outside -1 to 1.
+
+        Notes
+        -----
+        Ḟ = x g - k ℓ̇, where k is the stiffness of the oil and g is the rate of change of the force
+        when the valve is fully open. Hence x = (Ḟ + k ℓ̇) / g, which includes a feedforward of the
+        piston velocity. Leakage is left to the integral of the force loop.
         """
         valve_force_rate = force_rate + geometry.stiffness * geometry.lever * v
         full_opening_rate = (
@@ -314,7 +532,24 @@ class Cylinders(Value):
     def power(
         self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array
     ) -> PowerBalance:
-        """Where the power goes at an instant: see `PowerBalance`."""
+        """Return the power flows at one instant.
+
+        Parameters
+        ----------
+        x : ndarray, shape (d,)
+            Valve openings.
+        pressures : ndarray, shape (2, d)
+            Pressures of the chambers A and B [Pa].
+        geometry : CylinderGeometry
+            Geometry at the joint angles.
+        v : ndarray, shape (d,)
+            Joint velocities [rad/s].
+
+        Returns
+        -------
+        PowerBalance
+            The power flows.
+        """
         flows, line = self.valve_flows(x, pressures), self.line_pressures(x)
         stored = geometry.compliance * pressures * self.pressure_rates(x, pressures, geometry, v)
         leaked = pressures * self.leakage_flow(pressures)

@@ -1,5 +1,6 @@
-"""App. B: two plain models of an actuator that is late, a pure delay and a first-order lag, to
-compare with the oil.
+"""Two simple models of slow actuators, a pure delay and a first-order lag.
+
+They serve as a comparison for the hydraulic actuators. [FBR]_, App. B.
 """
 
 from __future__ import annotations
@@ -12,17 +13,24 @@ import numpy.typing as npt
 from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
 from floatbase.robots import Robot
 
-# s: times are counted in whole nanoseconds, so that no rounding adds up from step to step
+# s: times are counted in whole nanoseconds, so that rounding errors do not accumulate
 _TIME_UNIT = 1e-9
-_MAX_TIME = 10.0  # s, of a delay and of a step: longer is a slip of units
+_MAX_TIME = 10.0  # s, longest delay and longest step: a longer one indicates a wrong unit
 
 
 class Delay:
-    """App. B: torques that arrive late, τ(t) = τ_d(t - T), and are else as desired. Usable as
-    `actuators` in `rollout`.
+    """Actuators whose torques arrive late: τ(t) = τ_d(t - T); usable as `actuators` in `rollout`.
 
-    robot: as from `fb.load`.
-    delay: s, T, counted in whole nanoseconds; 0 hands the torques on.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as returned by `fb.load`.
+    delay : float
+        Delay T, rounded to whole nanoseconds [s]. With 0, torques are passed on at once.
+
+    Notes
+    -----
+    [FBR]_, App. B.
     """
 
     def __init__(self, robot: Robot, delay: float):
@@ -33,10 +41,14 @@ class Delay:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Let the torques under way be tau, shape (d,), N·m, zero by default.
+        """Set the torques that are on their way.
 
-        q_joints: (d,) rad, not used: this actuator asks for no angles, but is called as the
-            hydraulic ones are.
+        Parameters
+        ----------
+        tau : array_like, shape (d,), optional
+            Torques [N·m]; zero by default.
+        q_joints : array_like, shape (d,), optional
+            Joint angles [rad], not used; hydraulic actuators have the same parameter.
         """
         self._queue = deque(
             [(round(self.delay / _TIME_UNIT), _checked_reset(self.robot, tau, q_joints))]
@@ -49,11 +61,23 @@ class Delay:
         v_joints: npt.ArrayLike,
         dt: float,
     ) -> Array:
-        """The torques that arrive in the next dt s, shape (d,), N·m: their mean where they change
-        meanwhile.
+        """Advance by a time step and return the torques that arrive during it.
 
-        tau_desired: (d,) N·m, from now on, for dt s.
-        q_joints, v_joints: (d,) rad and rad/s, not used.
+        Parameters
+        ----------
+        tau_desired : array_like, shape (d,)
+            Desired torques during the step [N·m].
+        q_joints : array_like, shape (d,)
+            Joint angles [rad], not used.
+        v_joints : array_like, shape (d,)
+            Joint velocities [rad/s], not used.
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques [N·m], averaged over the step if they change during it.
         """
         step = remaining = _time_units(dt)
         self._queue.append((step, _checked_desired(self.robot, tau_desired, q_joints, v_joints)))
@@ -69,13 +93,24 @@ class Delay:
 
 
 class FirstOrderLag:
-    """App. B: torques that follow as a first-order lag does, τ̇ = ω (τ_d - τ). Usable as
-    `actuators` in `rollout`.
+    """Actuators whose torques follow as τ̇ = ω (τ_d - τ); usable as `actuators` in `rollout`.
 
-    robot: as from `fb.load`.
-    bandwidth: Hz, ω / 2π, where the torque's amplitude has fallen by 3 dB. After a step of τ_d, 63
-        % have come after 1/ω.
-    `tau` is the present torque, (d,) N·m.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as returned by `fb.load`.
+    bandwidth : float
+        Bandwidth ω / 2π, where the amplitude of the torque has dropped by 3 dB [Hz]. At a time 1/ω
+        after a step of τ_d, the torque has completed 63 % of the change.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (d,)
+        Present torques [N·m].
+
+    Notes
+    -----
+    [FBR]_, App. B.
     """
 
     def __init__(self, robot: Robot, bandwidth: float):
@@ -86,10 +121,14 @@ class FirstOrderLag:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Let the present torques be tau, shape (d,), N·m, zero by default.
+        """Set the present torques.
 
-        q_joints: (d,) rad, not used: this actuator asks for no angles, but is called as the
-            hydraulic ones are.
+        Parameters
+        ----------
+        tau : array_like, shape (d,), optional
+            Torques [N·m]; zero by default.
+        q_joints : array_like, shape (d,), optional
+            Joint angles [rad], not used; hydraulic actuators have the same parameter.
         """
         self.tau = _checked_reset(self.robot, tau, q_joints)
 
@@ -100,10 +139,23 @@ class FirstOrderLag:
         v_joints: npt.ArrayLike,
         dt: float,
     ) -> Array:
-        """Let dt s pass, exactly for a τ_d that stays; the torques at their end, shape (d,), N·m.
+        """Advance by a time step and return the torques at its end, exact for a constant τ_d.
 
-        tau_desired: (d,) N·m.
-        q_joints, v_joints: (d,) rad and rad/s, not used.
+        Parameters
+        ----------
+        tau_desired : array_like, shape (d,)
+            Desired torques during the step [N·m].
+        q_joints : array_like, shape (d,)
+            Joint angles [rad], not used.
+        v_joints : array_like, shape (d,)
+            Joint velocities [rad/s], not used.
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Torques at the end of the step [N·m].
         """
         desired = _checked_desired(self.robot, tau_desired, q_joints, v_joints)
         time = as_positive("dt", dt, "s", maximum=_MAX_TIME)
@@ -113,14 +165,14 @@ class FirstOrderLag:
 
 
 def _time_units(dt: float) -> int:
-    """A step's time in whole nanoseconds, at least one."""
+    """Return the length of a step in whole nanoseconds, at least one."""
     return max(1, round(as_positive("dt", dt, "s", maximum=_MAX_TIME) / _TIME_UNIT))
 
 
 def _checked_reset(
     robot: Robot, tau: npt.ArrayLike | None, q_joints: npt.ArrayLike | None
 ) -> Array:
-    """What a reset is given, looked at: torques, zero by default."""
+    """Check the arguments of a reset and return the torques, zero by default."""
     if q_joints is not None:
         as_array("q_joints", q_joints, (robot.d,), "rad")
     return read_only(as_array("tau", np.zeros(robot.d) if tau is None else tau, (robot.d,), "N·m"))
@@ -129,7 +181,7 @@ def _checked_reset(
 def _checked_desired(
     robot: Robot, tau_desired: npt.ArrayLike, q_joints: npt.ArrayLike, v_joints: npt.ArrayLike
 ) -> Array:
-    """What a step is given, looked at: the desired torques."""
+    """Check the arguments of a step and return the desired torques."""
     as_array("q_joints", q_joints, (robot.d,), "rad")
     as_array("v_joints", v_joints, (robot.d,), "rad/s")
     return read_only(as_array("tau_desired", tau_desired, (robot.d,), "N·m"))

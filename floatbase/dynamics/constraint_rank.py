@@ -79,11 +79,11 @@ def contact_space(eom: EquationsOfMotion) -> ContactSpace:
 
     Notes
     -----
-    Near a state where J loses rank (solo8 on four feet), A has a singular value σ that cannot be
-    told from 0 with measured angles and velocities. The map ζ would multiply their noise in b by
-    1/σ². Such a direction is left out: no row constrains it, and no force acts along it. Newton's
-    law still holds exactly. A q̈ - b is off by at most σ |q̈|, in addition to the part of b that A
-    cannot meet.
+    J loses rank for solo8 on four feet, for example. Near such a state, A has a small singular
+    value σ. Measured angles and velocities are not exact enough to tell σ from 0, and the map ζ
+    would multiply their noise in b by 1/σ². Such a direction is left out: no row constrains it, and
+    no force acts along it. Newton's law still holds exactly. The norm of A q̈ - b is at most σ ‖q̈‖,
+    in addition to the part of b that A cannot meet.
     """
     U, s, A = _resolved(eom)
     U_A, w, Vt_A = np.linalg.svd(A @ np.linalg.solve(eom.M, eom.J.T))

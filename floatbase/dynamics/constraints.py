@@ -141,10 +141,10 @@ class RollingWheel(SinglePointContact):
     """A wheel or disc that rolls on a plane without slipping, a nonholonomic constraint.
 
     The point of the wheel that touches the ground is at rest: g(q, q̇) = v_c + ω × (-r u) = 0. Here
-    v_c is the velocity of the wheel's centre, and u is the unit vector in the wheel's plane that
-    points up from the contact. Along the normal, this is the derivative of a position constraint on
-    the height of the centre. Along the ground it is not: the wheel can reach every place, but it
-    cannot move sideways. Differentiating once gives A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
+    v_c is the velocity of the wheel's centre. The unit vector u lies in the wheel's plane and
+    points up from the contact. Along the normal, the constraint is the derivative of a position
+    constraint on the height of the centre. Along the ground it is not: the wheel can reach every
+    place, but it cannot move sideways. Differentiating once gives A = ∂g/∂q̇ and b = -(∂g/∂q) q̇.
 
     Parameters
     ----------
@@ -163,8 +163,8 @@ class RollingWheel(SinglePointContact):
     Raises
     ------
     InputError
-        By `positions`, `jacobian` and `constraint`, if the wheel lies flat on its side: then it has
-        no single lowest point.
+        If the wheel lies flat on its side when `positions`, `jacobian` or `constraint` is called,
+        since it then has no single lowest point.
 
     Notes
     -----

@@ -87,8 +87,8 @@ class MotionConstraint(Protocol):
 class FrictionContact(MotionConstraint, Protocol):
     """A constraint whose forces act at points, each with a friction cone.
 
-    λ holds the forces of the ground on the robot in world axes [N], three numbers for each point,
-    stacked in the order of the points.
+    λ holds the forces of the ground on the robot in world axes [N]. It has three numbers for each
+    point, in the order of the points.
     """
 
     @property

@@ -89,19 +89,21 @@ def bias_forces(state: State, axes: Literal["base", "world"] = "base") -> BiasFo
     T = _world_to_base_axes(state) if axes == "world" else np.eye(model.nv)
     g = np.array(pin.computeGeneralizedGravity(model, data, state.q))
 
-    def moving(v: Array) -> Array:
+    def velocity_forces(v: Array) -> Array:
         """Compute Σ_ij Γ_ij u_i u_j for u with v = T u: q̈ = T u̇ + Ṫ u, and Tᵀ maps forces."""
-        turning = (
+        axes_rotation = (
             state.M[:, :3] @ np.cross(v[:3], v[3:6])
             if axes == "world" and state.robot.is_floating
             else 0.0
         )
-        return np.asarray(T.T @ (pin.nonLinearEffects(model, data, state.q, v) - g + turning))
+        return np.asarray(T.T @ (pin.nonLinearEffects(model, data, state.q, v) - g + axes_rotation))
 
     u = T.T @ state.v  # T is orthogonal
-    centrifugal = np.column_stack([moving(unit) for unit in T.T]) @ u**2
+    centrifugal = np.column_stack([velocity_forces(unit) for unit in T.T]) @ u**2
     return BiasForces(
-        read_only(T.T @ g), read_only(centrifugal), read_only(moving(state.v) - centrifugal)
+        read_only(T.T @ g),
+        read_only(centrifugal),
+        read_only(velocity_forces(state.v) - centrifugal),
     )
 
 
@@ -211,9 +213,8 @@ def view_from_rotating_frame(
     Raises
     ------
     InputError
-        If the times do not increase, if the frame turns more than about 160 times between two of
-        them,
-        or if `omega` is a function and `omega_rate` is missing.
+        If the times do not increase, or if the frame turns more than about 160 times between two of
+        them. Also if `omega` is a function and `omega_rate` is missing.
 
     Notes
     -----

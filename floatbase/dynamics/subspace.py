@@ -26,7 +26,7 @@ from floatbase.linear_algebra import null_space, rank
 
 
 def delassus_matrix(eom: EquationsOfMotion) -> Array:
-    """Compute A M⁻¹ Jᵀ, the change of the contact accelerations per contact force.
+    """Compute A M⁻¹ Jᵀ, the change of the contact accelerations per unit of contact force.
 
     For point contacts it is J M⁻¹ Jᵀ, known as the Delassus matrix. Its inverse, if it exists, is
     the apparent inertia at the contacts.
@@ -408,8 +408,8 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     """Compute every size, rank and dimension of the equations of motion from singular values.
 
     `contact_space` decides the rank of J. The null spaces of B and C come from their own singular
-    values, with the resolved rows and their forces in place of A and J. The dimension of null(Jᵀ)
-    is then added.
+    values. In B and C, the resolved rows and their forces replace A and J, so the dimension of
+    null(Jᵀ) is added.
 
     Parameters
     ----------

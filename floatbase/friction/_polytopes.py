@@ -25,12 +25,13 @@ MAX_FACETS = 1000
 # fraction of the size below which a set is flat or a point lies on a facet: above a linear
 # program's rounding
 _FLATNESS_TOLERANCE = 1e-9
-# searches for farther points; each adds at least one, and the stances of the course need about ten
+# rounds of search for farther points; each adds at least one, and the stances of the course need
+# about ten
 _MAX_ROUNDS = 200
 _QHULL_TOLERANCE = 1e-8  # fraction of the size by which qhull's facets may miss their points
 # fraction of the largest singular value; below it, rays are too dependent to determine a facet
 _SLIVER_TOLERANCE = 1e-7
-_SAME_DIRECTION = 1e-6  # rad, closer normals are one: qhull's triangles of one facet
+_SAME_DIRECTION = 1e-6  # rad, closer normals count as one: qhull's triangles of one facet
 _DIGITS = 9  # digits to which the equations of qhull's triangles of one facet agree
 
 

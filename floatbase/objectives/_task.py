@@ -203,8 +203,8 @@ class TargetTask(Value):
         Raises
         ------
         InputError
-            If a function returns a value of the wrong shape, or one that is not a rotation matrix
-            or a configuration where such a value is needed.
+            If a function returns a value of the wrong shape, or an invalid rotation matrix or
+            configuration.
         """
         shapes = self.shapes_for(robot, k)
         values = [getattr(self, name) for name in shapes]

@@ -27,7 +27,7 @@ class AngularMomentumTask(TargetTask):
         Target in the world frame [kg·m²/s], or a function of the time t [s] that returns
         `momentum` or `(momentum, rate)`. The default is zero.
     rate : array_like, shape (3,), optional
-        Time derivative of a constant target, in the world frame [N·m].
+        Time derivative of the target in the world frame [N·m], if `momentum` is not a function.
     kd : float, optional
         Gain on the momentum error [1/s].
     weight : float, optional

@@ -65,8 +65,8 @@ def centroidal_momentum(state: State) -> Array:
 def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
     """Compute the time derivative of the centroidal momentum for an acceleration q̈.
 
-    By the laws of Newton and Euler it equals (f_c + m g, τ_c), where (f_c, τ_c) is the wrench of
-    the contact forces about the centre of mass. Joint torques are internal and have no effect.
+    By the laws of Newton and Euler it equals (f_c + m g, τ_c). Here (f_c, τ_c) is the wrench of the
+    contact forces about the centre of mass. Joint torques are internal and have no effect.
 
     Parameters
     ----------

@@ -67,9 +67,9 @@ class CoMTask(MotionTask):
         Target in the world frame [m], or a function of the time t [s] that returns `position` or
         `(position, velocity, acceleration)`.
     velocity : array_like, shape (3,), optional
-        Velocity of a constant target, in the world frame [m/s].
+        Target velocity in the world frame [m/s], if `position` is not a function.
     acceleration : array_like, shape (3,), optional
-        Acceleration of a constant target, in the world frame [m/s²].
+        Target acceleration in the world frame [m/s²], if `position` is not a function.
     kp : float, optional
         Gain on the position error [1/s²].
     kd : float, optional
@@ -118,9 +118,9 @@ class OrientationTask(MotionTask):
         t [s] that returns `rotation` or `(rotation, angular_velocity, angular_acceleration)`. The
         default is the identity.
     angular_velocity : array_like, shape (3,), optional
-        Angular velocity of a constant target, in the world frame [rad/s].
+        Target angular velocity in the world frame [rad/s], if `rotation` is not a function.
     angular_acceleration : array_like, shape (3,), optional
-        Angular acceleration of a constant target, in the world frame [rad/s²].
+        Target angular acceleration in the world frame [rad/s²], if `rotation` is not a function.
     kp : float, optional
         Gain on the orientation error [1/s²].
     kd : float, optional
@@ -173,9 +173,9 @@ class FrameTask(MotionTask):
         Target in the world frame [m], or a function of the time t [s] that returns `position` or
         `(position, velocity, acceleration)`.
     velocity : array_like, shape (3,), optional
-        Velocity of a constant target, in the world frame [m/s].
+        Target velocity in the world frame [m/s], if `position` is not a function.
     acceleration : array_like, shape (3,), optional
-        Acceleration of a constant target, in the world frame [m/s²].
+        Target acceleration in the world frame [m/s²], if `position` is not a function.
     kp : float, optional
         Gain on the position error [1/s²].
     kd : float, optional
@@ -218,9 +218,9 @@ class PostureTask(MotionTask):
         returns `q` or `(q, velocity, acceleration)`. The base part is ignored. The pair (cos, sin)
         of a joint without limits must have length 1.
     velocity : array_like, shape (d,), optional
-        Joint velocities of a constant target [rad/s, m/s]; zero by default.
+        Target joint velocities [rad/s, m/s], if `q` is not a function; zero by default.
     acceleration : array_like, shape (d,), optional
-        Joint accelerations of a constant target [rad/s², m/s²]; zero by default.
+        Target joint accelerations [rad/s², m/s²], if `q` is not a function; zero by default.
     kp : float, optional
         Gain on the position error [1/s²].
     kd : float, optional

@@ -1,5 +1,6 @@
-"""Quadratic programs: named rows, optimality, back ends, and rows in conflict (§4, App. C of the
-course text).
+"""Quadratic programs: labelled constraints, optimality, solvers and conflicting constraints.
+
+[FBR]_, §4 and App. C.
 """
 
 from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set

@@ -1,4 +1,4 @@
-"""Linear programs, in one place: geometry of cones, wrenches of a stance."""
+"""Linear programs, used for cones and for the wrenches of a stance."""
 
 from __future__ import annotations
 
@@ -23,23 +23,37 @@ def linear_program(
         None,
     ),
 ) -> OptimizeResult:
-    """min cᵀ x subject to A x = b, G x ≤ h; `.status` is `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`,
-    never anything else.
+    """Solve the linear program min cᵀ x subject to A x = b and G x ≤ h.
 
-    cost: c, (n,).
-    equalities, inequalities: (A, b) and (G, h), none by default.
-    bounds: (lowest, highest) of every variable, or a list with a pair for each; None where there is
-        none.
+    Parameters
+    ----------
+    cost : ndarray, shape (n,)
+        Cost vector c.
+    equalities : tuple of ndarray, optional
+        A, shape (m, n), and b, shape (m,); none by default.
+    inequalities : tuple of ndarray, optional
+        G, shape (l, n), and h, shape (l,); none by default.
+    bounds : tuple or sequence of tuple, optional
+        Lower and upper bound of all variables, or one such pair per variable. None means no bound.
+        By default x ≥ 0.
 
-    Raises `SolverError` when HiGHS does not converge.
+    Returns
+    -------
+    OptimizeResult
+        Result of SciPy. Its `status` is always `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`.
+
+    Raises
+    ------
+    SolverError
+        If HiGHS does not converge.
     """
-    from scipy.optimize import linprog  # slow to load, and never needed while all goes well
+    from scipy.optimize import linprog  # slow to import, and rarely needed
 
     (A, b), (G, h) = equalities or (None, None), inequalities or (None, None)
     for presolve in (
         True,
         False,
-    ):  # presolve may stop at "infeasible or unbounded"; the simplex method then decides
+    ):  # presolve may stop at "infeasible or unbounded"; without it, the simplex method decides
         result = linprog(
             cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve}
         )

@@ -1,36 +1,36 @@
-"""A primal active-set method for convex QPs, written to be read (Appendix C).
+"""Primal active-set method for convex QPs, written for readability.
 
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
-A row of G x ≤ h is a table top: at the optimum we either rest on it, and it may as well be an
-equality, or we do not touch it, and it may as well not be there. Knowing which is which, one linear
-system gives the answer. So guess, look at what the guess gives, and correct it by one row at a
-time. Every point on the way satisfies all rows.
+Each row of G x ≤ h is like a table top. At the optimum, either we rest on it, and it might as well
+be an equality, or we do not touch it, and it might as well be absent. If we know which rows are
+which, one linear system gives the answer. So the method guesses, solves for the guess, and corrects
+it by one row at a time. Every iterate satisfies all rows.
 
 Symbols
-    β  coordinates in which the equalities always hold, x = x0 + Z β (13); x without equalities
-    W  working set: rows of G held with equality for now, linearly independent
-    p  direction from the point to the minimiser on the rows of W
-    α  length of the step along p, 1 to arrive at that minimiser
+    β  coordinates in which the equalities always hold, x = x0 + Z β, eq. (13); x if there are none
+    W  working set: linearly independent rows of G that are treated as equalities for now
+    p  direction from the current point to the minimizer on the rows of W
+    α  step length along p; α = 1 reaches that minimizer
     μ  multipliers of the rows of W, from H x + g + Gᵀ μ = 0
 
 Algorithm
-    0. `_feasible_start`: a point that satisfies all rows (phase 1: the same method, on the problem
-       "least violation").
-    1. `_direction`: p, in the null space of the rows of W.
-    2. `_longest_step`: α = 1, unless a row outside W forbids it. Go there.
-    3. Forbidden: that row blocks, it joins W; back to 1.
-    4. Arrived: `_multipliers`. All ≥ 0: this is the optimum.
-       Otherwise a multiplier is wrong-signed (μ < 0): its row, `_row_to_drop`, leaves W; back to 1.
+    0. `_feasible_start`: find a point that satisfies all rows (phase 1: the same method, applied to
+       the problem "minimize the violation").
+    1. `_direction`: compute p in the null space of the rows of W.
+    2. `_longest_step`: α = 1, unless a row outside W blocks. Take the step.
+    3. If a row blocks, it joins W; return to 1.
+    4. Otherwise compute the multipliers (`_multipliers`). If all are ≥ 0, this is the optimum. If
+       one is negative, a row with a negative multiplier (`_row_to_drop`) leaves W; return to 1.
 
-At a degenerate point (more rows meet than there are coordinates) steps of length 0 can follow one
-another. As long as they do, both choices fall on the row with the least index (Bland's rule), which
-keeps a working set from coming back. A direction without curvature, along which the objective
-falls, has no minimiser: p then is the way down and α may be as long as it likes; if no row blocks,
-the objective has no minimum.
+At a degenerate point, where more rows meet than there are coordinates, several steps of length 0
+can follow each other. During these steps, both choices select the row with the smallest index
+(Bland's rule), so that no working set occurs twice. If the objective decreases along a direction
+without curvature, there is no minimizer: p is then this descent direction and α is not limited. If
+no row blocks, the objective has no minimum.
 
-Source: [FBR], Appendix C; Nocedal and Wright, Numerical Optimization (2006), ch. 16.5; for Bland's
-rule on quadratic programs Chang and Cottle, Math. Programming 18 (1980).
+[FBR]_, App. C. [NocedalWright2006]_, section 16.5. For Bland's rule in quadratic programs: Chang
+and Cottle, Math. Programming 18 (1980).
 """
 
 from __future__ import annotations
@@ -65,27 +65,37 @@ from floatbase.qp.labels import ConstraintLabel
 from floatbase.qp.problem import QP, InequalityQP
 from floatbase.qp.solution import Solution
 
-# part of a sum's largest terms that may be rounding: 450 units in the last place, for sums of 60
-# terms
+# fraction of the largest terms of a sum that may be rounding: 450 units in the last place, for
+# sums of 60 terms
 _ROUNDING = 1e-13
-_SIGNIFICANT = 1e3  # times rounding: a slope or a negative curvature beyond it is not rounding
-_UNLIMITED = 10**6  # iterations, beyond any count that the method would take
+_SIGNIFICANT = 1e3  # multiple of rounding: a larger slope or negative curvature is significant
+_UNLIMITED = 10**6  # iterations, more than the method ever needs
 _SLACK_CONSTRAINT = "violation s ≥ 0"  # the row that ends phase 1 when it blocks
 
 
 @dataclass(frozen=True, eq=False)
 class Iteration(Value):
-    """One round of the method, for a lesson to draw: from x along direction, as far as step_length.
+    """One iteration of the active-set method: a step from x along a direction.
 
-    working_set: names of the rows in W.
-    x: (n,), the point it starts from.
-    direction: (n,), p.
-    step_length: α.
-    blocking: name of the row that forbade a longer step and joins W, or None.
-    multipliers: μ of the rows of W, by name, where the step arrived; empty when a row blocked.
-    dropped: name of the row that leaves W, or None.
-    objective: ½ xᵀ H x + gᵀ x at x; in phase 1 the largest violation at x, in units of the rows'
-        length.
+    Parameters
+    ----------
+    working_set : tuple of str
+        Names of the rows in W.
+    x : ndarray, shape (n,)
+        Point at which the step starts.
+    direction : ndarray, shape (n,)
+        Direction p of the step.
+    step_length : float
+        Step length α, dimensionless.
+    blocking : str or None
+        Name of the row that blocked a longer step and joins W; None if no row blocked.
+    multipliers : mapping of str to float
+        Multipliers μ of the rows of W at the end of the step, by name; empty if a row blocked.
+    dropped : str or None
+        Name of the row that leaves W; None if no row leaves.
+    objective : float
+        Value of ½ xᵀ H x + gᵀ x at x [units of the objective]. In phase 1 it is the largest
+        violation at x, for rows scaled to unit length.
     """
 
     working_set: tuple[str, ...]
@@ -99,22 +109,29 @@ class Iteration(Value):
 
     @property
     def x_next(self) -> Array:
-        """The point that the step leads to, shape (n,)."""
+        """Point at the end of the step, shape (n,)."""
         return read_only(self.x + self.step_length * self.direction)
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveSetRun(Value):
-    """The answer of `active_set` and the way to it.
+    """Result of `active_set` with all its iterations.
 
-    solution: the optimum, with its multipliers; where the run was stopped, the point it had come
-        to, all multipliers 0.
-    iterations: from a feasible point to the optimum, objective never rising.
-    phase_one: from the start to that feasible point, violation never rising; empty when the start
-        was feasible.
-    working_set: names of the rows in W at the end, which the next problem can start from.
-    converged: whether the end is the optimum. A run that was stopped has a point that satisfies all
-        rows once `iterations` holds any; before, in phase 1, it may violate some.
+    Parameters
+    ----------
+    solution : Solution
+        Optimum with its multipliers. If the run was stopped, it is the last point, with all
+        multipliers zero.
+    iterations : tuple of Iteration
+        Iterations from a feasible point to the optimum; the objective never increases.
+    phase_one : tuple of Iteration
+        Iterations from the start to that feasible point; the violation never increases. Empty if
+        the start was feasible.
+    working_set : tuple of str
+        Names of the rows in W at the end, from which the next problem can start.
+    converged : bool
+        Whether the last point is the optimum. The point of a stopped run satisfies all rows if
+        `iterations` is not empty. A run stopped in phase 1 may violate some rows.
     """
 
     solution: Solution
@@ -130,22 +147,41 @@ def active_set(
     working_set: Sequence[str] = (),
     max_iterations: int | None = None,
 ) -> ActiveSetRun:
-    """App. C: solve a convex QP by the active-set method of this module, keeping a record of every
-    iteration.
+    """Solve a convex QP by the active-set method and record every iteration.
 
-    qp: the problem.
-    start: (n,), a guess of x, such as the last problem's; it need not satisfy any row. By default
-        the minimiser on the rows of `working_set`, as if there were no others.
-    working_set: names of inequality rows to start with in W, such as the last run's `working_set`;
-        those that depend on earlier ones are left out.
-    max_iterations: iterations after which to stop, those of phase 1 included, as a program in real
-        time must; None does not stop. A run that is stopped raises no error:
-        `ActiveSetRun.converged` says so.
+    Parameters
+    ----------
+    qp : QP
+        Problem to solve.
+    start : array_like, shape (n,), optional
+        Initial guess of x, such as the solution of a previous problem. It need not satisfy any row.
+        By default the minimizer on the rows of `working_set`, ignoring all other rows.
+    working_set : sequence of str, optional
+        Names of the inequality rows that are initially in W, such as the `working_set` of the last
+        run. Rows that depend on earlier ones are left out.
+    max_iterations : int, optional
+        Largest number of iterations, including those of phase 1; None means no limit. Real-time
+        programs need a limit. Reaching the limit raises no error; check `ActiveSetRun.converged`.
 
-    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the
-    objective has no minimum, is not convex or does not let the method end on its rows,
-    `UnknownNameError` for a row that does not exist, `InputError` for a start of another shape or a
-    `max_iterations` below 1.
+    Returns
+    -------
+    ActiveSetRun
+        The solution and all iterations.
+
+    Raises
+    ------
+    InfeasibleError
+        If the constraints are in conflict; the error names a minimal set of conflicting rows.
+    SolverError
+        If the objective is not convex or has no minimum, or if the method does not converge.
+    UnknownNameError
+        If `working_set` contains an unknown row.
+    InputError
+        If `start` has the wrong shape, or if `max_iterations` is less than 1.
+
+    Notes
+    -----
+    [FBR]_, App. C. [NocedalWright2006]_
     """
     space, problem = as_instance("qp", qp, QP).equality_space, qp.reduced
     rows = _independent_rows(
@@ -165,10 +201,9 @@ def active_set(
     )
     if result.converged and np.any(
         _violated(problem, result.x)
-    ):  # rows so nearly parallel that the method takes them for one
+    ):  # rows so nearly parallel that the method treats them as one
         raise SolverError(
-            f"active_set ends beyond rows of {qp!r} that nearly repeat each other. Check their "
-            f"scaling."
+            f"The result of active_set violates nearly equal rows of {qp!r}. Check their scaling."
         )
     mu = np.zeros(len(qp.G))
     mu[result.rows] = np.maximum(result.multipliers, 0.0)
@@ -186,9 +221,7 @@ def active_set(
 
 @dataclass(frozen=True, eq=False)
 class _Result:
-    """Where a walk ended: point, rows of W and their multipliers, the iterations that led there,
-    and whether it was done.
-    """
+    """Result of a run: point, rows of W, their multipliers, iterations and convergence."""
 
     x: Array
     rows: list[int]
@@ -200,9 +233,7 @@ class _Result:
 def _iterate(
     problem: QP, x: Array, rows: list[int], max_iterations: int, last: int | None = None
 ) -> _Result:
-    """Steps 1 to 4, from a point x that satisfies all rows and lies on those of W, at most so
-    often; row `last` ends it.
-    """
+    """Run steps 1 to 4 from a feasible point x on the rows of W; stop if row `last` blocks."""
     rows, degenerate = list(rows), False
     iterations: list[Iteration] = []
     iteration_limit = 100 + 20 * (problem.n + len(problem.G))
@@ -224,14 +255,13 @@ def _iterate(
     if max_iterations <= iteration_limit:
         return _Result(x, rows, np.zeros(len(rows)), iterations, converged=False)
     raise SolverError(
-        f"active_set did not converge: its rows still change after {len(iterations)} iterations on "
-        f"{problem!r}. "
-        "Check the scaling of the problem."
+        f"active_set did not converge: its working set still changes after {len(iterations)} "
+        f"iterations on {problem!r}. Check the scaling of the problem."
     )
 
 
 def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
-    """The point on the rows of W that is nearest to y, or without y the minimiser there."""
+    """Return the point on the rows of W nearest to y, or the minimizer there if y is None."""
     W = problem.G[rows]
     origin = np.zeros(problem.n) if y is None else y
     point = origin + np.linalg.pinv(W) @ (problem.h[rows] - W @ origin)
@@ -240,12 +270,11 @@ def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
 
 
 def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int) -> _Result:
-    """Phase 1: a point that satisfies all rows, with rows of W that it lies on, in at most so many
-    iterations.
+    """Find a point that satisfies all rows, and the rows of W that it lies on (phase 1).
 
-    Minimises s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h on
-    the others, by the same method. s = 0 is reached exactly if all rows can hold; otherwise the
-    rows that stop s above 0 are in conflict.
+    It minimizes s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h
+    on the others, by the same method. s = 0 is reached exactly if all rows can be satisfied.
+    Otherwise, the rows that keep s above 0 are in conflict.
     """
     n, norms = problem.n, problem.row_norms
     violation = (problem.G @ y - problem.h) / norms
@@ -273,7 +302,7 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
     if result.converged and result.rows[-1] != s_row and np.any(_violated(problem, result.x[:-1])):
         share = (
             result.multipliers * relaxed.row_norms[result.rows]
-        )  # those of the violated rows add up to 1
+        )  # the shares of the violated rows add up to 1
         raise infeasible(
             problem.inequality_names[i]
             for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE])
@@ -285,17 +314,17 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
 
 
 def _violated(problem: QP, x: Array) -> npt.NDArray[np.bool_]:
-    """Which rows a point does not satisfy, shape (l,)."""
+    """Return which rows a point violates, shape (l,)."""
     norms = problem.row_norms
     return (problem.G @ x - problem.h) / norms > violation_tolerance(problem.h / norms, x)
 
 
 def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
-    """The direction p to the minimiser on the rows of W, and how far along it to go: 1, or inf
-    where there is none.
+    """Return the direction p to the minimizer on the rows of W, and the largest step length.
 
-    With the columns of Z spanning the null space of W's rows, p = Z u and u minimises ½ uᵀ (Zᵀ H Z)
-    u + (Zᵀ slope)ᵀ u, whose curvatures are the eigenvalues of Zᵀ H Z.
+    The largest step length is 1, or inf if there is no minimizer. If the columns of Z span the null
+    space of the rows of W, then p = Z u, where u minimizes ½ uᵀ (Zᵀ H Z) u + (Zᵀ slope)ᵀ u. The
+    curvatures are the eigenvalues of Zᵀ H Z.
     """
     Z = null_space(problem.G[rows] / problem.row_norms[rows, None])
     curvature, modes = np.linalg.eigh(Z.T @ problem.H @ Z)
@@ -313,8 +342,10 @@ def _direction(problem: QP, x: Array, rows: list[int]) -> tuple[Array, float]:
 def _longest_step(
     problem: QP, x: Array, p: Array, max_length: float, rows: list[int]
 ) -> tuple[float, int | None]:
-    """How far from x along p, at most `max_length`, all rows hold: the length α, and the (first)
-    row that forbids more.
+    """Return the length α of the longest feasible step from x along p, and the row that blocks.
+
+    The length is at most `max_length`. The row is None if no row blocks, and the first if several
+    do.
     """
     norms = problem.row_norms
     rate, slack = problem.G @ p, problem.h - problem.G @ x
@@ -334,15 +365,18 @@ def _longest_step(
 
 
 def _multipliers(problem: QP, x: Array, rows: list[int]) -> Array:
-    """μ of the rows of W at the minimiser on them, shape (len(rows),): solves Gᵀ μ = -(H x + g) in
-    least squares.
+    """Return the multipliers μ of the rows of W at their minimizer, shape (len(rows),).
+
+    They solve Gᵀ μ = -(H x + g) in the least-squares sense.
     """
     return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 
 
 def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, degenerate: bool) -> int | None:
-    """The row of W with the most negative multiplier, rows at equal size, or None; when stuck, the
-    first of wrong sign.
+    """Return the row of W with the most negative multiplier, or None if no multiplier is negative.
+
+    Multipliers are compared for rows scaled to equal length. At a degenerate point, it is the first
+    row with a negative multiplier.
     """
     force = mu * problem.row_norms[rows]
     negative = [row for row, f in zip(rows, force, strict=True) if f < -_slope_rounding(problem, x)]
@@ -352,12 +386,12 @@ def _row_to_drop(problem: QP, x: Array, rows: list[int], mu: Array, degenerate: 
 
 
 def _independent_rows(problem: QP, rows: Sequence[int]) -> list[int]:
-    """`rows` without those that depend on the ones before them."""
+    """Return `rows` without those that depend linearly on earlier ones."""
     independent: list[int] = []
     basis = np.zeros((0, problem.n))
     for row in rows:
         residual = problem.G[row] / problem.row_norms[row]
-        for _ in range(2):  # twice: the first pass leaves rounding
+        for _ in range(2):  # twice, since the first pass leaves rounding errors
             residual = residual - basis.T @ (basis @ residual)
         length = float(np.linalg.norm(residual))
         if length > RANK_TOLERANCE:
@@ -367,12 +401,13 @@ def _independent_rows(problem: QP, rows: Sequence[int]) -> list[int]:
 
 
 def _slope_rounding(problem: QP, x: Array) -> float:
-    """How large an entry of H x + g may come out when it is zero."""
+    """Return how large rounding can make an entry of H x + g that is zero."""
     H, g = np.abs(problem.H), np.abs(problem.g)
     return _ROUNDING * float(np.max(g, initial=0.0) + np.max(H @ np.abs(x), initial=0.0))
 
 
 def _index(qp: QP, name: str) -> int:
+    """Return the index of a named inequality row."""
     if name not in qp.inequality_names:
         raise unknown_name("inequality constraint", name, qp.inequality_names)
     return qp.inequality_names.index(name)
@@ -388,6 +423,7 @@ def _iteration_record(
     mu: Array,
     drop: int | None,
 ) -> Iteration:
+    """Return the record of one iteration."""
     names = problem.inequality_names
     return Iteration(
         working_set=tuple(names[i] for i in rows),
@@ -402,9 +438,7 @@ def _iteration_record(
 
 
 def _in_original_variables(step: Iteration, space: Affine, offset: float) -> Iteration:
-    """The same iteration in the problem's own variables, objective raised by `offset`; phase 1's s
-    falls away.
-    """
+    """Return an iteration in the variables of the QP, without s and with an objective offset."""
     n = space.n_in
     return replace(
         step,

@@ -1,8 +1,7 @@
-"""Problems without an optimum: the errors that say why, and which rows of an infeasible problem are
-in conflict.
+"""Problems without an optimum: their errors, and minimal sets of conflicting constraints.
 
-The rows named are a smallest set: infeasible as they are, feasible without any one of them. In
-optimisation that is called an irreducible infeasible subsystem (IIS).
+A minimal set is infeasible as it is, and feasible without any one of its rows. In optimization it
+is called an irreducible infeasible subsystem (IIS).
 """
 
 from __future__ import annotations
@@ -15,21 +14,31 @@ from floatbase._validation import Array
 from floatbase.errors import InfeasibleError, SolverError
 from floatbase.qp.labels import ConstraintLabel
 
-# how far a solver may violate an inequality of unit length: N, N·m; well above rounding
+# how far a solver may violate an inequality of unit length (N, N·m); well above rounding
 FEASIBILITY_TOLERANCE = 1e-9
-# of the multipliers of a conflict, which add up to 1: a row with less has no part in it
+# multipliers of a conflict add up to 1; a row with a smaller one is not part of the conflict
 MULTIPLIER_TOLERANCE = 1e-9
-_ROUNDING = 1e-12  # part of a row, of its |h| and of the largest |x| that may be rounding
-# for each row, before the search for a conflict gives up; it takes about one
+_ROUNDING = 1e-12  # fraction of a row, of its |h| and of the largest |x| that may be rounding
+# steps per row before the search for a conflict gives up; it needs about one
 _STEPS_PER_CONSTRAINT = 100
-_MAX_LISTED = 4  # rows that are listed in one line
+_MAX_LISTED = 4  # largest number of constraints listed on one line
 
 
 def infeasible(constraints: Iterable[str]) -> InfeasibleError:
-    """The error that names the inequality rows in conflict.
+    """Return the error that names the conflicting inequality constraints.
 
-    More than a few are grouped by kind and counted, each by its owner, or by its whole name where
-    its owner has several.
+    More than a few constraints are grouped by kind and counted. Each is then named by its owner, or
+    by its full name if its owner has several constraints of that kind.
+
+    Parameters
+    ----------
+    constraints : iterable of str
+        Names of the constraints, plain strings or `ConstraintLabel`.
+
+    Returns
+    -------
+    InfeasibleError
+        The error to raise.
     """
     labels = [
         row if isinstance(row, ConstraintLabel) else ConstraintLabel(row) for row in constraints
@@ -46,55 +55,103 @@ def infeasible(constraints: Iterable[str]) -> InfeasibleError:
             + "\n"
         )
     return InfeasibleError(
-        f"no point satisfies all constraints. Given the equalities, these are in conflict:{text}"
-        "At least one of these constraints has to be loosened or dropped; others may be in "
-        "conflict too.",
+        f"No point satisfies all constraints. Given the equalities, these are in conflict:{text}"
+        "Relax or remove at least one of them. Other constraints may be in conflict, too.",
         labels,
     )
 
 
 def unbounded(problem: object) -> SolverError:
-    """The error for a problem, told by its repr, whose objective falls for ever."""
+    """Return the error for a problem whose objective decreases without limit.
+
+    Parameters
+    ----------
+    problem : object
+        Problem, whose repr the message shows.
+
+    Returns
+    -------
+    SolverError
+        The error to raise.
+    """
     return SolverError(
-        f"the objective of {problem!r} has no minimum: it falls for ever along a direction without "
-        f"curvature or row. "
-        "Add a task of small weight for every variable (force or torque regularisation), or bounds."
+        f"The objective of {problem!r} has no minimum: it decreases without limit along a "
+        f"direction that has no curvature and meets no constraint. "
+        "Add a task of small weight for every variable (force or torque regularization), or bounds."
     )
 
 
 def not_convex(problem: object, H: Array) -> SolverError:
-    """The error for a problem, told by its repr, whose objective curves downwards; H: where the
-    equalities hold.
+    """Return the error for a problem whose objective has negative curvature.
+
+    Parameters
+    ----------
+    problem : object
+        Problem, whose repr the message shows.
+    H : ndarray, shape (n, n)
+        Matrix of the objective on the space where the equalities hold.
+
+    Returns
+    -------
+    SolverError
+        The error to raise.
     """
     return SolverError(
         f"{problem!r} is not convex: along one direction its curvature is "
         f"{np.linalg.eigvalsh(H)[0]:.3g}. "
-        "H must be positive semidefinite where the equalities hold; weights must be ≥ 0."
+        "H must be positive semidefinite where the equalities hold. Make all weights ≥ 0."
     )
 
 
 def violation_tolerance(h: Array, x: Array | None = None) -> Array:
-    """How far rows of unit length may be violated, shape (l,): `FEASIBILITY_TOLERANCE`, and
-    rounding.
+    """Return how far rows of unit length may be violated: `FEASIBILITY_TOLERANCE` plus rounding.
 
-    h: (l,), their right-hand sides. x: (n,), the point that is tried, or None where there is none.
+    Parameters
+    ----------
+    h : ndarray, shape (l,)
+        Right-hand sides of the rows.
+    x : ndarray, shape (n,), optional
+        Point at which the rows are evaluated.
+
+    Returns
+    -------
+    ndarray, shape (l,)
+        Tolerance of each row.
     """
     magnitude = 0.0 if x is None else float(np.max(np.abs(x), initial=0.0))
     return FEASIBILITY_TOLERANCE + _ROUNDING * (np.abs(h) + magnitude)
 
 
 def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
-    """Indices of rows of G y ≤ h that cannot hold together, while any of them dropped leaves the
-    others satisfiable.
+    """Find a minimal set of rows of G y ≤ h that cannot be satisfied together.
 
-    G: (l, n), h: (l,), in units that make violations of different rows comparable. Empty when a
-        point satisfies all rows
-    but for `violation_tolerance`. Otherwise, by Farkas' lemma, multipliers m ≥ 0 of the rows prove
-    that there is none: Gᵀ m = 0 and hᵀ m < 0. They minimise ‖Gᵀ m‖² + (hᵀ m + 1)²; the active-set
-    method for m ≥ 0 ends with columns (G, h) of independent rows, so that no row of the proof can
-    be spared. Source: Lawson and Hanson, Solving Least Squares Problems (1974), ch. 23.
+    Without any one of these rows, the others can be satisfied.
+
+    Parameters
+    ----------
+    G : ndarray, shape (l, n)
+        Matrix of the inequalities, scaled so that violations of different rows are comparable.
+    h : ndarray, shape (l,)
+        Right-hand sides, scaled in the same way.
+
+    Returns
+    -------
+    tuple of int
+        Indices of the rows. Empty if some point satisfies all rows within `violation_tolerance`.
+
+    Raises
+    ------
+    SolverError
+        If the search does not end.
+
+    Notes
+    -----
+    By Farkas' lemma, infeasibility is proved by multipliers m ≥ 0 with Gᵀ m = 0 and hᵀ m < 0. They
+    minimize ‖Gᵀ m‖² + (hᵀ m + 1)². The active-set method for m ≥ 0 ends with linearly independent
+    columns (G, h), so the proof needs every row it uses. Source: Lawson and Hanson, Solving Least
+    Squares Problems (1974), ch. 23.
     """
-    from scipy.optimize import nnls  # slow to load, and never needed while all goes well
+    from scipy.optimize import nnls  # slow to import, and rarely needed
 
     if not len(G):
         return ()
@@ -109,7 +166,8 @@ def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
         )
     except RuntimeError as error:
         raise SolverError(
-            f"the search for conflicting rows among {len(G)} did not end: {error}"
+            f"The search for conflicting constraints among {len(G)} did not end: {error}. Check "
+            f"the scaling of the problem."
         ) from None
     m /= np.sum(m) or 1.0
     infeasible_certificate = (

@@ -1,6 +1,4 @@
-"""The label of a row of a `QP`: its name, which is a text, and what kind of row it is, of which
-owner.
-"""
+"""Labels of QP constraints: a name, the kind of the constraint, and its owner."""
 
 from __future__ import annotations
 
@@ -12,14 +10,21 @@ from floatbase.errors import InputError
 
 
 class ConstraintLabel(str):
-    """The name of a row, such as "FL_foot facet 2", that also knows what it names.
+    """The name of a constraint, with its kind and owner.
 
-    text: the name; label and text are equal, so `"FL_foot facet 2" in command.active` asks as one
-        expects.
-    kind: what the row says, such as "friction", "upper torque limit" or "dynamics"; "other
-        constraints" for a plain text.
-    owner: the foot, joint or contact that it says it of; the text itself by default.
-    number: which of its owner's rows of that kind, or None where the owner has one.
+    A label equals its text, so `"FL_foot facet 2" in command.active` works.
+
+    Parameters
+    ----------
+    text : str
+        Name of the constraint.
+    kind : str, optional
+        Kind of the constraint, such as "friction", "upper torque limit" or "dynamics". Plain
+        strings have the kind "other constraints".
+    owner : str, optional
+        Foot, joint or contact that the constraint belongs to; the text itself by default.
+    number : int, optional
+        Index among the constraints of this kind and owner; None if the owner has only one.
     """
 
     __slots__ = ("kind", "number", "owner")
@@ -35,20 +40,37 @@ class ConstraintLabel(str):
         owner: str | None = None,
         number: int | None = None,
     ) -> ConstraintLabel:
+        """Make a label; see the class for its parameters."""
         label = super().__new__(cls, text)
         label.kind, label.owner, label.number = kind, text if owner is None else owner, number
         return label
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle a label with its kind, owner and number."""
         return ConstraintLabel, (str(self), self.kind, self.owner, self.number)
 
 
 def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[ConstraintLabel, ...]:
-    """A label for each of the rows: the names as labels, or "equality 0", "equality 1", … where
-    there are none.
+    """Return a label for each row of a matrix.
 
-    kind: "equality" or "inequality". Raises `InputError` for another number of names, or one that
-        stands twice.
+    Parameters
+    ----------
+    names : iterable of str
+        Names of the rows, or none. Rows without names get "equality 0", "equality 1", and so on.
+    count : int
+        Number of rows.
+    kind : {"equality", "inequality"}
+        Kind of the rows, used in default names and messages.
+
+    Returns
+    -------
+    tuple of ConstraintLabel
+        One label per row.
+
+    Raises
+    ------
+    InputError
+        If the number of names differs from `count`, or if a name is not unique.
     """
     labels = tuple(
         name if isinstance(name, ConstraintLabel) else ConstraintLabel(name)
@@ -57,11 +79,10 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
     labels = labels or tuple(ConstraintLabel(f"{kind} {i}") for i in range(count))
     if len(labels) != count:
         raise InputError(
-            f"{len(labels)} {kind} names for {count} rows; give one for each row, or none at all."
+            f"There are {len(labels)} {kind} names for {count} rows. Give one name per row, or "
+            f"none at all."
         )
     if len(set(labels)) != count:
         duplicate = next(label for label in labels if labels.count(label) > 1)
-        raise InputError(
-            f"{kind} name {str(duplicate)!r} stands twice; each row needs a name of its own."
-        )
+        raise InputError(f"Duplicate {kind} name {str(duplicate)!r}. Names must be unique.")
     return labels

@@ -1,20 +1,21 @@
-"""Quadratic programs with named rows, and what makes a point their optimum (§4, App. C).
+"""Quadratic programs with named constraints, and their optimality conditions.
 
     min ½ xᵀ H x + gᵀ x   subject to   A x = b,   G x ≤ h
 
-The course text's g_i(x) = 0 are the rows of A x - b = 0; its h_j(x) < 0 are those of G x - h ≤ 0,
-with the ≤ that it means: an active row holds with equality. For positive semidefinite H, x is an
-optimum exactly if there are multipliers ν, one for each equality, and μ, one for each inequality,
-with (Karush, Kuhn, Tucker)
+The g_i(x) = 0 of the course text are the rows of A x - b = 0. Its h_j(x) < 0 are the rows of
+G x - h ≤ 0. We write ≤, which is what the text means, since an active row holds with equality. For
+positive semidefinite H, x is an optimum exactly if there are multipliers ν, one per equality, and
+μ, one per inequality, that satisfy the Karush-Kuhn-Tucker conditions
 
-    H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the rows balance the objective's slope
+    H x + g + Aᵀ ν + Gᵀ μ = 0     stationarity: the constraints balance the slope of the objective
     A x = b,  G x ≤ h             feasibility
-    μ ≥ 0                         a multiplier is never negative: a table top pushes, it never pulls
+    μ ≥ 0                         no multiplier is negative: a table top pushes, but never pulls
     μ_i (G x - h)_i = 0           complementarity: only the rows we rest on are active
 
-μ_i is what one unit more in h_i would lower the objective by, to first order; ν_i likewise in b_i,
-of either sign.
-Source: [FBR], Appendix C; Boyd and Vandenberghe, Convex Optimization (2004), ch. 5.5.
+To first order, raising h_i by one unit lowers the objective by μ_i. The same holds for ν_i and b_i,
+but ν_i can have either sign.
+
+[FBR]_, App. C. [Boyd2004]_, section 5.5.
 """
 
 from __future__ import annotations
@@ -33,25 +34,46 @@ from floatbase.linear_algebra import row_norms, svd_with_rank
 from floatbase.qp.conflicts import conflicting_constraints
 from floatbase.qp.labels import constraint_labels
 
-# part of the largest |b| by which equalities of unit length may miss each other: measured b
+# fraction of 1 + the largest |b| by which equalities of unit length may disagree: b is measured
 _CONSISTENCY_TOLERANCE = 1e-7
-_ROUNDING = 1e-14  # part of a sum's terms that may be rounding: some 50 units in the last place
+# fraction of the terms of a sum that may be rounding: about 50 units in the last place
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class QP(Value):
-    """App. C: min ½ xᵀ H x + gᵀ x  subject to  A x = b,  G x ≤ h, with the ≤ that the course text
-    means.
+    """A quadratic program: min ½ xᵀ H x + gᵀ x subject to A x = b and G x ≤ h.
 
-    H: (n, n), symmetric, positive semidefinite where A x = b.
-    g: (n,).
-    A, b: (m, n) and (m,), the equalities.
-    G, h: (l, n) and (l,), the inequalities.
-    equality_names, inequality_names: one for each row, plain texts or `ConstraintLabel`s; both are
-        kept as `ConstraintLabel`s.
-    blocks: names of slices of x.
+    Parameters
+    ----------
+    H : array_like, shape (n, n)
+        Symmetric matrix of the objective, positive semidefinite on the space where A x = b.
+    g : array_like, shape (n,)
+        Vector of the objective.
+    A : array_like, shape (m, n)
+        Matrix of the equality constraints.
+    b : array_like, shape (m,)
+        Right-hand side of the equality constraints.
+    G : array_like, shape (l, n)
+        Matrix of the inequality constraints.
+    h : array_like, shape (l,)
+        Right-hand side of the inequality constraints.
+    equality_names : sequence of str
+        Name of each equality, as a plain string or `ConstraintLabel`; stored as `ConstraintLabel`.
+    inequality_names : sequence of str
+        Name of each inequality, as a plain string or `ConstraintLabel`; stored as
+        `ConstraintLabel`.
+    blocks : mapping of str to slice
+        Names of slices of x.
 
-    Raises `InputError` when shapes or names do not fit.
+    Raises
+    ------
+    InputError
+        If shapes or names do not match.
+
+    Notes
+    -----
+    [FBR]_, App. C. The inequalities are meant with ≤.
     """
 
     _example = "controller.qp(state)"
@@ -81,11 +103,23 @@ class QP(Value):
             object.__setattr__(self, name, value)
 
     def without(self, *kinds: str) -> QP:
-        """The same problem without the inequality rows of these kinds, such as "friction" or
-        "normal force".
+        """Return the same problem without the inequality constraints of some kinds.
 
-        The kind of a row is `ConstraintLabel.kind`, "other constraints" where its name is a plain
-        text. Raises `UnknownNameError` for a kind that no row has.
+        Parameters
+        ----------
+        *kinds : str
+            Kinds to remove, such as "friction" or "normal force". The kind of a constraint is its
+            `ConstraintLabel.kind`, which is "other constraints" if its name is a plain string.
+
+        Returns
+        -------
+        QP
+            The problem with fewer constraints.
+
+        Raises
+        ------
+        UnknownNameError
+            If no constraint is of a given kind.
         """
         labels = constraint_labels(self.inequality_names, len(self.G), "inequality")
         for kind in as_strings("kinds", kinds):
@@ -111,16 +145,27 @@ class QP(Value):
         return int(self.g.size)
 
     def objective(self, x: Array) -> float:
-        """½ xᵀ H x + gᵀ x."""
+        """Return ½ xᵀ H x + gᵀ x.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Point at which the objective is evaluated.
+
+        Returns
+        -------
+        float
+            Value of the objective.
+        """
         return float(0.5 * x @ self.H @ x + self.g @ x)
 
     @cached_property
     def equality_space(self) -> Affine:
-        """All x with A x = b, as the map β -> x0 + Z β with orthonormal Z and x0 of smallest norm
-        (13).
+        """All solutions of A x = b, as the map β -> x0 + Z β of eq. (13).
 
-        Rows count at unit length, so that multiplying an equation changes nothing. Raises
-        `InfeasibleError` naming rows when the equalities are inconsistent.
+        Z has orthonormal columns, and x0 is the solution of smallest norm. Equations are scaled to
+        unit length, so multiplying an equation by a number changes nothing. Inconsistent equations
+        raise an `InfeasibleError` that names them.
         """
         size = row_norms(self.A)
         A, b = self.A / size[:, None], self.b / size
@@ -129,13 +174,13 @@ class QP(Value):
         if residual > _CONSISTENCY_TOLERANCE * (1.0 + np.max(np.abs(b), initial=0.0)):
             resolved = (U[:, :rank] * s[:rank]) @ Vt[
                 :rank
-            ]  # rows that nearly repeat each other would meet far away
+            ]  # solutions of nearly equal rows would lie far away
             sides = conflicting_constraints(
                 np.vstack([resolved, -resolved]), np.append(b, -b)
             )  # A x ≤ b and A x ≥ b
             rows = [self.equality_names[i] for i in sorted(side % len(A) for side in sides)]
             raise InfeasibleError(
-                f"these equality constraints are inconsistent: {', '.join(rows)}. Drop one of "
+                f"These equality constraints are inconsistent: {', '.join(rows)}. Remove one of "
                 f"them.",
                 rows,
             )
@@ -143,14 +188,15 @@ class QP(Value):
 
     @cached_property
     def reduced(self) -> QP:
-        """The same problem in β: the objective pulled back through `equality_space` (18), the same
-        inequality rows.
+        """Equivalent problem in the coordinates β of `equality_space`, without equalities.
+
+        The objective is pulled back as in eq. (18). The inequality constraints are the same.
         """
         if not len(self.A):
             return self
         Z, x0 = self.equality_space
-        # what vanishes on the space must come out as zero: its rounding would pass for a curvature,
-        # a slope or a row
+        # terms that vanish on the space must be exactly zero: their rounding would look like a
+        # curvature, a slope or a row
         H = _zero_if_rounding(Z.T @ self.H @ Z, np.max(np.abs(self.H), initial=0.0))
         g = _zero_if_rounding(
             Z.T @ (self.H @ x0 + self.g),
@@ -167,8 +213,7 @@ class QP(Value):
 
     @cached_property
     def row_norms(self) -> Array:
-        """The unit to compare violations of rows in, shape (l,): the length of each row of G, 1 for
-        a row of zeros.
+        """Length of each row of G, shape (l,), used to compare violations; 1 for a row of zeros.
 
         `reduced` keeps the lengths that the rows have in x.
         """
@@ -180,8 +225,13 @@ class QP(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InequalityQP(QP):
-    """A `QP` without equalities, made from another one, whose `row_norms` (l,) are given rather
-    than measured.
+    """A `QP` without equalities, made from another one, with given `row_norms`.
+
+    Parameters
+    ----------
+    row_norms : array_like, shape (l,)
+        Lengths of the rows in the variables of the other problem. The remaining parameters are
+        those of `QP`.
     """
 
     row_norms: Array = field(kw_only=True)
@@ -192,7 +242,7 @@ class InequalityQP(QP):
 
     @classmethod
     def _unchecked(cls, **values: Any) -> InequalityQP:
-        """One whose values are known to fit, and are not checked again."""
+        """Make a problem from values that are known to fit, without checking them again."""
         qp = object.__new__(cls)
         for name, value in values.items():
             object.__setattr__(
@@ -202,5 +252,5 @@ class InequalityQP(QP):
 
 
 def _zero_if_rounding(value: Array, terms: float) -> Array:
-    """`value`, or zeros when it is within the rounding error of sums of terms of that size."""
+    """Return `value`, or zeros if it is within the rounding error of sums of such terms."""
     return value if np.max(np.abs(value), initial=0.0) > _ROUNDING * terms else np.zeros_like(value)

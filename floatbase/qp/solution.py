@@ -1,4 +1,4 @@
-"""The answer to a `QP`: the minimiser, its multipliers, and the residuals that show it is one."""
+"""Solutions of QPs: the minimizer, its multipliers, and the residuals that prove optimality."""
 
 from __future__ import annotations
 
@@ -11,19 +11,26 @@ from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_norms
 from floatbase.qp.problem import QP
 
-# part of the largest slope above which a multiplier counts: what solvers leave on rows that touch
+# fraction of the largest slope above which a multiplier counts: solvers leave less on touching rows
 _ACTIVE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """What a solution leaves of each optimality condition; all are 0 at an exact optimum.
+    """Residuals of the optimality conditions; all are 0 at an exact optimum.
 
-    stationarity: max |H x + g + Aᵀ ν + Gᵀ μ|.
-    equality: max |A x - b|.
-    inequality: max(G x - h, 0).
-    complementarity: max |μ (G x - h)|.
-    dual: max(-μ, 0).
+    Parameters
+    ----------
+    stationarity : float
+        Largest magnitude in H x + g + Aᵀ ν + Gᵀ μ [units of g].
+    equality : float
+        Largest magnitude in A x - b [units of b].
+    inequality : float
+        Largest positive entry of G x - h, or 0 [units of h].
+    complementarity : float
+        Largest magnitude in μ (G x - h), entry by entry [units of the objective].
+    dual : float
+        Largest positive entry of -μ, or 0 [units of μ].
     """
 
     stationarity: float
@@ -35,13 +42,20 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Solution(Value):
-    """The minimiser of a QP and the multipliers that prove it: H x + g + Aᵀ ν + Gᵀ μ = 0.
+    """The minimizer of a QP, with the multipliers that prove it: H x + g + Aᵀ ν + Gᵀ μ = 0.
 
-    qp: the problem.
-    x: (n,), the minimiser.
-    inequality_multipliers: μ ≥ 0, (l,).
-    solver: name of the back end that answered.
-    iterations: the solver's own count, 0 where it has none.
+    Parameters
+    ----------
+    qp : QP
+        The problem.
+    x : ndarray, shape (n,)
+        The minimizer.
+    inequality_multipliers : ndarray, shape (l,)
+        Multipliers μ ≥ 0 of the inequalities.
+    solver : str
+        Name of the solver that found the solution.
+    iterations : int
+        Number of iterations that the solver reports; 0 if it reports none.
     """
 
     qp: QP
@@ -56,7 +70,7 @@ class Solution(Value):
 
     @cached_property
     def equality_multipliers(self) -> Array:
-        """ν, shape (m,): follows from stationarity, by least squares."""
+        """Multipliers ν of the equalities, shape (m,), from stationarity by least squares."""
         qp = self.qp
         slope, size = qp.H @ self.x + qp.g + qp.G.T @ self.inequality_multipliers, row_norms(qp.A)
         return read_only(
@@ -65,7 +79,7 @@ class Solution(Value):
 
     @cached_property
     def residuals(self) -> Residuals:
-        """How well the optimality conditions hold, computed from the problem itself."""
+        """Residuals of the optimality conditions, computed from the problem itself."""
         qp, mu = self.qp, self.inequality_multipliers
         slack = qp.G @ self.x - qp.h
         slope = qp.H @ self.x + qp.g + qp.A.T @ self.equality_multipliers + qp.G.T @ mu
@@ -79,8 +93,10 @@ class Solution(Value):
 
     @cached_property
     def active(self) -> tuple[str, ...]:
-        """Names of the active inequality rows: those whose multiplier counts beside the slopes that
-        it balances.
+        """Names of the active inequality constraints.
+
+        A constraint is active if its multiplier is significant compared with the slopes it
+        balances.
         """
         qp, scaled = self.qp, self.inequality_multipliers * self.qp.row_norms
         slopes = np.concatenate([qp.g, qp.H @ self.x, scaled])
@@ -89,21 +105,23 @@ class Solution(Value):
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Multiplier of each active inequality row, by name: what one unit more in h would lower
-        the objective by.
+        """Multiplier of each active inequality constraint, by name.
+
+        To first order, raising the constraint's entry of h by one unit lowers the objective by this
+        much.
         """
         mu = dict(zip(self.qp.inequality_names, self.inequality_multipliers, strict=True))
         return {name: float(mu[name]) for name in self.active}
 
     @property
     def objective(self) -> float:
-        """The smallest value."""
+        """Minimum of the objective."""
         return self.qp.objective(self.x)
 
     def __getitem__(self, block: str) -> Array:
-        """One named block of x."""
+        """Return one named block of x."""
         if not isinstance(block, str) or block not in self.qp.blocks:
             raise InputError(
-                f"this problem has no block {block!r}; its blocks are {list(self.qp.blocks)}."
+                f"This problem has no block {block!r}. Its blocks are {list(self.qp.blocks)}."
             )
         return self.x[self.qp.blocks[block]]

@@ -1,4 +1,4 @@
-"""`solve` and its back ends: the `Solution` of a `QP`, or the error that says why there is none."""
+"""Solvers of QPs, and the errors that explain why a QP has no solution."""
 
 from __future__ import annotations
 
@@ -23,25 +23,50 @@ from floatbase.qp.conflicts import (
 from floatbase.qp.problem import QP
 from floatbase.qp.solution import Solution
 
-# requested of Clarabel in turn: now and then it makes no progress on the way to the first
+# requested from Clarabel in turn, since it occasionally fails to reach the first
 _CLARABEL_TOLERANCES = (1e-12, 1e-10, 1e-8)
-# part of the largest |H| that a curvature may be negative by: rounding of the pullback
+# fraction of the largest |H| by which a curvature may be negative: rounding of the pullback
 _CONVEXITY_TOLERANCE = 1e-10
-# part of the largest variable that polishing may move any: beyond it, it mends no last digits
+# fraction of 1 + the largest variable by which polishing may change a variable: a larger step
+# would be more than a correction of the last digits
 _MAX_POLISHING_STEP = 1e-4
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
     """Solve a QP.
 
-    solver: one of `solvers()`. "daqp" is what controllers use; "cvxpy" (Clarabel at tight
-        tolerances) is the judge,
-    slow and independent; "active_set" is the method of `active_set.py`, written to be read. Where
-    the first two find no point although no rows are in conflict, or end where polishing fails, as
-    with weights too far apart, "active_set" answers, in 4 to 40 ms, and `Solution.solver` says so.
-    Raises `InfeasibleError` with a smallest set of conflicting rows, `SolverError` when the
-    objective has no minimum or the solver did not converge, `UnknownNameError` for a solver that
-    does not exist, `MissingDependencyError` for "cvxpy" where it is not installed.
+    Parameters
+    ----------
+    qp : QP
+        Problem to solve.
+    solver : {"daqp", "cvxpy", "active_set"}, optional
+        Solver to use, one of `solvers()`. "daqp" is what controllers use. "cvxpy" (Clarabel with
+        tight tolerances) is slow, but independent, and serves as a reference. "active_set" is the
+        readable method of `active_set`.
+
+    Returns
+    -------
+    Solution
+        The minimizer and its multipliers.
+
+    Raises
+    ------
+    InfeasibleError
+        If the constraints are in conflict; the error names a minimal set of conflicting rows.
+    SolverError
+        If the objective has no minimum or is not convex, or if the solver does not converge.
+    UnknownNameError
+        If there is no such solver.
+    MissingDependencyError
+        If `solver` is "cvxpy" and cvxpy is not installed.
+
+    Notes
+    -----
+    "daqp" is the dual active-set method of [Arnstrom2022]_.
+
+    "daqp" and "cvxpy" fall back to "active_set" if they find no point although no constraints are
+    in conflict. "daqp" also does so if polishing its result fails, as with weights that are too far
+    apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it.
     """
     check_solver(solver)
     as_instance("qp", qp, QP)
@@ -57,13 +82,30 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
 
 def solvers() -> tuple[str, ...]:
-    """Names that `solve` takes here: "cvxpy" only where it is installed."""
+    """List the solvers that `solve` accepts here.
+
+    Returns
+    -------
+    tuple of str
+        Names of the solvers; "cvxpy" only if it is installed.
+    """
     return tuple(name for name in _BACK_ENDS if name != "cvxpy" or find_spec("cvxpy"))
 
 
 def check_solver(solver: str) -> None:
-    """Raise `UnknownNameError` for a solver that `solve` does not take, and
-    `MissingDependencyError` for one whose package is not installed.
+    """Check that a solver exists and is installed.
+
+    Parameters
+    ----------
+    solver : str
+        Name of the solver.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such solver.
+    MissingDependencyError
+        If the package of the solver is not installed.
     """
     if not isinstance(solver, str) or solver not in _BACK_ENDS:
         raise unknown_name("solver", solver, _BACK_ENDS)
@@ -72,10 +114,10 @@ def check_solver(solver: str) -> None:
 
 
 def _daqp(qp: QP) -> Solution | None:
-    """Eliminate the equalities, then DAQP's dual active set on what remains; what controllers use.
+    """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
-    None where weights are so far apart that DAQP does not converge or ends where polishing fails,
-    and where it sees no point: little curvature may look like that to it.
+    Return None if weights are so far apart that DAQP does not converge or that polishing fails.
+    Also return None if DAQP reports infeasibility, since it may mistake small curvature for it.
     """
     import daqp
 
@@ -88,7 +130,7 @@ def _daqp(qp: QP) -> Solution | None:
         reduced.g / scale,
         reduced.G / norms[:, None],
         reduced.h / norms,
-        np.full(rows, -1e30),  # what DAQP takes for no bound
+        np.full(rows, -1e30),  # DAQP treats this as no bound
         np.zeros(rows, dtype=np.int32),
         primal_tol=FEASIBILITY_TOLERANCE,
         eps_prox=-1.0,
@@ -98,8 +140,7 @@ def _daqp(qp: QP) -> Solution | None:
     if exit_flag == -5:
         raise not_convex(qp, reduced.H)
     if exit_flag not in (1, 2):
-        # infeasible, it says, or it cycled or took too many iterations; its numbers may be of any
-        # size
+        # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
         return None
     polished = _polished(
         qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
@@ -108,7 +149,7 @@ def _daqp(qp: QP) -> Solution | None:
 
 
 def _active_set(qp: QP) -> Solution:
-    """The method of `active_set.py` from a cold start, its answer polished."""
+    """Solve from a cold start with `active_set` and polish the result."""
     solution, space = active_set(qp).solution, qp.equality_space
     polished = _polished(qp, space.A.T @ (solution.x - space.b), solution.inequality_multipliers)
     return (
@@ -119,23 +160,21 @@ def _active_set(qp: QP) -> Solution:
 
 
 def _cvxpy(qp: QP) -> Solution | None:
-    """The whole problem, equalities included, by cvxpy and Clarabel at tight tolerances: slow and
-    independent.
-    """
+    """Solve the whole problem, equalities included, with Clarabel at tight tolerances."""
     cp = require("cvxpy", extra="course")
     reduced = qp.reduced
-    # Clarabel does not check
+    # Clarabel does not check convexity
     if np.any(
         np.linalg.eigvalsh(reduced.H)
         < -_CONVEXITY_TOLERANCE * np.max(np.abs(reduced.H), initial=0.0)
     ):
         raise not_convex(qp, reduced.H)
-    # written around the optimum without inequalities: Clarabel's gap is relative to an objective
-    # that is then small, which is what lets it see weights of 1e-6 beside weights of 10
+    # the variables are relative to the optimum without inequalities: Clarabel's gap is relative to
+    # the objective, which is then small, so weights of 1e-6 still matter beside weights of 10
     origin = qp.equality_space(np.linalg.lstsq(reduced.H, -reduced.g, rcond=None)[0])
     scale = min(
         _objective_scale(qp), 1.0
-    )  # a small objective is blown up, or Clarabel's absolute tolerance hides it
+    )  # a small objective is enlarged, or Clarabel's absolute tolerance would hide it
     H, slope = qp.H / scale, (qp.H @ origin + qp.g) / scale
     step = cp.Variable(qp.n)
     equalities = [qp.A @ step == qp.b - qp.A @ origin] if len(qp.A) else []
@@ -144,8 +183,8 @@ def _cvxpy(qp: QP) -> Solution | None:
     problem = cp.Problem(cp.Minimize(objective), equalities + inequalities)
     for tolerance in _CLARABEL_TOLERANCES:
         with suppress(cp.error.SolverError), warnings.catch_warnings():
-            # at its last digits Clarabel calls itself inaccurate; how accurate it was,
-            # Solution.residuals says
+            # Clarabel reports inaccuracy near its last digits; Solution.residuals gives the actual
+            # accuracy
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
             tolerances = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance)
             problem.solve(solver=cp.CLARABEL, max_iter=200, **tolerances)
@@ -156,7 +195,8 @@ def _cvxpy(qp: QP) -> Solution | None:
         raise unbounded(qp)
     if step.value is None:
         raise SolverError(
-            f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}."
+            f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}. Check "
+            f"the scaling of the problem, or use another solver."
         )
     mu = (
         np.maximum(np.atleast_1d(inequalities[0].dual_value) * scale, 0.0)
@@ -174,15 +214,21 @@ _BACK_ENDS: dict[str, Callable[[QP], Solution | None]] = {
 
 
 def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
-    """Two steps of Newton's method on the optimality conditions of the active rows, for the last
-    digits: x and μ.
+    """Improve the last digits of x and μ by two Newton steps on the optimality conditions.
 
-    With weights from 1e-8 to 1 the reduced H has few digits to spare for the slope; here it is
-    summed in extended precision, where the processor has it, from the problem as it was written.
-    None where a step would do more than that, or leads past a row that is not active, as it may
-    where the optimum is not unique.
+    With weights from 1e-8 to 1, the reduced H leaves few digits for the slope. Here the slope is
+    summed in extended precision, if the processor supports it, from the original problem. Return
+    None if a step is too large for rounding, or if it violates a row that is not active, which can
+    happen if the optimum is not unique.
 
-    y: (p,), the minimiser of `qp.reduced`; mu: (l,), the multipliers of the inequalities.
+    Parameters
+    ----------
+    qp : QP
+        The problem.
+    y : ndarray, shape (p,)
+        Minimizer of `qp.reduced`.
+    mu : ndarray, shape (l,)
+        Multipliers of the inequalities.
     """
     reduced, space, n = qp.reduced, qp.equality_space, len(y)
     active = np.flatnonzero(mu > 0.0)
@@ -213,5 +259,5 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
 
 
 def _objective_scale(qp: QP) -> float:
-    """What to divide the objective by so that tolerances mean the same for every problem."""
+    """Return the divisor of the objective that makes tolerances comparable between problems."""
     return float(np.max(np.abs(qp.H), initial=0.0) or np.max(np.abs(qp.g), initial=0.0) or 1.0)

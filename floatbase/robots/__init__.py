@@ -1,4 +1,7 @@
-"""Robots, and the states they can be in (§1, §2 of the course text)."""
+"""Robot models and their states.
+
+[FBR]_, §1 and §2.
+"""
 
 from floatbase.robots._checks import UNIT_NORM_TOLERANCE
 from floatbase.robots.loading import PLATE_SIZE, catalogue, load, load_urdf, with_floating_base

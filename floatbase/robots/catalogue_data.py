@@ -1,4 +1,4 @@
-"""The catalogue: what it adds to robots of example-robot-data. Data only; `loading` reads it."""
+"""Data that the catalogue adds to the robots of example-robot-data; `loading` reads it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,21 @@ from floatbase.robots.robot import Foot
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """What the catalogue adds to a robot of example-robot-data.
+    """Data that the catalogue adds to a robot of example-robot-data.
 
-    description: what the robot is for.
-    feet: where it can touch the ground.
-    torque_limit: of every joint, N·m, where the URDF's limits are wrong.
-    joints: angles of the posture, rad, by joint, where the reference posture will not do.
-    sources: where these numbers come from.
+    Parameters
+    ----------
+    description : str
+        Purpose of the robot.
+    feet : tuple of Foot
+        Places where the robot can touch the ground.
+    torque_limit : float or None
+        Torque limit of every joint, if the limits in the URDF are wrong [N·m].
+    joints : mapping of str to float
+        Joint angles of the posture that replace those of the reference posture, by joint name
+        [rad].
+    sources : mapping of str to str
+        Sources of these numbers.
     """
 
     description: str
@@ -32,6 +40,7 @@ class CatalogueEntry:
 def _ball_feet(
     frames: Sequence[str], radius: float, centre: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> tuple[Foot, ...]:
+    """Return ball feet with the same radius [m] and centre, shape (3,) [m], in each frame."""
     return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
 
 
@@ -46,36 +55,38 @@ _solo = partial(
     feet=_ball_feet(("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"), 0.016),
     torque_limit=2.7,
     sources={
-        "foot radius": "half the width of the foot's mesh in example-robot-data",
+        "foot radius": "half the width of the foot mesh in example-robot-data",
         "torque limit": "2.7 N·m at 12 A: Grimminger et al., An open torque-controlled modular "
         "robot architecture, 2020 "
-        "(the URDF says 1000 N·m, which no motor of this size gives)",
+        "(the URDF has 1000 N·m, which no motor of this size can exert)",
     },
 )
 
 CATALOGUE: Mapping[str, CatalogueEntry] = {
     "go2": CatalogueEntry(
-        "quadruped with 3 joints a leg: as many leg torques as contact forces",
+        "quadruped with 3 joints per leg: as many leg torques as contact forces",
         _ball_feet(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022),
-        sources={"foot radius": "the foot's mesh in example-robot-data", "torque limits": "URDF"},
+        sources={"foot radius": "foot mesh in example-robot-data", "torque limits": "URDF"},
     ),
-    "solo12": _solo("small quadruped with 3 joints a leg, weak motors: torque limits are near"),
-    "solo8": _solo("small quadruped with 2 joints a leg: fewer torques than contact forces"),
+    "solo12": _solo(
+        "small quadruped with 3 joints per leg and weak motors: torque limits are close"
+    ),
+    "solo8": _solo("small quadruped with 2 joints per leg: fewer torques than contact forces"),
     "anymal_kinova": CatalogueEntry(
         "quadruped with an arm: more torques than contact forces",
         _ball_feet(("LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"), 0.031, (0.0, 0.0, 0.02325)),
         sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
     ),
     "talos": CatalogueEntry(
-        "humanoid with flat feet: each foot carries a wrench through its corners",
+        "humanoid with flat feet: each foot transmits a wrench through its corners",
         tuple(Foot(frame, corners=_TALOS_SOLE) for frame in ("left_sole_link", "right_sole_link")),
         sources={
-            "sole": "20 cm × 12 cm, within the ankle's collision mesh",
+            "sole": "20 cm × 12 cm, within the collision mesh of the ankle",
             "torque limits": "URDF",
         },
     ),
     "hyq": CatalogueEntry(
-        "hydraulic quadruped of 80 kg with 3 joints a leg",
+        "hydraulic quadruped of 80 kg with 3 joints per leg",
         _ball_feet(("lf_foot", "rf_foot", "lh_foot", "rh_foot"), 0.02175),
         sources={"foot radius": "URDF collision sphere", "torque limits": "URDF"},
     ),
@@ -91,8 +102,8 @@ CATALOGUE: Mapping[str, CatalogueEntry] = {
             for joint, angle in {"hip_pitch": -0.25, "knee": 0.5, "ankle_pitch": -0.25}.items()
         },
         sources={
-            "sole": "lowest points of the URDF's collision spheres",
-            "posture": "knees bent by 0.5 rad: the reference posture stands on straight legs",
+            "sole": "lowest points of the collision spheres in the URDF",
+            "posture": "knees bent by 0.5 rad, since the reference posture has straight legs",
             "torque limits": "URDF",
         },
     ),

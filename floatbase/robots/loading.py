@@ -1,5 +1,6 @@
-"""Robots from files: the catalogue, any other robot of example-robot-data once its feet are given,
-and your own URDFs.
+"""Loading robots: the catalogue, other robots of example-robot-data, and your own URDFs.
+
+Robots of example-robot-data that are not in the catalogue need their feet to be given.
 """
 
 from __future__ import annotations
@@ -40,15 +41,19 @@ from floatbase.robots.urdf import (
 PLATE_SIZE = (
     0.4,
     0.03,
-)  # width and thickness, m, of the plate on which `with_floating_base` lets a robot stand
-# what may stand before a text: an XML declaration stands only at the very beginning
+)  # width and thickness, m, of the plate on which `with_floating_base` places a robot
+# characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
-_FLIGHT_HEIGHT = 1.0  # m: where a robot without bolts and plate floats
+_FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
 
 def catalogue() -> dict[str, str]:
-    """The catalogue: name -> what the robot is for. `load` also takes the other names of
-    example-robot-data.
+    """List the robots of the catalogue.
+
+    Returns
+    -------
+    dict of str to str
+        Name and purpose of each robot. `load` also accepts the other names of example-robot-data.
     """
     return {name: entry.description for name, entry in CATALOGUE.items()}
 
@@ -64,19 +69,45 @@ def load(
 ) -> Robot:
     """Load a robot by name.
 
-    name: one of `catalogue()`, or any other robot of example-robot-data that has a URDF.
-    feet: frames (or `Foot` values) that can touch the ground; by default as the catalogue has them.
-        A floating-base robot outside the catalogue needs them.
-    foot_radius: radius of the feet given as frames, m, 0 by default.
-    torque_limits: one number or shape (d,), N·m; by default those of the catalogue or the URDF.
-    posture: shape (nq,), a configuration to stand in, of the robot before joints are locked; by
-        default the one that comes with the robot, its joints brought within their limits.
-    locked: names of joints that become fixed where the posture has them. They have no entry in q, v
-        and τ.
+    Parameters
+    ----------
+    name : str
+        One of `catalogue()`, or any other robot of example-robot-data that has a URDF.
+    feet : sequence of str or Foot, optional
+        Frames or `Foot` values that can touch the ground; by default those of the catalogue.
+        Floating-base robots outside the catalogue require them.
+    foot_radius : float, optional
+        Radius of the feet that are given as frames [m]; 0 by default.
+    torque_limits : float or array_like, shape (d,), optional
+        Torque limits [N·m]; by default those of the catalogue or the URDF.
+    posture : array_like, shape (nq,), optional
+        Standing configuration of the robot before joints are locked. By default the one that comes
+        with the robot, with its joints brought within their limits.
+    locked : sequence of str, optional
+        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
-    Raises `UnknownNameError` with the near names, and `InputError` for feet, limits or a posture
-    that do not fit, for joints coupled by <mimic>, and for a robot whose inertia M is singular.
-    Warns where the motors of a fixed-base robot are too weak to hold its posture.
+    Returns
+    -------
+    Robot
+        The robot.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no robot, frame or joint with a given name; the message lists similar names.
+    InputError
+        If the feet, limits or posture do not fit the robot, if joints are coupled by <mimic>, or if
+        the robot's inertia matrix M is singular.
+
+    Warns
+    -----
+    RobotWarning
+        If the motors of a fixed-base robot are too weak to hold its posture.
+
+    Examples
+    --------
+    >>> fb.load("go2").d
+    12
     """
     import example_robot_data as data
 
@@ -95,21 +126,21 @@ def load(
     )
     start = _reference_posture(
         model, loader, srdf, entry
-    )  # also where a posture is given: it reads the inertia of rotors
+    )  # also if a posture is given, since it reads the rotor inertias
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
     if feet is None:
         if foot_radius is not None:
             raise InputError(
-                "foot_radius goes with feet=[…]: the catalogue's feet have their own radius."
+                "foot_radius requires feet=[…], since the feet of the catalogue have their own "
+                "radius."
             )
         if name not in CATALOGUE and loader.free_flyer:
             raise InputError(
-                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so its feet must be "
-                f"given: "
-                f'fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"Its limbs end with {', '.join(_limb_ends(model))}. A robot that flies has none: "
-                f"feet=[]."
+                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so you must give its "
+                f'feet: fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
+                f"The links at the ends of its limbs are {', '.join(_limb_ends(model))}. For a "
+                f"flying robot, use feet=[]."
             )
     robot = _make_robot(
         name,
@@ -141,16 +172,46 @@ def load_urdf(
 ) -> Robot:
     """Load your own robot from a URDF.
 
-    path: of the URDF file, or the URDF's text itself, such as `robot.urdf`.
-    name: the file's name without its ending, or "robot" of a text, by default.
-    floating: whether the root link is free to move.
-    package_dirs: where meshes named package://… lie; the file's own folder is always searched.
-    feet, foot_radius, torque_limits, locked: as for `load`.
-    posture: as for `load`; that of all joints at zero, or at the limit that is nearest to it, by
-        default.
+    Parameters
+    ----------
+    path : str or Path
+        Path of the URDF file, or the text of the URDF itself, such as `robot.urdf`.
+    name : str, optional
+        Name of the robot. By default the file name without its extension, or "robot" if the text is
+        given.
+    floating : bool, optional
+        Whether the root link can move freely.
+    package_dirs : sequence of str or Path, optional
+        Folders that contain meshes named package://…; the folder of the file is always searched.
+    feet : sequence of str or Foot, optional
+        Frames or `Foot` values that can touch the ground; none by default.
+    foot_radius : float, optional
+        Radius of the feet that are given as frames [m]; 0 by default.
+    torque_limits : float or array_like, shape (d,), optional
+        Torque limits [N·m]; by default those of the URDF.
+    posture : array_like, shape (nq,), optional
+        Standing configuration of the robot before joints are locked. By default all joints are at
+        zero, or at the limit nearest to zero.
+    locked : sequence of str, optional
+        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
-    Raises `InputError` for a file that is not there or cannot be read, for planar and floating
-    joints inside the robot, and as `load` does.
+    Returns
+    -------
+    Robot
+        The robot.
+
+    Raises
+    ------
+    UnknownNameError
+        If a foot frame or a locked joint does not exist.
+    InputError
+        If the file does not exist or cannot be read, if the robot has planar or floating joints
+        besides its base, or for the same reasons as in `load`.
+
+    Warns
+    -----
+    RobotWarning
+        If the motors of a fixed-base robot are too weak to hold its posture.
     """
     urdf, directories = (
         as_string("path", str(path) if isinstance(path, Path) else path),
@@ -168,8 +229,8 @@ def load_urdf(
 
             if urdf in data.robots_loader.ROBOTS:
                 raise InputError(
-                    f'there is no file {urdf}, but a robot of that name: fb.load("{urdf}") loads '
-                    f"it."
+                    f"There is no file {urdf}, but there is a robot with this name. Load it with "
+                    f'fb.load("{urdf}").'
                 )
         urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
     model = parse_urdf(name, urdf, floating)
@@ -189,7 +250,7 @@ def load_urdf(
 
 
 def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
-    """Folders given as texts or paths."""
+    """Return folders, given as strings or paths, as paths."""
     strings = (
         [str(path) if isinstance(path, Path) else path for path in paths]
         if isinstance(paths, list | tuple)
@@ -199,21 +260,34 @@ def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
 
 
 def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
-    """A fixed-base robot with its base free to move: the links and joints of its URDF are the same,
-    the bolts are gone.
+    """Free the base of a fixed-base robot.
 
-    Bolts are the link "world", which some URDFs have below the base, and the joints that hang from
-    it.
+    The links and joints of the URDF stay the same. The link "world", which some URDFs have below
+    the base, and the joints attached to it are removed.
 
-    robot: with a fixed base, such as ur5.
-    plate: let it stand on a square plate that has no weight (`PLATE_SIZE`); else it touches nothing
-        and floats 1 m up.
+    Parameters
+    ----------
+    robot : Robot
+        Robot with a fixed base, such as ur5.
+    plate : bool, optional
+        Whether the robot stands on a massless square plate of size `PLATE_SIZE`. Otherwise it
+        touches nothing and floats 1 m above the ground.
+
+    Returns
+    -------
+    Robot
+        The robot with a floating base.
+
+    Raises
+    ------
+    InputError
+        If the base is already floating.
     """
     as_bool("plate", plate)
     if as_instance("robot", robot, Robot, 'fb.load("ur5")').is_floating:
         raise InputError(
-            f"{robot.name} has no bolts; with_floating_base takes a robot with a fixed base, such "
-            f"as ur5."
+            f"The base of {robot.name} is already floating. with_floating_base needs a robot with "
+            f"a fixed base, such as ur5."
         )
     floating = load_urdf(
         without_world_link(robot.urdf),
@@ -246,9 +320,7 @@ def _make_robot(
     torque_limits: npt.ArrayLike | None,
     **fields: Any,
 ) -> Robot:
-    """A robot of a URDF's text and of the model read from it, after joints are locked and what
-    cannot be held is refused.
-    """
+    """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
     locked, floating = as_strings("locked", locked), has_floating_base(model)
     if locked:
         full_model, q = model, as_posture(name, model, posture)
@@ -256,7 +328,7 @@ def _make_robot(
         for joint in locked:
             if joint not in joints:
                 raise unknown_name(
-                    f"joint of {name}", joint, joints, "Those that are fixed already need no lock."
+                    f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
                 )
         urdf = with_locked_joints(urdf, full_model, q, locked)
         model = parse_urdf(name, urdf, floating)
@@ -270,13 +342,14 @@ def _make_robot(
     check_urdf(name, urdf, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
-        torque_limits = np.where(effort > 0, effort, np.inf)  # 0 stands for unknown
+        torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
     return Robot(name, model, urdf, posture=posture, torque_limits=torque_limits, **fields)  # type: ignore[arg-type]  # it checks
 
 
 def _warn_if_motors_are_weak(robot: Robot) -> None:
-    """Warn the caller's caller where a fixed base's motors cannot hold the arm in its posture: it
-    will sink.
+    """Warn if the motors of a fixed-base robot cannot hold its posture against gravity.
+
+    The warning points at the code that called the loading function.
     """
     if robot.is_floating:
         return
@@ -294,28 +367,27 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
     ]
     if weak:
         message = (
-            f"{robot.name} sinks: its motors are too weak to hold its posture against "
-            f"gravity, N·m or N: {', '.join(weak)}."
+            f"{robot.name} will sink: its motors are too weak to hold its posture against "
+            f"gravity (N·m or N): {', '.join(weak)}."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
-    """What example-robot-data says about a robot."""
+    """Return the entry of a robot in example-robot-data."""
     if str(name).endswith((".urdf", ".xml", ".xacro")) or "/" in str(name):
         raise UnknownNameError(
-            f"{str(name)!r} is no robot's name but a file's; fb.load_urdf({str(name)!r}, feet=[…]) "
-            f"loads your own URDF. "
-            f"Names that fb.load knows: {', '.join(CATALOGUE)}, and the others of "
-            f"example-robot-data."
+            f"{str(name)!r} is the name of a file, not of a robot. Load your own URDF with "
+            f"fb.load_urdf({str(name)!r}, feet=[…]). fb.load accepts {', '.join(CATALOGUE)}, and "
+            f"the other names of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:
         raise unknown_name(
-            "robot", name, known, "fb.catalogue() says what the catalogue's robots are for."
+            "robot", name, known, "fb.catalogue() describes the robots of the catalogue."
         )
     if not known[name].urdf_filename:
         raise InputError(
-            f"{name} comes as an SDF file; floatbase reads URDF. Choose one of "
+            f"{name} is an SDF file, but floatbase reads only URDF. Choose one of "
             f"{', '.join(CATALOGUE)}."
         )
     return known[name]
@@ -324,8 +396,9 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
 def _reference_posture(
     model: pin.Model, loader: Any, srdf: Path | None, entry: CatalogueEntry
 ) -> Array:
-    """The SRDF's reference configuration with the catalogue's joint angles on top; loads rotor
-    inertia too.
+    """Return the reference posture of the SRDF with the joint angles of the catalogue.
+
+    The rotor inertias of the SRDF are stored in the model.
     """
     q = pin.neutral(model)
     if srdf is not None:
@@ -344,11 +417,10 @@ def _reference_posture(
 
 
 def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Array:
-    """The posture of a loader that changes the model after reading the URDF; `InputError` where
-    that is another robot then.
+    """Return the posture of a loader that changes the model after reading the URDF.
 
-    A loader may turn the world under a free base (human): the posture takes that turn, since our q
-    is the base in the world.
+    A loader may rotate the world under a floating base (human). The posture includes this rotation,
+    since our q describes the base in the world frame. Any other change is an `InputError`.
     """
     loaded = loader().robot
     first = 2 if loader.free_flyer else 1
@@ -358,10 +430,9 @@ def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Arra
     ]
     if fingerprints[0] != fingerprints[1]:
         raise InputError(
-            f"example-robot-data makes {name} from {loader.urdf_filename} by changing it after "
-            f"reading: {loaded.model.nv} of "
-            f"{model.nv} velocities stay. floatbase takes URDFs as they are: load the whole robot, "
-            f"hold joints with locked=[…]."
+            f"example-robot-data modifies {name} after reading {loader.urdf_filename}: "
+            f"{loaded.model.nv} of {model.nv} velocities remain. floatbase uses URDFs unmodified. "
+            f"Load the whole robot and lock joints with locked=[…]."
         )
     q = np.array(loaded.q0)
     if loader.free_flyer:
@@ -370,14 +441,15 @@ def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Arra
 
 
 def _limb_ends(model: pin.Model) -> list[str]:
-    """Names of the links that carry no other link, behind the last joint of a limb: feet, fingers,
-    heads.
+    """Return the names of the links at the ends of limbs: feet, fingers, heads.
+
+    These links are behind the last joint of a limb and carry no other link.
     """
     frames, parent_joints = model.frames, set(model.parents)
     bodies = [frame for frame in frames if frame.type == pin.FrameType.BODY]
     parents = {
         frames[frames[frame.parentFrame].parentFrame].name for frame in bodies
-    }  # a link hangs from a joint's frame
+    }  # the parent of a link is the frame of a joint
     return [
         str(frame.name)
         for frame in bodies
@@ -386,7 +458,7 @@ def _limb_ends(model: pin.Model) -> list[str]:
 
 
 def _as_feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
-    """Feet of frames and `Foot` values."""
+    """Return feet, given as frames or `Foot` values, as `Foot` values."""
     if isinstance(requested, str) or not isinstance(requested, Sequence):
         raise InputError(
             f'feet must be a list of frames, as in feet=["FL_foot"], not {short_repr(requested)}.'

@@ -1,4 +1,4 @@
-"""A robot: floating or fixed base, feet, standing posture, torque limits, S of (3)."""
+"""Robots: base, feet, standing posture, torque limits and actuation matrix."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from floatbase._validation import (
     as_positive,
     as_string,
     cached_property,
+    checked,
     read_only,
 )
 from floatbase.errors import InputError, unknown_name
@@ -37,70 +38,94 @@ from floatbase.robots._checks import (
 if TYPE_CHECKING:
     from floatbase.robots.state import State
 
-# least eigenvalue of M scaled to a diagonal of ones: robots have 1e-3 and more, rounding leaves
-# 1e-15
+# smallest eigenvalue of M scaled to a diagonal of ones: robots have at least 1e-3, and rounding
+# leaves 1e-15
 _SINGULAR_M = 1e-10
-_PARTICIPATION_TOLERANCE = 0.05  # part in a motion without inertia from which a joint is named
+_PARTICIPATION_TOLERANCE = 0.05  # share in a motion without inertia above which a joint is named
 
 
 @dataclass(frozen=True, eq=False)
 class Foot(Value):
-    """Where a robot can touch the ground: a ball, or a flat foot with corners.
+    """A part of a robot that can touch the ground: a ball, or a flat foot with corners.
 
-    frame: name of the frame that carries the foot; a flat foot's z axis points out of the ground
-        when it stands.
-    radius: of the ball, m; 0 for a flat foot.
-    centre: of the ball, shape (3,), m, in the frame.
-    corners: of a flat foot, shape (n, 3), m, in the frame; None for a ball.
+    Parameters
+    ----------
+    frame : str
+        Name of the frame that carries the foot. The z axis of a flat foot points out of the ground
+        when the robot stands.
+    radius : float
+        Radius of the ball [m]; 0 for a flat foot.
+    centre : array_like, shape (3,)
+        Centre of the ball in the frame [m].
+    corners : array_like, shape (n, 3), or None
+        Corners of a flat foot in the frame [m]; None for a ball.
     """
 
-    frame: str
-    radius: float = 0.0
-    centre: Array = field(default_factory=lambda: np.zeros(3))
+    frame: str = field(metadata=checked(as_string))
+    radius: float = field(default=0.0, metadata=checked(as_positive, "m", allow_zero=True))
+    centre: Array = field(
+        default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
+    )
     corners: Array | None = None
 
     def __post_init__(self) -> None:
-        as_string("frame of a foot", self.frame)
-        object.__setattr__(
-            self,
-            "radius",
-            as_positive(f"radius of foot {self.frame}", self.radius, "m", allow_zero=True),
-        )
-        object.__setattr__(
-            self, "centre", as_array(f"centre of foot {self.frame}", self.centre, (3,), "m")
-        )
+        super().__post_init__()
         if self.corners is not None:
             object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
 
+    def _label(self) -> str:
+        """Return the name that messages use for the foot."""
+        return f"foot {self.frame}" if isinstance(self.frame, str) else "a foot"
+
     @property
     def is_flat(self) -> bool:
-        """Whether the foot stands on its corners rather than on a point."""
+        """Whether the foot stands on its corners rather than on one point."""
         return self.corners is not None
 
     @property
     def middle(self) -> Array:
-        """The ball's centre, or the middle of the corners; shape (3,), m, in the frame."""
+        """Centre of the ball, or mean of the corners, shape (3,), in the frame [m]."""
         return self.centre if self.corners is None else read_only(self.corners.mean(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Robot(Value):
-    """A robot as the equations need it. Made by `load`; nothing in it changes afterwards.
+    """A robot model with feet, torque limits and a standing posture.
 
-    name: as it was loaded.
-    model: the Pinocchio model; q = (base position [m, world], base quaternion x y z w, joints), or
-        joints alone.
-    urdf: the text of the URDF; the physics and the pictures are made from it.
-    package_dirs: where its meshes named package://… lie.
-    feet: where it can touch the ground.
-    torque_limits: shape (d,), N·m (N for prismatic joints), +inf where none is known.
-    posture: shape (nq,), a configuration to stand in, before the feet are put on the ground; joints
-        within their limits.
-    description: what it is for.
-    sources: where the numbers come from that are not the URDF's.
+    Use `load` or `load_urdf` to make one. A robot is immutable.
 
-    Raises `InputError` for what does not fit, for a robot that nothing moves, and for one whose M
-    (1) is singular.
+    Parameters
+    ----------
+    name : str
+        Name under which the robot was loaded.
+    model : pinocchio.Model
+        Pinocchio model with q = (base position [m, world frame], base quaternion x y z w, joints),
+        or q = joints if the base is fixed.
+    urdf : str
+        Text of the URDF, from which the simulation and the viewer are built.
+    package_dirs : tuple of Path
+        Folders that contain meshes named package://….
+    feet : tuple of Foot
+        Places where the robot can touch the ground.
+    torque_limits : array_like, shape (d,)
+        Torque limits [N·m], or force limits of prismatic joints [N]; +inf if unknown.
+    posture : array_like, shape (nq,)
+        Standing configuration, before the feet are placed on the ground. Joints are within their
+        limits.
+    description : str
+        Purpose of the robot.
+    sources : mapping of str to str
+        Sources of the numbers that do not come from the URDF.
+
+    Raises
+    ------
+    InputError
+        If the arguments do not fit together, if nothing of the robot can move, or if its inertia
+        matrix M of eq. (1) is singular.
+
+    Notes
+    -----
+    Pinocchio computes kinematics and dynamics [Carpentier2019]_.
     """
 
     _example = 'fb.load("go2")'
@@ -123,26 +148,27 @@ class Robot(Value):
                 self.frame_id(foot.frame)
             ) > 1:
                 raise InputError(
-                    f"foot {foot.frame!r} of {self.name} is given twice; name each foot once."
+                    f"Duplicate foot {foot.frame!r} of {self.name}. Name each foot once."
                 )
         self._check_inertia()
 
     def _check_inertia(self) -> None:
-        """Raise `InputError` for a robot without mass, or for which (1) cannot be solved for q̈."""
+        """Raise `InputError` if the robot has no mass, or if eq. (1) cannot be solved for q̈."""
         if self.nv == 0:
             raise InputError(
-                f"nothing of {self.name} moves: its base is fixed, and so are all its joints."
+                f"{self.name} cannot move: its base and all its joints are fixed. Free the base or "
+                f"a joint."
             )
         if not 0.0 < self.mass < np.inf:
             raise InputError(
-                f"{self.name} has a mass of {self.mass:g} kg; give its links <inertial> in the "
+                f"{self.name} has a mass of {self.mass:g} kg. Give its links <inertial> in the "
                 f"URDF."
             )
         M = pin.crba(self.model, self.model.createData(), np.array(self.posture))
         if not np.all(np.abs(M) <= MAX_MAGNITUDE):
             raise InputError(
-                f"the inertia M (1) of {self.name} is not finite; look for lengths or masses that "
-                f"no robot has."
+                f"The inertia matrix M of {self.name} is not finite. Check the URDF for "
+                f"unrealistic lengths or masses."
             )
         scale = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
         values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
@@ -157,23 +183,21 @@ class Robot(Value):
         )
         if massless:
             joints = [name for name in massless if name != "its base"]
-            lock_hint = f", or hold joints still, as with locked={joints}" if joints else ""
+            lock_hint = f", or lock joints, as with locked={joints}" if joints else ""
             fix_hint = (
-                ", or load it with floating=False where it is bolted to the ground"
+                ", or load the robot with floating=False if it is bolted to the ground"
                 if "its base" in massless
                 else ""
             )
             raise InputError(
-                f"{self.name} has a singular inertia M (1) in its posture: {', '.join(massless)} "
-                f"can accelerate without moving "
-                f"any mass. Give the links there mass and inertia{lock_hint}{fix_hint}."
+                f"{self.name} has a singular inertia matrix M in its posture: "
+                f"{', '.join(massless)} can accelerate without moving any mass. Give these links "
+                f"mass and inertia{lock_hint}{fix_hint}."
             )
 
     @cached_property
     def _fingerprint(self) -> bytes:
-        """Of all that equations, physics and pictures take from the robot: the same in another
-        process.
-        """
+        """Digest of what equations, simulation and viewer use, the same in every process."""
         shapes = [foot.centre if foot.corners is None else foot.corners for foot in self.feet]
         feet = [
             (foot.frame, foot.radius, shape.shape, shape.tobytes())
@@ -185,9 +209,7 @@ class Robot(Value):
         ).digest()
 
     def __eq__(self, other: object) -> bool:
-        """Whether the other is the same robot: another `load` of it, or one that came out of a
-        pickle.
-        """
+        """Return whether the other is the same robot, even if loaded again or unpickled."""
         return self is other or (
             isinstance(other, Robot) and self._fingerprint == other._fingerprint
         )
@@ -197,26 +219,41 @@ class Robot(Value):
 
     @cached_property
     def is_floating(self) -> bool:
-        """Whether the base is free to move: nv = d + 6 rather than d."""
+        """Whether the base can move freely: nv = d + 6 rather than nv = d."""
         return has_floating_base(self.model)
 
     @cached_property
     def nq(self) -> int:
-        """(2) Length of q: of q_base, which is 7 for a floating base and 0 for a fixed one, and of
-        q_jnt.
+        """Length of the configuration q, which consists of q_base and q_jnt.
+
+        q_base has 7 entries for a floating base and none for a fixed base.
+
+        Notes
+        -----
+        [FBR]_, eq. (2).
         """
         return int(self.model.nq)
 
     @cached_property
     def nv(self) -> int:
-        """(2) Length of v, of q̈ and of each row of J: d + 6 for a floating base, d for a fixed
-        one.
+        """Length of v, of q̈ and of each row of J.
+
+        It is d + 6 for a floating base and d for a fixed base.
+
+        Notes
+        -----
+        [FBR]_, eq. (2).
         """
         return int(self.model.nv)
 
     @cached_property
     def d(self) -> int:
-        """(2) Number of actuated joints: the length of τ."""
+        """Count of the actuated joints, which is the length of τ.
+
+        Notes
+        -----
+        [FBR]_, eq. (2).
+        """
         return self.nv - (6 if self.is_floating else 0)
 
     @cached_property
@@ -226,26 +263,30 @@ class Robot(Value):
 
     @cached_property
     def S(self) -> Array:
-        """(3) The actuation matrix, shape (nv, d): S τ puts zeros where no motor acts. Source:
-        [FBR], §2.
+        """Actuation matrix, shape (nv, d): the rows of S τ without a motor are zero.
+
+        Notes
+        -----
+        [FBR]_, eq. (3).
         """
         return read_only(np.eye(self.nv, self.d, self.d - self.nv))
 
     @cached_property
     def mass(self) -> float:
-        """Total mass, kg. With a fixed base it includes what is bolted down, which `State.com` does
-        not.
+        """Total mass [kg].
+
+        With a fixed base it includes the fixed links, which `State.com` does not.
         """
         return float(sum(inertia.mass for inertia in self.model.inertias))
 
     @property
     def gravity(self) -> float:
-        """Size of the acceleration of gravity, m/s²."""
+        """Magnitude of the gravitational acceleration [m/s²]."""
         return float(np.linalg.norm(self.model.gravity.linear))
 
     @property
     def weight(self) -> float:
-        """Total weight, N."""
+        """Total weight [N]."""
         return self.mass * self.gravity
 
     @cached_property
@@ -255,7 +296,7 @@ class Robot(Value):
 
     @cached_property
     def base(self) -> str:
-        """Name of the base link's frame."""
+        """Name of the frame of the base link."""
         root, frames = int(self.is_floating), self.model.frames
         return str(
             next(
@@ -271,32 +312,61 @@ class Robot(Value):
 
     @cached_property
     def _frame_ids(self) -> dict[str, int]:
-        """Pinocchio's number of each frame, the first of several that share a name; "base" is the
-        base link.
+        """Index of each frame in Pinocchio.
+
+        Frames with the same name get the index of the first. "base" is the base link.
         """
         numbers = {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
         return {"base": numbers[self.base], **numbers}
 
     def frame_id(self, frame: str) -> int:
-        """Pinocchio's number of a frame; "base" stands for the base link on every robot.
+        """Return the index of a frame in Pinocchio.
 
-        Raises `UnknownNameError` with the near names.
+        Parameters
+        ----------
+        frame : str
+            Name of the frame; "base" is the base link of every robot.
+
+        Returns
+        -------
+        int
+            Index of the frame in `model.frames`.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame; the message lists similar names.
         """
         if not isinstance(frame, str) or frame not in self._frame_ids:
             raise unknown_name(
-                f"frame of {self.name}", frame, self.frames, "robot.frames lists them all."
+                f"frame of {self.name}", frame, self.frames, "robot.frames lists all of them."
             )
         return self._frame_ids[frame]
 
     def foot(self, frame: str) -> Foot:
-        """The foot carried by a frame; a frame that is no foot gives a point foot of radius 0 at
-        its origin.
+        """Return the foot that a frame carries.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+
+        Returns
+        -------
+        Foot
+            The foot of the robot, or a point foot of radius 0 at the frame's origin if the frame is
+            not a foot.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
         """
         self.frame_id(frame)
         return next((foot for foot in self.feet if foot.frame == frame), Foot(frame))
 
     def neutral(self) -> State:
-        """The state with all joints at zero and the base at the world's origin, at rest."""
+        """Return the state at rest with all joints at zero and the base at the world origin."""
         from floatbase.robots.state import State
 
         return State(self, pin.neutral(self.model))
@@ -307,16 +377,30 @@ class Robot(Value):
         normal: npt.ArrayLike | None = None,
         offset: npt.ArrayLike | None = None,
     ) -> State:
-        """A state at rest with every foot on the ground, and the base turned as the posture has it.
+        """Return a state at rest with every foot on the ground.
 
-        height: how far above z = 0 the base's origin should be, m; by default as the posture has
-            it.
-        normal: (3,), world, of the ground, upwards by default; (n, 3) for several planes, all
-            solid, as the sides of a valley.
-        offset: m, of the points normal · x = offset of a plane: one number for all, or (n,); 0 by
-            default.
-        Raises `InputError` when the feet cannot get there. A fixed-base robot, or one without feet,
-        gets its posture.
+        The base is oriented as in the posture.
+
+        Parameters
+        ----------
+        height : float, optional
+            Height of the base's origin above z = 0 in the world frame [m]. By default it follows
+            from the feet.
+        normal : array_like, shape (3,) or (n, 3), optional
+            Normals of the ground planes in the world frame; up by default. Every plane is solid, so
+            several planes can form a valley.
+        offset : float or array_like, shape (n,), optional
+            Offsets of the planes normal · x = offset [m]; 0 by default.
+
+        Returns
+        -------
+        State
+            The standing state. A fixed-base robot and a robot without feet get their posture.
+
+        Raises
+        ------
+        InputError
+            If the feet cannot all reach the ground.
         """
         from floatbase.robots.standing import find_standing_state
 
@@ -328,16 +412,26 @@ class Robot(Value):
 
     @cached_property
     def _standing(self) -> State:
+        """Standing state on level ground with the default height."""
         from floatbase.robots.standing import find_standing_state
 
         return find_standing_state(self)
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
-        """A random state around standing, the same for the same seed.
+        """Return a random state near the standing state; equal seeds give equal states.
 
-        spread: how far joints [rad, m], the base's attitude [rad] and position [m] stray;
-            velocities are normal with
-        that deviation in rad/s and m/s. Joints stay within their limits.
+        Parameters
+        ----------
+        seed : int or numpy.random.Generator, optional
+            Seed of the random numbers.
+        spread : float, optional
+            Largest deviation of joints [rad or m], base orientation [rad] and base position [m]. It
+            is also the standard deviation of the normally distributed velocities [rad/s and m/s].
+
+        Returns
+        -------
+        State
+            The state. Its joints are within their limits.
         """
         if not isinstance(seed, np.random.Generator):
             seed = as_integer("seed", seed, 0, 2**64, "or a numpy.random.Generator")
@@ -357,11 +451,21 @@ class Robot(Value):
 
 
 class Workspace(local):
-    """Memory for Pinocchio's results, one for each thread: making it takes longer than filling it.
+    """Memory for Pinocchio's results, one per thread; allocating it takes longer than filling it.
 
-    data: the results.
-    state: whose they are, a weak reference.
-    has_jacobians: whether the Jacobians of the joints are among them.
+    Parameters
+    ----------
+    model : pinocchio.Model
+        Model for which the memory is allocated.
+
+    Attributes
+    ----------
+    data : pinocchio.Data
+        The results.
+    state : callable
+        Weak reference to the state that the results belong to.
+    has_jacobians : bool
+        Whether the joint Jacobians are among the results.
     """
 
     def __init__(self, model: pin.Model):

@@ -1,4 +1,4 @@
-"""A standing state: every foot on the ground, found by steps of smallest size."""
+"""Standing states: every foot is on the ground, found by minimum-norm steps."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from floatbase.robots._checks import joint_limits
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
-_TOLERANCE = 1e-11  # m and rad: a hundred roundings of a robot of 1 m
+_TOLERANCE = 1e-11  # m and rad: about a hundred rounding errors for a robot of 1 m
 _MAX_STEPS = 50  # the catalogue's robots take five
 _UP = (0.0, 0.0, 1.0)  # normal of the ground
-_LARGEST_STEP = 0.2  # m and rad: Gauss-Newton's Jacobian is good that far
+_LARGEST_STEP = 0.2  # m and rad: the Jacobian of Gauss-Newton is accurate over this distance
 
 _Planes: TypeAlias = tuple[
     Array, Array
@@ -31,7 +31,30 @@ def find_standing_state(
     normal: npt.ArrayLike | None = None,
     offset: npt.ArrayLike | None = None,
 ) -> State:
-    """The standing state nearest to `robot.posture`, at rest; see `Robot.standing`."""
+    """Find the standing state at rest nearest to `robot.posture`; see `Robot.standing`.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot to place on the ground.
+    height : float, optional
+        Height of the base's origin above z = 0 in the world frame [m]. By default it follows from
+        the feet.
+    normal : array_like, shape (3,) or (n, 3), optional
+        Normals of the ground planes in the world frame; they are normalized. By default up.
+    offset : float or array_like, shape (n,), optional
+        Offsets of the planes normal · x = offset [m]; 0 by default.
+
+    Returns
+    -------
+    State
+        The standing state. A fixed-base robot and a robot without feet get their posture.
+
+    Raises
+    ------
+    InputError
+        If the feet cannot all reach the ground.
+    """
     posture = State(robot, robot.posture)
     normals, offsets = _UP if normal is None else normal, 0.0 if offset is None else offset
     planes = as_half_spaces("the ground", normals, offsets)
@@ -51,9 +74,7 @@ def find_standing_state(
         remaining = np.max(np.abs(error))
         if remaining < _TOLERANCE:
             return state
-        at_limit = np.zeros(
-            len(joints), dtype=bool
-        )  # joints at a limit that the step would take beyond it
+        at_limit = np.zeros(len(joints), dtype=bool)  # joints at a limit that the step would exceed
         while True:
             step = -np.linalg.pinv(J, rcond=RANK_TOLERANCE) @ error
             newly_at_limit = ~at_limit & (
@@ -67,26 +88,26 @@ def find_standing_state(
         q = pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
         q[index] = np.clip(q[index], lower, upper)
         state = State(robot, q)
-    height_text = "" if height is None else f" with its base {height:g} m above it"
+    height_text = "" if height is None else f" with its base at height {height:g} m"
     limited = [
         f"{robot.model.names[joint]} at {x:.3g}"
         for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)
     ]
-    reason = f", with joints at their limits: {', '.join(limited)}" if limited else ""
-    advice = "Ask for another height, or load it with another posture."
+    reason = f", with these joints at their limits: {', '.join(limited)}" if limited else ""
+    advice = "Choose another height, or load the robot with another posture."
     raise InputError(
-        f"{robot.name} cannot put all its feet on the ground{height_text}: {remaining:.2g} m "
-        f"remain{reason}. {advice}"
+        f"{robot.name} cannot put all its feet on the ground{height_text}: an error of "
+        f"{remaining:.2g} m remains{reason}. {advice}"
     )
 
 
 def _standing_residual(
     state: State, posture: State, height: float | None, planes: _Planes
 ) -> tuple[Array, Array]:
-    """What must be zero when the robot stands, and its Jacobian.
+    """Return the residual that is zero when the robot stands, and its Jacobian.
 
-    Soles on the ground and along it; the base where the posture has it, but for its height, which
-    follows the feet or is given.
+    Soles touch the ground and are parallel to it. The base has the orientation and the horizontal
+    position of the posture; its height follows from the feet or is given.
     """
     errors, rows = [], []
     for foot in state.robot.feet:
@@ -108,8 +129,10 @@ def _standing_residual(
 
 
 def _clearance(state: State, foot: Foot, planes: _Planes) -> tuple[float, Array]:
-    """Distance of the foot's lowest point from the nearest plane, m, negative below it, and that
-    plane's normal, shape (3,).
+    """Return the clearance of a foot above the nearest plane [m], and the normal of that plane.
+
+    The clearance is the distance of the foot's lowest point, negative below the plane. The normal
+    has shape (3,).
     """
     normals, offsets = planes
     distances = normals @ state.point(foot.frame, foot.middle) - offsets

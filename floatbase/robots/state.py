@@ -1,6 +1,4 @@
-"""`State(robot, q, v)`: where a robot is and how it moves; validated, immutable, kinematics
-computed once.
-"""
+"""States of robots: checked, immutable, with kinematics that are computed once."""
 
 from __future__ import annotations
 
@@ -28,19 +26,36 @@ WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class State(Value):
-    """(2) A configuration q = (q_base, q_jnt) and a velocity v of a robot, and all that follows
-    from them alone.
+    """A configuration q = (q_base, q_jnt) and a velocity v of a robot, with all derived quantities.
 
-    A State does not change; `state.replace(q=…)` makes a new one. Jacobians, velocities and drifts
-    of frames are given in the world-aligned frame at the point requested.
+    A state is immutable; `state.replace(q=…)` returns a new one. Jacobians, velocities and drifts
+    of frames are expressed in world axes at the origin of the frame.
 
-    robot: as from `fb.load`.
-    q: shape (nq,): base position [m, world], base quaternion x y z w, joints [rad or m].
-    v: shape (nv,): base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint
-        velocities; 0 by default.
+    Parameters
+    ----------
+    robot : Robot
+        Robot, as returned by `fb.load`.
+    q : array_like, shape (nq,)
+        Base position [m, world frame], base quaternion x y z w, joints [rad or m].
+    v : array_like, shape (nv,), optional
+        Base linear [m/s] and angular [rad/s] velocity **in the base frame**, then joint velocities
+        [rad/s or m/s]; 0 by default.
 
-    Raises `InputError` for wrong shapes, entries that are not finite, and quaternions (also (cos,
-    sin) of joints without limits) that are not of unit length.
+    Raises
+    ------
+    InputError
+        If a shape is wrong, an entry is not finite, or a quaternion, or a (cos, sin) pair of a
+        joint without limits, is not of unit length.
+
+    Notes
+    -----
+    [FBR]_, eq. (2).
+
+    Examples
+    --------
+    >>> state = fb.load("go2").standing()
+    >>> state.replace(v=np.zeros(18)).com.shape
+    (3,)
     """
 
     _example = "robot.standing()"
@@ -58,15 +73,17 @@ class State(Value):
 
     @classmethod
     def _unchecked(cls, robot: Robot, q: Array, v: Array) -> State:
-        """A state of arrays that have been checked, and that nobody else writes to."""
+        """Make a state from checked arrays that nothing else writes to."""
         state = object.__new__(cls)
         vars(state).update(robot=robot, q=frozen(q.view()), v=frozen(v.view()))
         return state
 
     @property
     def _data(self) -> pin.Data:
-        """Pinocchio's results at (q, v): kinematics, then what is asked for, which changes none of
-        them. Never handed out: the next state that this thread asks about takes this memory.
+        """Pinocchio's results at (q, v).
+
+        They hold the kinematics; other results may be added without changing these. Never return
+        them to the user, since the next state that this thread uses overwrites them.
         """
         workspace = self.robot._workspace
         if workspace.state() is not self:
@@ -79,51 +96,57 @@ class State(Value):
 
     @cached_property
     def M(self) -> Array:
-        """The generalised inertia matrix M(q) of (1), shape (nv, nv), symmetric positive definite,
-        rotor inertia included.
+        """Generalized inertia matrix M(q) of eq. (1), shape (nv, nv), positive definite.
+
+        It is symmetric and includes the rotor inertias.
         """
         return frozen(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
 
     @cached_property
     def h(self) -> Array:
-        """The generalised bias force h(q, q̇) of (1), shape (nv,): Coriolis, centrifugal and
-        gravity.
+        """Generalized bias force h(q, q̇) of eq. (1), shape (nv,).
+
+        It contains the Coriolis, centrifugal and gravity terms.
         """
         return frozen(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
 
     @cached_property
     def _centre_of_mass(self) -> tuple[Array, Array, Array]:
-        """Its position, velocity and drift."""
+        """Position, velocity and drift of the centre of mass."""
         data = self._data
         com = pin.centerOfMass(self.robot.model, data, pin.KinematicLevel.ACCELERATION, False)
         return frozen(com), frozen(data.vcom[0].copy()), frozen(data.acom[0].copy())
 
     @property
     def com(self) -> Array:
-        """Centre of mass, shape (3,), m, world."""
+        """Position of the centre of mass, shape (3,), world frame [m]."""
         return self._centre_of_mass[0]
 
     @property
     def com_velocity(self) -> Array:
-        """Velocity of the centre of mass, shape (3,), m/s, world."""
+        """Velocity of the centre of mass, shape (3,), world frame [m/s]."""
         return self._centre_of_mass[1]
 
     @cached_property
     def com_jacobian(self) -> Array:
-        """Jacobian of the centre of mass, shape (3, nv): com_velocity = com_jacobian v."""
+        """Jacobian of the centre of mass, shape (3, nv), world frame.
+
+        It satisfies com_velocity = com_jacobian v.
+        """
         J = frozen(pin.jacobianCenterOfMass(self.robot.model, self._data, False))
-        return J.reshape(3, self.robot.nv)  # of one joint Pinocchio gives (3,)
+        return J.reshape(3, self.robot.nv)  # for one joint Pinocchio returns shape (3,)
 
     @property
     def com_drift(self) -> Array:
-        """J̇ v of the centre of mass, shape (3,), m/s²: its acceleration when q̈ = 0."""
+        """Drift J̇ v of the centre of mass, shape (3,), world frame [m/s²].
+
+        It is the acceleration of the centre of mass if q̈ = 0.
+        """
         return self._centre_of_mass[2]
 
     @cached_property
     def joint_transforms(self) -> Array:
-        """World poses of Pinocchio's joints, shape (njoints, 4, 4), index = joint number (0 = the
-        world).
-        """
+        """World poses of Pinocchio's joints, shape (njoints, 4, 4); joint 0 is the world."""
         return read_only([placement.homogeneous for placement in self._data.oMi])
 
     @property
@@ -136,24 +159,88 @@ class State(Value):
         return data
 
     def frame_pose(self, frame: str) -> pin.SE3:
-        """Pose T_world_frame of a frame. Raises `UnknownNameError`."""
+        """Return the pose of a frame in the world frame.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+
+        Returns
+        -------
+        pinocchio.SE3
+            The pose T_world_frame.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
+        """
         return pin.updateFramePlacement(self.robot.model, self._data, self.robot.frame_id(frame))
 
     def point(self, frame: str, offset: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-        """World position, shape (3,), m, of a point at `offset` (m, in the frame)."""
+        """Return the position of a point that is attached to a frame.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+        offset : array_like, shape (3,), optional
+            Position of the point in the frame [m].
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Position in the world frame [m].
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
+        """
         return read_only(self.frame_pose(frame).act(as_array("offset", offset, (3,), "m")))
 
     def frame_jacobian(self, frame: str) -> Array:
-        """Jacobian of a frame's origin, shape (6, nv): linear rows, then angular rows,
-        world-aligned.
+        """Return the Jacobian of a frame's origin.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+
+        Returns
+        -------
+        ndarray, shape (6, nv)
+            Linear rows, then angular rows, in world axes.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
         """
         J = pin.getFrameJacobian(
             self.robot.model, self._jacobians, self.robot.frame_id(frame), WORLD_ALIGNED
         )
-        return read_only(J.reshape(6, self.robot.nv))  # of one joint Pinocchio gives (6,)
+        return read_only(J.reshape(6, self.robot.nv))  # for one joint Pinocchio returns shape (6,)
 
     def frame_velocity(self, frame: str) -> Array:
-        """Linear [m/s] and angular [rad/s] velocity of a frame's origin, shape (6,), world axes."""
+        """Return the velocity of a frame's origin.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+
+        Returns
+        -------
+        ndarray, shape (6,)
+            Linear [m/s], then angular [rad/s] velocity, in world axes.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
+        """
         return read_only(
             pin.getFrameVelocity(
                 self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
@@ -161,8 +248,22 @@ class State(Value):
         )
 
     def frame_drift(self, frame: str) -> Array:
-        """J̇ v of the frame named `frame`, shape (6,), world axes: its origin's acceleration when
-        q̈ = 0, m/s² and rad/s².
+        """Return the drift J̇ v of a frame, which is the acceleration of its origin if q̈ = 0.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame.
+
+        Returns
+        -------
+        ndarray, shape (6,)
+            Linear [m/s²], then angular [rad/s²] acceleration, in world axes.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
         """
         motion = pin.getFrameClassicalAcceleration(
             self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
@@ -170,24 +271,55 @@ class State(Value):
         return read_only(motion.vector)
 
     def integrate(self, dv: npt.ArrayLike) -> Array:
-        """The configuration, shape (nq,), at the end of a motion dv.
+        """Return the configuration after a displacement.
 
-        dv: shape (nv,), velocity times time: base part, m and rad, in the base frame, then joints.
+        Parameters
+        ----------
+        dv : array_like, shape (nv,)
+            Displacement, which is velocity times time: base part in the base frame [m and rad],
+            then joints [rad or m].
+
+        Returns
+        -------
+        ndarray, shape (nq,)
+            The new configuration.
         """
         return read_only(
             pin.integrate(self.robot.model, self.q, as_array("dv", dv, (self.robot.nv,)))
         )
 
     def difference(self, q: npt.ArrayLike) -> Array:
-        """The dv, shape (nv,), that leads from configuration q to this state's:
-        `State(robot, q).integrate(dv)` = self.q.
+        """Return the displacement dv from a configuration to the configuration of this state.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration at which the displacement starts.
+
+        Returns
+        -------
+        ndarray, shape (nv,)
+            The dv with `State(robot, q).integrate(dv)` = self.q.
         """
         return read_only(
             pin.difference(self.robot.model, as_array("q", q, (self.robot.nq,)), self.q)
         )
 
     def replace(self, q: npt.ArrayLike | None = None, v: npt.ArrayLike | None = None) -> State:
-        """A new state with q or v replaced."""
+        """Return a new state with q or v replaced.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,), optional
+            New configuration; by default unchanged.
+        v : array_like, shape (nv,), optional
+            New velocity; by default unchanged.
+
+        Returns
+        -------
+        State
+            The new state.
+        """
         return State(self.robot, self.q if q is None else q, self.v if v is None else v)
 
     def __repr__(self) -> str:

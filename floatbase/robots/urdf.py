@@ -1,4 +1,4 @@
-"""URDF texts: read, joints made fixed, bolts taken away, and what (1)-(7) cannot hold named."""
+"""URDF texts: reading, checking, locking joints and removing the world link."""
 
 from __future__ import annotations
 
@@ -15,74 +15,121 @@ from floatbase.errors import InputError
 from floatbase.robots._checks import has_floating_base
 
 _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # types of joints that need a <limit>
-# kg m²: programs that write URDFs put -5e-20 for an inertia of 0, and no part of a robot has so
-# little
+_LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # joint types that need a <limit>
+# kg m²: some programs write -5e-20 for an inertia of 0, and every real part of a robot has more
 _ROUNDING = 1e-12
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF file. Raises `InputError` for one that is not there or cannot be read."""
+    """Read the text of a URDF file.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the file.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist or cannot be read.
+    """
     try:
         return path.read_bytes().decode(
             "utf-8-sig", errors="replace"
-        )  # a comment in another encoding changes no robot
-    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        )  # a comment in another encoding does not change the robot
+    except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"there is no file {path.absolute()} to read ({reason}); give the path of a URDF file."
+            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF file."
         ) from None
 
 
 def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
-    """Pinocchio's model of a URDF text, with a root joint where the base is free to move.
+    """Build the Pinocchio model of a URDF text, with a root joint if the base is floating.
 
-    Raises `InputError` for a text that is no URDF, or no XML: Pinocchio forgives more there than
-    what reads it later.
+    Parameters
+    ----------
+    name : str
+        Name of the robot, for messages.
+    urdf : str
+        Text of the URDF.
+    floating : bool
+        Whether the base can move freely.
+
+    Returns
+    -------
+    pinocchio.Model
+        The model.
+
+    Raises
+    ------
+    InputError
+        If the text is not valid XML or not a URDF. Pinocchio accepts some texts that later readers
+        reject.
     """
     try:
         ElementTree.fromstring(urdf)
         return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
     except (ElementTree.ParseError, RuntimeError, ValueError) as error:
-        raise InputError(f"{name} cannot be read as a URDF: {_parse_error(urdf, error)}") from None
+        raise InputError(f"{name} is not a valid URDF: {_parse_error(urdf, error)}") from None
 
 
 def _parse_error(urdf: str, error: Exception) -> str:
-    """Why a text is no URDF; Pinocchio writes the reason to the terminal, not into its error."""
+    """Return why a text is not a URDF; Pinocchio prints the reason instead of raising it."""
     if "xacro:" in urdf:
         return (
-            f"{str(error).rstrip('.')}. It is written in xacro: run xacro first, as in xacro "
-            f"robot.xacro > robot.urdf."
+            f"{str(error).rstrip('.')}. The file is written in xacro. Run xacro first, as in "
+            f"`xacro robot.xacro > robot.urdf`."
         )
     if isinstance(error, ElementTree.ParseError):
         return str(error)
     root = ElementTree.fromstring(urdf)
     if root.tag != "robot":
-        return f"its outermost element is <{root.tag}>; that of a URDF is <robot>."
+        return f"its outermost element is <{root.tag}>, but it must be <robot>."
     for kind in ("link", "joint"):
         for duplicate, count in Counter(
             element.get("name") for element in root.findall(kind)
         ).items():
             if count > 1:
-                return f"{count} {kind}s are called {duplicate!r}; give each a name of its own."
+                return f"{count} {kind}s have the name {duplicate!r}. Names must be unique."
     for joint in root.findall("joint"):
         if joint.get("type") in _LIMITED_JOINT_TYPES and joint.find("limit") is None:
             return (
-                f"{joint.get('type')} joint {joint.get('name')!r} has no <limit>, with lower, "
-                f"upper, effort and velocity."
+                f"{joint.get('type')} joint {joint.get('name')!r} has no <limit>. Add one with "
+                f"lower, upper, effort and velocity."
             )
     return str(error)
 
 
 def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
-    """Raise `InputError` for what Pinocchio reads without a word and (1)-(7) cannot hold."""
+    """Raise `InputError` for content that Pinocchio accepts but eqs. (1)-(7) cannot represent.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot, for messages.
+    urdf : str
+        Text of the URDF.
+    model : pinocchio.Model
+        Model built from the text.
+
+    Raises
+    ------
+    InputError
+        If an inertia, limit, axis, name, joint type or joint coupling is not supported.
+    """
     root = ElementTree.fromstring(urdf)
     for check in _CHECKS:
         check(name, root, model)
 
 
 def _check_inertials(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Masses and inertias are numbers, and no mass is negative."""
+    """Check that masses and inertias are numbers, and that no mass is negative."""
     for link in root.findall("link"):
         for inertial in link.findall("inertial"):
             mass, tensor = inertial.find("mass"), inertial.find("inertia")
@@ -99,13 +146,13 @@ def _check_inertials(name: str, root: ElementTree.Element, model: pin.Model) -> 
             invalid += [f"mass {values['mass']}"] if _as_float(values["mass"]) < 0.0 else []
             if invalid:
                 raise InputError(
-                    f"<inertial> of link {link.get('name')!r} of {name} has {invalid[0]}; it needs "
-                    f"a mass ≥ 0, kg, and six numbers ixx … izz, kg m²."
+                    f"<inertial> of link {link.get('name')!r} of {name} has {invalid[0]}. It needs "
+                    f"a mass ≥ 0 (kg) and six numbers ixx … izz (kg m²)."
                 )
 
 
 def _check_limits_and_axes(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Lower limits lie below upper limits, and axes have a direction."""
+    """Check that no lower limit is above its upper limit, and that axes are not zero."""
     for joint in _movable_joints(root):
         label, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
         lower, upper = (
@@ -114,63 +161,63 @@ def _check_limits_and_axes(name: str, root: ElementTree.Element, model: pin.Mode
         )
         if joint.get("type") in _LIMITED_JOINT_TYPES and lower > upper:
             raise InputError(
-                f"joint {label!r} of {name} has the lower limit {lower:g} above the upper limit "
-                f"{upper:g} (rad, or m; a limit that is not given is 0). Swap lower and upper in "
-                f"<limit>, or make it continuous if it turns without limit."
+                f"The lower limit {lower:g} of joint {label!r} of {name} is above the upper limit "
+                f"{upper:g} (rad or m; a missing limit is 0). Swap lower and upper in <limit>, or "
+                f"make the joint continuous if it has no limits."
             )
         if axis is not None and not any(map(_as_float, axis.get("xyz", "1").split())):
             raise InputError(
-                f"joint {label!r} of {name} has an <axis> of zeros; give its direction, as in "
+                f"The <axis> of joint {label!r} of {name} is zero. Give a direction, as in "
                 f'xyz="0 0 1".'
             )
 
 
 def _check_moments_of_inertia(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """No link has a negative moment of inertia, with all that is welded to it."""
-    for i, inertia in list(enumerate(model.inertias))[1:]:  # a sum may mend a negative part
+    """Check that no link, including everything welded to it, has a negative moment of inertia."""
+    # Pinocchio's inertias are sums, which may be positive although a part is negative
+    for i, inertia in list(enumerate(model.inertias))[1:]:
         smallest = float(inertia.inertia.diagonal().min())
         if smallest < -_ROUNDING:
             where = (
-                "the base"
+                "The base"
                 if model.names[i] == "root_joint"
-                else f"the link that joint {model.names[i]!r} moves"
+                else f"The link moved by joint {model.names[i]!r}"
             )
             raise InputError(
-                f"{where} of {name} has a negative moment of inertia, {smallest:.4g} kg m², with "
-                f"all that is welded to it; ixx, iyy and izz of <inertia> must be above zero there."
+                f"{where} of {name}, with everything welded to it, has a negative moment of "
+                f"inertia, {smallest:.4g} kg m². Make ixx, iyy and izz of <inertia> positive."
             )
 
 
 def _check_reserved_names(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Nothing has the name of the base link's frame or of the base's own joint."""
+    """Check that the names "base" and "root_joint" are used for the base only."""
     base_frame = next((frame for frame in model.frames if frame.name == "base"), None)
     if base_frame is not None and base_frame.parentJoint != int(has_floating_base(model)):
         raise InputError(
-            f"a {'link' if base_frame.type == pin.BODY else 'joint'} of {name} that moves is "
-            f"called base, the word for the link that all others hang from, on every robot; "
-            f"rename it."
+            f"A moving {'link' if base_frame.type == pin.BODY else 'joint'} of {name} has the name "
+            f"base, which is reserved for the root link of every robot. Rename it."
         )
     if list(model.names).count("root_joint") > 1:
         raise InputError(
-            f"a joint of {name} is called root_joint, as Pinocchio calls that of a free base; "
-            f"rename it."
+            f"A joint of {name} has the name root_joint, which Pinocchio uses for the joint of a "
+            f"floating base. Rename it."
         )
 
 
 def _check_joint_types(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Every joint moves in one way."""
+    """Check that every joint has one degree of freedom."""
     names = [joint.get("name", "") for joint in _movable_joints(root)]
     for joint in model.joints:
         if joint.nv > 1 and model.names[joint.id] in names:
             raise InputError(
-                f"joint {model.names[joint.id]!r} of {name} moves in {joint.nv} ways; a motor "
-                f"drives one. Make it revolute, continuous, prismatic or fixed; the base is made "
-                f"free by floating=True."
+                f"Joint {model.names[joint.id]!r} of {name} has {joint.nv} degrees of freedom, but "
+                f"a motor drives only one. Make it revolute, continuous, prismatic or fixed. To "
+                f"free the base, use floating=True."
             )
 
 
 def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """No joint mimics another."""
+    """Check that no joint mimics another joint."""
     names = [joint.get("name", "") for joint in _movable_joints(root)]
     masters = {
         joint.get("name", ""): mimic.get("joint", "")
@@ -184,9 +231,9 @@ def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> 
         )
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
-            f"joints of {name} are coupled: {pairs}. Such couplings are not part of (1)-(7), where "
-            f"every joint has a motor of its own. Hold these joints still, locked={coupled}, or "
-            f"take <mimic> out of the URDF where they do have motors."
+            f"Joints of {name} are coupled: {pairs}. Eqs. (1)-(7) need a separate motor for every "
+            f"joint. Lock these joints with locked={coupled}, or remove <mimic> from the URDF if "
+            f"they do have separate motors."
         )
 
 
@@ -201,11 +248,29 @@ _CHECKS = (
 
 
 def _movable_joints(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return the joints of a URDF that are not fixed."""
     return [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
 
 
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:
-    """The URDF with joints made fixed where the configuration q has them."""
+    """Return a URDF with some joints fixed at their positions in a configuration.
+
+    Parameters
+    ----------
+    urdf : str
+        Text of the URDF.
+    model : pinocchio.Model
+        Model built from the text.
+    q : ndarray, shape (nq,)
+        Configuration that gives the positions of the joints.
+    joints : collection of str
+        Names of the joints to fix.
+
+    Returns
+    -------
+    str
+        Text of the new URDF.
+    """
     data, root = model.createData(), ElementTree.fromstring(urdf)
     pin.framesForwardKinematics(model, data, q)
     for joint in root.findall("joint"):
@@ -226,8 +291,19 @@ def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection
 
 
 def without_world_link(urdf: str) -> str:
-    """The URDF without the link "world", which some have below the base, and without the joints
-    that hang from it.
+    """Return a URDF without the link "world" and the joints attached to it.
+
+    Some URDFs have such a link below the base.
+
+    Parameters
+    ----------
+    urdf : str
+        Text of the URDF.
+
+    Returns
+    -------
+    str
+        Text of the new URDF.
     """
     root = ElementTree.fromstring(urdf)
     for element in [
@@ -239,7 +315,7 @@ def without_world_link(urdf: str) -> str:
 
 
 def _as_float(text: str | None) -> float:
-    """A number of a URDF, NaN where there is none."""
+    """Return a number of a URDF, or NaN if the text is not a number."""
     try:
         return float(text or "nan")
     except ValueError:

@@ -1,9 +1,9 @@
-"""The viewer: draws a robot's states, forces and friction cones in a web page; plays, plots and
-saves them.
+"""The viewer: draws, plays, plots and saves a robot's states, forces and friction cones.
 
-`Viewer` draws; `PictureOptions` explains what. `View` says from where it looks. `shapes` and
-`markers` make further items for a picture, in the `colours` of all pictures; `prefixed` puts
-several items below one path. `plots` makes figures of a rollout and of push recovery.
+`Viewer` draws in a web page; `PictureOptions` describes what it can draw, and `View` where it looks
+from. `shapes` and `markers` make additional items for a picture, in the `colours` of all pictures;
+`prefixed` puts several items below a common path. `plots` makes figures of rollouts and of push
+recovery.
 """
 
 from floatbase.errors import ViewerError
@@ -19,7 +19,9 @@ try:
 except ModuleNotFoundError as error:
     if str(error.name).startswith("floatbase"):
         raise
-    raise ViewerError(f'The viewer needs {error.name}: pip install "floatbase[viewer]".') from None
+    raise ViewerError(
+        f'The viewer needs {error.name}. Install it with: pip install "floatbase[viewer]"'
+    ) from None
 
 __all__ = [
     "PRESETS",

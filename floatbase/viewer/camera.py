@@ -1,66 +1,89 @@
-"""The camera: from where the page looks at the robot."""
+"""The camera: where the page looks at the robot from, and what it follows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from floatbase._validation import Array, as_array, as_bool, as_number, as_positive
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_bool,
+    as_number,
+    as_positive,
+    checked,
+    short_repr,
+)
 from floatbase.errors import InputError
+from floatbase.robots import Robot, State
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene.diff import ROOT
+from floatbase.viewer.scene.ground import displacement
+from floatbase.viewer.scene.painter import Painter
+
+# paths in the picture: the robot, and its position averaged over a stride
+ROBOT, FOLLOWED = "robot", "followed"
+_Ball: TypeAlias = tuple[tuple[float, float, float], float]  # centre, m, world, and radius, m
+
+
+def _as_ball(name: str, value: Any) -> _Ball | None:
+    """Return a centre and a radius as plain numbers, checked; None stays None."""
+    if value is None:
+        return None
+    try:
+        point, radius = value
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name} is {short_repr(value)}; it must be a centre and a radius, as in "
+            f"((0, 0, 0.3), 0.5)."
+        ) from None
+    x, y, z = as_array(f"point in {name}", point, (3,), "m").tolist()
+    return (x, y, z), as_positive(f"radius in {name}", radius, "m")
 
 
 @dataclass(frozen=True)
-class View:
+class View(Value):
     """A direction to look from, and what fills the picture.
 
-    azimuth: degrees around the vertical; 0 is in front of the robot (+x), 90 at its left (+y).
-    elevation: degrees above the horizontal.
-    distance: 1 fills the picture; 2 is twice as far away.
-    angle: vertical field of view, degrees.
-    feet: whether the robot's feet fill the picture, instead of the whole robot.
-    around: a point, (3,), m, world, and a radius, m: this ball fills the picture, instead of the
-        robot.
-    Raises `InputError` for an elevation beyond ±90, an angle not between 0 and 180, a distance or
-    radius that is not positive, and numbers that are not finite.
+    Parameters
+    ----------
+    azimuth : float, optional
+        Angle around the vertical [degrees]; 0 is in front of the robot (+x), 90 on its left (+y).
+    elevation : float, optional
+        Angle above the horizontal [degrees], from -90 to 90.
+    distance : float, optional
+        Relative distance, dimensionless: 1 fills the picture, 2 is twice as far away.
+    angle : float, optional
+        Vertical field of view [degrees], between 0 and 180.
+    feet : bool, optional
+        Whether the robot's feet fill the picture, instead of the whole robot.
+    around : tuple, optional
+        Centre, in the world frame [m], and radius [m] of a ball that fills the picture instead of
+        the robot, as `((x, y, z), radius)`.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or outside its range, or if a distance or radius is not positive.
     """
 
-    azimuth: float = 40.0
-    elevation: float = 18.0
-    distance: float = 1.0
-    angle: float = 32.0
-    feet: bool = False
-    around: tuple[tuple[float, float, float], float] | None = None
+    azimuth: float = field(default=40.0, metadata=checked(as_number, "degrees"))
+    elevation: float = field(default=18.0, metadata=checked(as_number, "degrees", -90.0, 90.0))
+    distance: float = field(default=1.0, metadata=checked(as_positive))
+    angle: float = field(default=32.0, metadata=checked(as_positive, "degrees"))
+    feet: bool = field(default=False, metadata=checked(as_bool))
+    around: _Ball | None = field(default=None, metadata=checked(_as_ball))
 
     def __post_init__(self) -> None:
-        as_positive("distance of a View", self.distance)
-        for name in ("azimuth", "elevation"):
-            as_number(f"{name} of a View", getattr(self, name), "degrees")
-        as_bool("feet of a View", self.feet)
-        if abs(self.elevation) > 90.0:
+        super().__post_init__()
+        if self.angle >= 180.0:
             raise InputError(
-                f"elevation of a View is {self.elevation:g}; it must be from -90 (below) to 90 "
-                f"(above) degrees."
+                f"angle of View is {self.angle:g}; it must be less than 180 degrees. The default "
+                "is 32."
             )
-        if as_positive("angle of a View", self.angle, "degrees") >= 180.0:
-            raise InputError(
-                f"angle of a View is {self.angle:g}; it must be below 180 degrees; 32 is usual."
-            )
-        if self.around is not None:
-            _check_around(self.around)
-
-
-def _check_around(around: Any) -> None:
-    try:
-        point, radius = around
-    except (TypeError, ValueError):
-        raise InputError(
-            f"around of a View is {around!r}; it must be a point and a radius, as ((0, 0, 0.3), "
-            f"0.5)."
-        ) from None
-    as_array("point in around of a View", point, (3,), "m")
-    as_positive("radius in around of a View", radius, "m")
 
 
 PRESETS = {
@@ -75,9 +98,19 @@ PRESETS = {
 
 
 def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
-    """The point that the camera looks at, and where the camera is: (3,) each, m, world.
+    """Compute the point that the camera looks at, and its own position.
 
-    low, high: (3,), m, world, corners of the box that fills the picture.
+    Parameters
+    ----------
+    view : View
+        The view.
+    low, high : ndarray, shape (3,)
+        Corners of the box that fills the picture, in the world frame [m].
+
+    Returns
+    -------
+    tuple of ndarray, shape (3,)
+        Target and position of the camera, in the world frame [m].
     """
     if view.around is None:
         target, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
@@ -91,3 +124,94 @@ def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
         np.sin(elevation),
     ]
     return target, target + distance * np.array(direction)
+
+
+class FollowingCamera:
+    """The camera of a viewer: it looks at a robot, and can follow it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot that fills the picture.
+    follows : bool
+        Whether the camera follows the robot.
+    """
+
+    def __init__(self, robot: Robot, follows: bool):
+        self.robot, self.follows = robot, follows
+        self._state: State | None = None  # the robot's state when the camera was set
+
+    def commands(
+        self, painter: Painter, view: View, state: State | None, followed: str = ROBOT
+    ) -> tuple[protocol.Update, ...]:
+        """Return the commands for the camera, for what it follows, and for the presets.
+
+        Parameters
+        ----------
+        painter : Painter
+            The painter of the viewer, which knows the robot's size and the ground.
+        view : View
+            Where to look from.
+        state : State or None
+            Current state of the robot; None for the standing pose.
+        followed : str, optional
+            Path of the item that the camera follows.
+
+        Returns
+        -------
+        tuple of Update
+            The commands.
+        """
+        self._state = state
+        presets = protocol.set_views(
+            {name: self._placement(painter, preset) for name, preset in PRESETS.items()}
+        )
+        return (
+            protocol.set_camera(*self._placement(painter, view)),
+            self.follow_command(painter, followed),
+            presets,
+        )
+
+    def follow_command(self, painter: Painter, followed: str) -> protocol.Update:
+        """Return the command that sets what the camera follows; nothing if it does not follow.
+
+        Parameters
+        ----------
+        painter : Painter
+            The painter of the viewer.
+        followed : str
+            Path of the item to follow.
+
+        Returns
+        -------
+        Update
+            The command.
+        """
+        base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
+        follows = self.follows and self.robot.is_floating
+        start = (self._state or painter.standing).joint_transforms[1][:3, 3]
+        return protocol.set_follow(
+            ROOT + base if follows else "",
+            start,
+            self._displacement(painter),
+            smooth=followed == ROBOT,
+        )
+
+    def _placement(self, painter: Painter, view: View) -> tuple[Array, Array, float]:
+        """Return the camera's position and target, shape (3,) [m], and its angle [degrees]."""
+        low, high = painter.feet_box if view.feet else painter.box
+        moved = self._displacement(painter) + [
+            0.0,
+            0.0,
+            painter.drawn_ground.height(painter.standing.com),
+        ]
+        target, eye = target_and_eye(view, low + moved, high + moved)
+        return eye, target, view.angle
+
+    def _displacement(self, painter: Painter) -> Array:
+        """Return how far the robot was from its standing pose, along the ground [m]."""
+        return displacement(
+            painter.drawn_ground,
+            painter.standing.com,
+            (self._state or painter.standing).com,
+        )

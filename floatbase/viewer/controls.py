@@ -1,6 +1,4 @@
-"""What a reader can set in the page: sliders, choices, check boxes, buttons, terms of an equation;
-texts, and a live strip.
-"""
+"""Controls in the page: sliders, lists, check boxes, buttons, toggles, texts and a plot."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ COLUMNS = ("", "model", "reality")
 class Controls:
     """The controls of a window's page, in a panel beside the picture.
 
-    section: heading that a control stands under; "" for the top, which is always open.
+    All callbacks run in the window's thread.
     """
 
     window: Window
@@ -49,14 +47,33 @@ class Controls:
     ) -> None:
         """Add a slider to the panel in the page.
 
-        name: its label.
-        changed: called with the new value when the reader moves it, in the window's thread.
-        value: where it stands at first, and again after a double click.
-        low, high, step: its range and its smallest step.
-        section: heading that it stands under.
-        column: "model" or "reality" for a part of a row of two, whose name ends in that word.
-        at_most: a word that stands for its highest value, as "perfect".
-        on_release: whether `changed` is called only when the reader releases the slider.
+        Parameters
+        ----------
+        name : str
+            Label of the slider.
+        changed : callable
+            Called as `changed(value)` when the reader moves the slider, in the window's thread.
+        value : float
+            Initial value, restored by a double click, in the slider's own unit like `low`, `high`
+            and `step`.
+        low, high : float
+            Range of the slider.
+        step : float, optional
+            Smallest step.
+        section : str, optional
+            Heading under which the slider appears; "" for the top of the panel, which is always
+            open.
+        column : {"", "model", "reality"}, optional
+            Column of the slider in a row of two; the name must end in this word.
+        at_most : str, optional
+            Word shown instead of the highest value, such as "perfect".
+        on_release : bool, optional
+            Whether to call `changed` only when the slider is released.
+
+        Raises
+        ------
+        InputError
+            If `value` is outside the range, or if `name` does not end in `column`.
         """
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
         value, step = as_number("value", value, "", low, high), as_positive("step", step)
@@ -69,15 +86,37 @@ class Controls:
         self._add_control(name, changed, value=value, min=low, max=high, step=step, **place)
 
     def add_button(self, name: str, pressed: Callable[[], None], section: str = "") -> None:
-        """Add a button to the panel in the page; `pressed()` is called in the window's thread."""
+        """Add a button to the panel in the page.
+
+        Parameters
+        ----------
+        name : str
+            Label of the button.
+        pressed : callable
+            Called as `pressed()` when the button is pressed, in the window's thread.
+        section : str, optional
+            Heading under which the button appears; "" for the top of the panel, which is always
+            open.
+        """
         as_callable("pressed", pressed, "pressed()")
         self._add_control(name, lambda _: pressed(), **_placement(name, section))
 
     def add_checkbox(
         self, name: str, changed: Callable[[bool], None], value: bool, section: str = ""
     ) -> None:
-        """Add a check box to the panel in the page; `changed(value)` is called in the window's
-        thread.
+        """Add a check box to the panel in the page.
+
+        Parameters
+        ----------
+        name : str
+            Label of the check box.
+        changed : callable
+            Called as `changed(value)` when the reader changes it, in the window's thread.
+        value : bool
+            Initial value.
+        section : str, optional
+            Heading under which the check box appears; "" for the top of the panel, which is always
+            open.
         """
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(name, changed, value=as_bool("value", value), **_placement(name, section))
@@ -90,17 +129,29 @@ class Controls:
         value: int = 0,
         section: str = "",
     ) -> None:
-        """Add a list to choose from to the panel in the page.
+        """Add a drop-down list to the panel in the page.
 
-        name: its label.
-        changed: called with the number of the chosen text, in the window's thread.
-        choices: texts, at least one.
-        value: number of the one that is chosen at first.
-        section: heading that it stands under.
+        Parameters
+        ----------
+        name : str
+            Label of the list.
+        changed : callable
+            Called as `changed(value)` with the index of the chosen entry, in the window's thread.
+        choices : sequence of str
+            Entries of the list, at least one.
+        value : int, optional
+            Index of the initial entry.
+        section : str, optional
+            Heading under which the list appears; "" for the top of the panel, which is always open.
+
+        Raises
+        ------
+        InputError
+            If `choices` is empty, or if it has no entry `value`.
         """
         choices = as_strings("choices", choices)
         if not choices:
-            raise InputError("choices is empty; give at least one text.")
+            raise InputError("choices is empty; it must have at least one entry.")
         changed = as_callable("changed", changed, "changed(value)")
         value = as_integer("value", value, 0, len(choices) - 1)
         self._add_control(
@@ -110,13 +161,20 @@ class Controls:
     def add_toggle(
         self, name: str, changed: Callable[[bool], None], value: bool, symbol: str, part: str
     ) -> None:
-        """Add a switch of a term of an equation, over the picture.
+        """Add a toggle for a term of an equation, above the picture.
 
-        name: what it switches, for its tooltip and for screen readers.
-        changed: called with whether it is on, in the window's thread.
-        value: whether it is on at first.
-        symbol: the term as it is written; switches of one symbol stand below each other.
-        part: "shown" for the symbol itself, else what is written on the switch.
+        Parameters
+        ----------
+        name : str
+            What it toggles, for its tooltip and for screen readers.
+        changed : callable
+            Called as `changed(value)` with whether it is on, in the window's thread.
+        value : bool
+            Whether it is on initially.
+        symbol : str
+            Symbol of the term; toggles of the same symbol are stacked.
+        part : str
+            "shown" for the symbol itself, else the text on the toggle.
         """
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(
@@ -130,9 +188,16 @@ class Controls:
     def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
         """Write a text into the panel, or change it.
 
-        name: which text; words: what it says.
-        section: heading that it stands under.
-        code: whether it is a program, with a button that copies it.
+        Parameters
+        ----------
+        name : str
+            Name that identifies the text.
+        words : str
+            The text.
+        section : str, optional
+            Heading under which the text appears; "" for the top of the panel, which is always open.
+        code : bool, optional
+            Whether the text is a program; it then has a button that copies it.
         """
         place = _placement(name, section)
         self.window.put(
@@ -148,9 +213,18 @@ class Controls:
         )
 
     def add_plot_point(self, name: str, t: float, value: float, unit: str = "") -> None:
-        """Add a point to the line of a number over the last seconds, at the top of the panel.
+        """Add a point to the plot of a quantity over the last seconds, at the top of the panel.
 
-        name: of the number; t: s; unit: of the value.
+        Parameters
+        ----------
+        name : str
+            Name of the quantity.
+        t : float
+            Time [s].
+        value : float
+            Value of the quantity, in `unit`.
+        unit : str, optional
+            Unit of the value.
         """
         point = {
             "t": as_number("t", t, "s"),
@@ -162,13 +236,25 @@ class Controls:
         )
 
     def set_control_value(self, name: str, value: float | bool) -> None:
-        """Show a control at another value, without calling what it calls. Raises `ViewerError`
-        where there is none.
+        """Show another value in a control, without calling its callback.
+
+        Parameters
+        ----------
+        name : str
+            Name of the control.
+        value : float or bool
+            Value to show.
+
+        Raises
+        ------
+        ViewerError
+            If there is no control of this name.
         """
         self.window.scene.set_control_value(as_string("name", name), value, "")
         self.window.put([])
 
     def _add_control(self, name: str, callback: Callable[[Any], None], **kind: Any) -> None:
+        """Register a callback and add its control to the page."""
         self._controls[as_string("name", name)] = callback
         controls = self._controls  # not self, so that the window does not keep its viewer alive
         self.window.on_control(
@@ -178,15 +264,14 @@ class Controls:
 
 
 def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
-    """Where a control stands, as its command says it. Raises `InputError` for another column, or a
-    name without it.
-    """
+    """Return where a control appears, as its command encodes it, checked."""
     if (
         not isinstance(column, str)
         or column not in COLUMNS
         or not as_string("name", name).endswith(column)
     ):
         raise InputError(
-            f'column is {column!r} of {name!r}; it must be "model" or "reality", and end the name.'
+            f'column of {name!r} is {column!r}; it must be "model" or "reality", and the name must '
+            f"end in it."
         )
     return {"section": as_string("section", section), **({"column": column} if column else {})}

@@ -1,19 +1,14 @@
-"""`Viewer(robot)`: draws a robot with its contacts, forces and friction cones in a web page, still
-or moving.
-"""
+"""The `Viewer`: draws a robot with its contacts, forces and friction cones in a web page."""
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import (
-    Array,
     as_array,
     as_bool,
     as_instance,
@@ -25,61 +20,71 @@ from floatbase._validation import (
 )
 from floatbase.behaviours import StepPlan, Walk
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, ViewerError
+from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
-from floatbase.viewer.camera import PRESETS, View, target_and_eye
+from floatbase.viewer.camera import FOLLOWED, PRESETS, ROBOT, FollowingCamera, View
 from floatbase.viewer.controls import Controls
-from floatbase.viewer.export import film, recording, thumbnail
-from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
+from floatbase.viewer.export import recording
+from floatbase.viewer.output import Output
 from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.scene.diff import ROOT, DiffRenderer
-from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes, displacement
+from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes
 from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter
 from floatbase.viewer.scene.shapes import Picture, prefixed
 from floatbase.viewer.transport.window import Window
-from floatbase.viewer.web import pages
 
 if TYPE_CHECKING:
-    from ipywidgets import Widget
-
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
-ROBOT, FOLLOWED = (
-    "robot",
-    "followed",
-)  # in the picture: the robot, and where it is on average of a stride
-_MOST_PIXELS = 10_000  # of a picture's height
+_MAX_HEIGHT = 10_000  # pixels
 
 
-class Viewer(Controls):
-    """Draws a robot in a web page that this process serves.
+class Viewer(Controls, Output):
+    """A web page in which this process draws a robot.
 
-    robot: the robot to draw.
-    height: height of the picture in a notebook, pixels.
-    background: "white" or "light", both of which are dark where the page around the picture is, or
-        the browser; or "dark".
-    scale: length of a drawn force, m/N, the same for forces and cones; None makes the robot's
-        weight about twice as long as its centre of mass is high.
-    facets: number of facets of the friction polyhedra that are drawn; None draws round cones.
-    inner_approximation, facet_rotation: as for `FrictionPolyhedron`.
-    ground: a simulation's `Ground`, or its normal, (3,), world, for a plane through the origin;
-        None takes the plane that the contacts stand on when they share a normal, else a level
-        ground.
-    follow: whether the camera goes with the robot where it walks; `play` and `camera` may have it
-        otherwise.
-    port: port of the page; 0 takes a free one once `url` is asked for, so a picture in a notebook
-        has none.
-    Raises `InputError` for an impossible argument and `ViewerError` when the port is taken.
+    In a notebook, a viewer on the last line of a cell displays itself, wherever the kernel runs:
+    its frames use the kernel's own connection, as slider values do. Elsewhere, open `viewer.url` in
+    a browser. Only the newest display in a notebook is live; earlier ones show the image with which
+    they opened. Give each interactive part its own `Viewer`.
 
-    In a notebook, a viewer as the last line of a cell displays itself, wherever the kernel runs:
-    its frames come as a slider's values do. Elsewhere, open `viewer.url` in a browser. The newest
-    display in a notebook is live; earlier ones show the image with which they opened. So give each
-    interactive part its own `Viewer`.
+    Parameters
+    ----------
+    robot : Robot
+        The robot to draw.
+    height : int, optional
+        Height of the picture in a notebook [pixels].
+    background : {"white", "light", "dark"}, optional
+        Background of the picture. "white" and "light" turn dark when the surrounding page or the
+        browser is dark.
+    scale : float, optional
+        Length of a drawn force [m/N], the same for forces and cones. By default, the arrow of the
+        robot's weight is about twice as long as its centre of mass is high.
+    facets : int, optional
+        Number of facets of the drawn friction polyhedra. By default, round cones are drawn.
+    inner_approximation : bool, optional
+        Whether the drawn polyhedra lie inside the friction cones, as for `FrictionPolyhedron`.
+    facet_rotation : float, optional
+        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
+    ground : Ground or array_like, shape (3,), optional
+        The ground of a simulation, or the normal, in the world frame, of a plane through the
+        origin. By default, the plane of the contacts if they share a normal, else level ground.
+    follow : bool, optional
+        Whether the camera follows the robot when it walks; `play` and `camera` can change this.
+    port : int, optional
+        Port of the page; 0 takes a free port when `url` is first read, so a viewer that is only
+        displayed in a notebook opens no port.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid.
+    ViewerError
+        If the port is already in use.
     """
 
     def __init__(
@@ -102,12 +107,12 @@ class Viewer(Controls):
                 f"background is {short_repr(background)}; it must be one of "
                 f"{', '.join(BACKGROUNDS)}."
             )
-        # raises for wrong ones
+        # raises an error if an argument is invalid
         polyhedron = FrictionPolyhedron(
             np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation
         )
         self.robot, self.background = robot, background
-        self.height = as_integer("height", height, 1, _MOST_PIXELS, "pixels")
+        self.height = as_integer("height", height, 1, _MAX_HEIGHT, "in pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
         background_colour, _, line_colour, text_colour = BACKGROUNDS[background]
         self.painter = Painter(
@@ -123,32 +128,37 @@ class Viewer(Controls):
         )
         self.window = Window(port)
         self.renderer = DiffRenderer(self.window)
-        self._is_playing, self._follow = False, as_bool("follow", follow)
+        self._camera = FollowingCamera(robot, as_bool("follow", follow))
+        self._is_playing = False
         self._last: State | None = None
-        self._camera_state: State | None = None  # where the robot was when the camera was set
         self._legend_entries: dict[
             str, tuple[RGB, str]
-        ] = {}  # kinds of items that the legend explains beside its own
+        ] = {}  # colour and meaning of each user-defined kind of item
         super().__init__()
         self._set_stage(background)
 
     @property
     def url(self) -> str:
-        """Address of the live page. It can be opened on the machine of this process only, by every
-        user of it.
+        """Address of the live page, which only users of this machine can open.
 
-        The page has no port before this is asked for. Raises `ViewerError` when the viewer was
-        closed before.
+        Reading it opens the page's port. It raises `ViewerError` if the viewer was closed before
+        the first read.
         """
         return self.window.web_url
 
     @property
     def scale(self) -> float:
-        """Length of a drawn force, m/N, the same for forces and cones."""
+        """Length of a drawn force [m/N], the same for forces and cones."""
         return self.painter.scale
 
     def set_ground(self, ground: Ground | npt.ArrayLike | None) -> None:
-        """Draw another ground from the next picture on. ground: as for the viewer."""
+        """Change the ground, starting with the next picture.
+
+        Parameters
+        ----------
+        ground : Ground or array_like, shape (3,), or None
+            As for `Viewer`; None restores the default.
+        """
         self.painter = self.painter.replace(ground=_ground(ground))
 
     def show(
@@ -162,35 +172,67 @@ class Viewer(Controls):
         ghost_name: str = GHOST_NAME,
         **options: Unpack[PictureKeywords],
     ) -> Viewer:
-        """Draw the robot and what the arguments ask for, and remove everything else. Returns this
-        viewer.
+        """Draw the robot and everything that the arguments ask for; remove everything else.
 
-        state: the state of the robot.
-        contacts: its contacts; each gets a patch and a friction cone.
-        forces: measured forces of the ground on the robot, shape (3 n,) or (n, 3) for the n points
-            of `contacts`, N, world.
-        planned: the same as a controller plans them. A cone's colour says where its force lies, of
-            `forces` if given, else of `planned`.
-        title: a line in the corner.
-        ghost_name: what the legend calls the ghost.
-        options: what else is drawn: com, cones, arrows, support, wrench, push, ghost, frames,
-            labels, extra, swing_feet; `PictureOptions` explains them.
-        Raises `InputError` for a state of another robot, a wrong number of forces, forces without
-        contacts, and NaN; `ViewerError` when the window is closed.
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        contacts : Contacts, optional
+            Contacts of the robot; each gets a patch and a friction cone.
+        forces : array_like, shape (3 n,) or (n, 3), optional
+            Measured forces of the ground on the robot at the n points of `contacts`, in the world
+            frame [N].
+        planned : array_like, shape (3 n,) or (n, 3), optional
+            The controller's planned forces, in the same form [N]. The colour of a cone shows where
+            its force lies: the one in `forces` if given, else the one in `planned`.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+        **options
+            What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
+            extra, swing_feet. `PictureOptions` describes them.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot, if forces are given without contacts or in the
+            wrong number, or if a value is NaN.
+        ViewerError
+            If the window is closed.
+
+        Examples
+        --------
+        >>> import floatbase as fb
+        >>> robot = fb.load("go2")
+        >>> view = fb.Viewer(robot).show(robot.standing(), title="standing")
+        >>> view.close()
         """
         _check_texts(title=title, ghost_name=ghost_name)
         picture = self.painter.picture(state, contacts, forces, planned, **options)
         self.draw(picture, title, ghost_name)
         if self._last is None:
-            self._last = state
-            self.renderer.set(*self._camera_commands(View()))
+            self.renderer.set(*self._camera.commands(self.painter, View(), state))
         self._last = state
         return self
 
     def add_legend_entry(self, kind: str, colour: RGB, meaning: str) -> None:
-        """Let the legend explain user-defined items, from the next picture on that has any.
+        """Add a legend entry for user-defined items; it appears in pictures that contain them.
 
-        kind: first part of their paths. colour: RGB, from 0 to 1. meaning: what the legend says.
+        Parameters
+        ----------
+        kind : str
+            First part of the items' paths.
+        colour : array_like, shape (3,)
+            RGB components from 0 to 1, dimensionless.
+        meaning : str
+            Text of the entry.
         """
         red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
         self._legend_entries[as_string("kind", kind)] = (
@@ -199,17 +241,33 @@ class Viewer(Controls):
         )
 
     def multiplier_labels(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
-        """Labels for `extra` of `show`: the multiplier of each active friction facet at its middle,
-        of a normal force on top.
+        """Make labels for the multipliers of active friction constraints, for `extra` of `show`.
+
+        The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
+        force on top of the cone. It tells how much the objective would decrease if its constraint
+        were relaxed by one newton; two significant digits are shown. To draw the labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
 
-        A multiplier is what one newton more of room would lower the objective by; two significant
-        digits are shown.
-        state, contacts: those that the controller was given.
-        solution: its answer: `command.solution`, or that of `solve(controller.qp(state))`.
-        Raises `InputError` for a solution of other contacts.
+        Parameters
+        ----------
+        state : State
+            The state that the controller was given.
+        contacts : Contacts
+            The contacts that the controller was given.
+        solution : Solution
+            The controller's solution: `command.solution`, or that of `solve(controller.qp(state))`.
+
+        Returns
+        -------
+        Picture
+            Labels by path.
+
+        Raises
+        ------
+        InputError
+            If the solution belongs to other contacts, or the state to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         positions, height = (
@@ -226,28 +284,62 @@ class Viewer(Controls):
         return prefixed("multiplier", drawn)
 
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
-        """Marks for `extra` of `show`: planned footholds, swing paths, the capture point, and the
-        planned ZMP of a `Walk`.
+        """Make markers for the plan of a `Walk`, for `extra` of `show`.
+
+        They mark the planned footholds, the swing paths, the capture point and the planned ZMP. To
+        draw them::
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
-        walk: the behaviour, after a tick; before its first one there is nothing to draw. state: of
-            the robot, then.
-        Raises `InputError` for those of another robot.
+        Parameters
+        ----------
+        walk : Walk
+            The behaviour after a control step; before the first one, there is nothing to draw.
+        state : State
+            State of the robot at that time.
+
+        Returns
+        -------
+        Picture
+            Markers by path.
+
+        Raises
+        ------
+        InputError
+            If the walk or the state belongs to another robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.walk_overlay(walk, state, self._overlay_style)
 
     def step_overlay(self, step: StepPlan, t: float, state: State) -> Picture:
-        """The same marks of a stored step, an entry of `walk.history`, as it was planned. t: s.
-        state: of the robot, then.
+        """Make the markers of `walk_overlay` for a stored step, as it was planned.
+
+        Parameters
+        ----------
+        step : StepPlan
+            An entry of `walk.history`.
+        t : float
+            Time [s].
+        state : State
+            State of the robot at that time.
+
+        Returns
+        -------
+        Picture
+            Markers by path.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.step_overlay(step, t, state, self._overlay_style)
 
     @property
     def _overlay_style(self) -> gait_overlay.Style:
+        """Size, ground and text colour of the overlays."""
         return gait_overlay.Style(
             self.painter.size, self.painter.drawn_ground, self.painter.text_colour
         )
@@ -255,17 +347,26 @@ class Viewer(Controls):
     def draw(
         self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME
     ) -> None:
-        """Draw a picture (path -> item), made by `painter.picture` or of your own items, and remove
-        everything else.
+        """Draw a picture and remove everything else.
+
+        Parameters
+        ----------
+        picture : Picture
+            Items by path, made by `painter.picture` or by yourself.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
         """
         if self._is_playing:
-            self.window.put([self._following(ROBOT), *protocol.end_animation()])
+            follow = self._camera.follow_command(self.painter, ROBOT)
+            self.window.put([follow, *protocol.end_animation()])
             self._is_playing = False
         settings = (
             *self._caption(legend.kinds(picture), title, ghost_name),
             protocol.set_ground(self.painter.drawn_ground.planes),
         )
-        self.renderer.draw(picture, *settings)  # at once: a second frame would wait
+        self.renderer.draw(picture, *settings)  # in one frame, because a second one would wait
 
     def play(
         self,
@@ -281,27 +382,50 @@ class Viewer(Controls):
         ghost_name: str = GHOST_NAME,
         **options: Unpack[PictureKeywords],
     ) -> Viewer:
-        """Play a rollout in the page, again and again, with a time slider and a choice of speeds.
-        Returns at once.
+        """Play a rollout in the page repeatedly, with a time slider and a choice of speeds.
 
-        A foot that swings, which is not among the controller's contacts just then, has no cone; its
-        measured force is drawn.
-        rollout: the record to play.
-        speed: 1 for real time, 0.25 for slow motion.
-        rate: pictures drawn for each second of the record.
-        planned: whether to draw the planned forces too.
-        title, ghost_name, options: as for `show`. The record says where pushes act and which feet
-            swing, in place of the options for these.
-        steps: `walk.history` of the `Walk` that was recorded; its marks are drawn as `step_overlay`
-            makes them.
-        follow: whether the camera goes with the robot, smoothly and at one height over the viewer's
-            ground; afterwards, too.
-        paused: whether the reader must press play first.
-        Raises `InputError` for a record of another robot or without rows.
+        The method returns at once. A swing foot, which is not among the controller's contacts at
+        that time, has no cone; its measured force is drawn.
+
+        Parameters
+        ----------
+        rollout : Rollout
+            The rollout to play.
+        speed : float, optional
+            Playback speed, dimensionless: 1 is real time, 0.25 slow motion.
+        rate : float, optional
+            Pictures drawn per second of the rollout [1/s].
+        planned : bool, optional
+            Whether to draw the planned forces too.
+        steps : iterable of StepPlan, optional
+            `walk.history` of the recorded `Walk`; its markers are drawn as by `step_overlay`.
+        follow : bool, optional
+            Whether the camera follows the robot, smoothly and at a constant height above the
+            viewer's ground. The setting stays in effect afterwards.
+        paused : bool, optional
+            Whether playback waits until the reader presses play.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+        **options
+            As for `show`. The rollout itself determines `push` and `swing_feet`.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If the rollout belongs to another robot or is empty.
         """
-        self.painter.check_robot("record", recording.as_rollout(rollout).robot)
+        self.painter.check_robot("rollout", recording.as_rollout(rollout).robot)
         if not len(rollout.time):
-            raise InputError("the record has no rows, so there is nothing to play.")
+            raise InputError(
+                "The rollout is empty, so there is nothing to play. Record at least one step."
+            )
         for name, flag in {"planned": planned, "follow": follow, "paused": paused}.items():
             as_bool(name, flag)
         _check_texts(title=title, ghost_name=ghost_name)
@@ -341,8 +465,8 @@ class Viewer(Controls):
         self.play_pictures(
             times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name
         )
-        self._last, self._follow = states[0], follow
-        self.renderer.set(*self._camera_commands(View(), FOLLOWED))
+        self._last, self._camera.follows = states[0], follow
+        self.renderer.set(*self._camera.commands(self.painter, View(), states[0], FOLLOWED))
         return self
 
     def play_pictures(
@@ -350,11 +474,27 @@ class Viewer(Controls):
         paused: bool = False,
         title: str | None = None, ghost_name: str = GHOST_NAME,
     ) -> Viewer:  # fmt: skip
-        """Play pictures, made by `painter.picture` or of your own items. Returns at once.
+        """Play a sequence of pictures repeatedly; return at once.
 
-        times: (n,), s; picture i is shown from times[i] on.
-        pictures: n pictures, path -> item each.
-        speed, paused, title, ghost_name: as for `play`.
+        Parameters
+        ----------
+        times : array_like, shape (n,)
+            Times [s]; picture i is shown from `times[i]` on.
+        pictures : sequence of Picture
+            n pictures, made by `painter.picture` or by yourself.
+        speed : float, optional
+            Playback speed, dimensionless; 1 is real time.
+        paused : bool, optional
+            Whether playback waits until the reader presses play.
+        title : str, optional
+            Text in the corner of the picture.
+        ghost_name : str, optional
+            Name of the ghost in the legend.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
         """
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
@@ -366,172 +506,57 @@ class Viewer(Controls):
         return self
 
     def camera(self, view: str | View = "default", follow: bool | None = None) -> Viewer:
-        """Look from a preset ("default", "front", "back", "left", "right", "top", "feet") or from a
-        `View`.
+        """Set the camera to a preset or to a `View`.
 
-        follow: whether the camera goes with the robot when it walks away, smoothly and at one
-            height over the viewer's ground; None leaves it so.
-        Every call undoes how the reader has turned the view, so do not call it each time a slider
-        moves. Raises `InputError` for another name.
+        Every call discards how the reader has turned the view, so do not call it each time a slider
+        moves.
+
+        Parameters
+        ----------
+        view : {"default", "front", "back", "left", "right", "top", "feet"} or View, optional
+            Where to look from.
+        follow : bool, optional
+            Whether the camera follows the robot when it walks away, smoothly and at a constant
+            height above the viewer's ground. By default, the setting is unchanged.
+
+        Returns
+        -------
+        Viewer
+            This viewer.
+
+        Raises
+        ------
+        InputError
+            If there is no preset of this name.
         """
         if isinstance(view, str) and view in PRESETS:
             view = PRESETS[view]
         if not isinstance(view, View):
             raise InputError(
-                f"camera view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, or a "
-                f"View."
+                f"The camera's view is {short_repr(view)}; it must be one of {', '.join(PRESETS)}, "
+                f"or a View."
             )
-        self._follow = self._follow if follow is None else as_bool("follow", follow)
-        self.renderer.force_set(
-            *self._camera_commands(view, FOLLOWED if self._is_playing else ROBOT)
-        )
+        if follow is not None:
+            self._camera.follows = as_bool("follow", follow)
+        followed = FOLLOWED if self._is_playing else ROBOT
+        self.renderer.force_set(*self._camera.commands(self.painter, view, self._last, followed))
         return self
 
-    def _camera_commands(self, view: View, followed: str = ROBOT) -> tuple[protocol.Update, ...]:
-        """The commands for a view of the robot where it is now, for what the camera follows from
-        there, and for the presets.
-        """
-        self._camera_state = self._last
-        presets = protocol.set_views(
-            {name: self._position_target_angle(preset) for name, preset in PRESETS.items()}
-        )
-        return (
-            protocol.set_camera(*self._position_target_angle(view)),
-            self._following(followed),
-            presets,
-        )
-
-    def _position_target_angle(self, view: View) -> tuple[Array, Array, float]:
-        """Position and target of the camera, (3,) each, m, world, and its angle, degrees, for a
-        view of the robot `_camera_state`.
-        """
-        low, high = self.painter.feet_box if view.feet else self.painter.box
-        moved = self._displacement + [
-            0.0,
-            0.0,
-            self.painter.drawn_ground.height(self.painter.standing.com),
-        ]
-        target, eye = target_and_eye(view, low + moved, high + moved)
-        return eye, target, view.angle
-
-    def _following(self, followed: str) -> protocol.Update:
-        """The command that lets the camera follow the robot, or what stands for it in a recording,
-        if it is to follow.
-        """
-        base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
-        follows = self._follow and self.robot.is_floating
-        start = (self._camera_state or self.painter.standing).joint_transforms[1][:3, 3]
-        return protocol.set_follow(
-            ROOT + base if follows else "", start, self._displacement, smooth=followed == ROBOT
-        )
-
-    @property
-    def _displacement(self) -> Array:
-        """How far the robot was from where it stands at home when the camera was set, (3,), m,
-        along the ground.
-        """
-        return displacement(
-            self.painter.drawn_ground,
-            self.painter.standing.com,
-            (self._camera_state or self.painter.standing).com,
-        )
-
-    def save(
-        self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
-    ) -> Path:
-        """Write the scene to a file, by its name's ending, and return its path.
-
-        path: .html is one page, still or moving, that needs neither server nor network. .mp4 and
-            .gif are the recording at the speed of `play`, .png its first picture; these need a
-            browser and `pip install "floatbase[video]"`.
-        title: of the page.
-        size: (width, height) of films and images in pixels, even numbers.
-
-        Raises `ViewerError` when nothing is drawn yet, for another ending, and when it cannot be
-        written.
-        """
-        target = Path(path if isinstance(path, Path) else as_string("path", path))
-        if self.window.scene.is_empty:
-            raise ViewerError(
-                "nothing is drawn yet, so there is nothing to save; call show(state) or "
-                "play(rollout) first."
-            )
-        size = film.checked_size(size)
-        if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
-            raise ViewerError(
-                f"cannot save {target.name!r}: end the name in .html, .mp4, .gif or .png."
-            )
-        try:
-            if target.suffix.lower() in film.FRAME_RATES:
-                film.capture(self.static_html(title), target, size)
-            else:
-                target.write_text(self.static_html(title), encoding="utf-8")
-        except OSError as error:
-            raise ViewerError(
-                f"cannot write {target} ({error.strerror}); choose a folder that exists."
-            ) from None
-        return target
-
-    def static_html(self, title: str | None = None) -> str:
-        """The scene as it is now, as one HTML page that needs neither server nor network."""
-        _check_texts(title=title)
-        return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
-
     def set_disconnect_message(self, words: str) -> None:
-        """What the page says when this viewer has been closed. words: the text."""
+        """Set the message that the page shows after this viewer has been closed.
+
+        Parameters
+        ----------
+        words : str
+            The message.
+        """
         self.renderer.set(
             protocol.page_command("set_disconnect_message", text=as_string("words", words))
         )
 
     def close(self) -> None:
-        """Close the page: its thread ends and its port is free."""
+        """Close the page: end its thread and free its port."""
         self.window.close()
-
-    def widget(self) -> Widget:
-        """A widget that shows the picture, for panels: live, until the viewer is displayed again;
-        then it shows the image of the picture with which it opened. Raises `ViewerError` without
-        anywidget.
-
-        Where FLOATBASE_VIEWER=static is in the environment, and when the viewer is closed, it is a
-        still copy of the scene.
-        """
-        if self._is_static:
-            import ipywidgets
-
-            return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(
-            self.robot.name,
-            self.height,
-            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
-        )
-
-    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """The live picture, and an image of it for wherever no widget can be; a program that stores
-        notebooks may have another, see `MIMEBUNDLES`.
-        """
-        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
-            return bundle(self)
-        if self._is_static:
-            return {"text/html": self._static_frame()}
-        picture = self.widget()
-        data, metadata = thumbnail.with_thumbnail(picture._repr_mimebundle_(**kwargs), picture)
-        return {**data, "text/plain": repr(self)}, metadata
-
-    @property
-    def _is_static(self) -> bool:
-        """Whether a display is a copy of the scene and no more."""
-        return display_mode() == "static" or not self.window.is_open
-
-    def _static_frame(self) -> str:
-        """HTML of the scene as it is now, which needs no kernel."""
-        name, style = (
-            html.escape(self.robot.name),
-            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
-        )
-        return (
-            f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
-            f'style="{style}"></iframe>'
-        )
 
     def __repr__(self) -> str:
         address = f", {self.url}" if self.window.is_listening else ""
@@ -551,7 +576,7 @@ class Viewer(Controls):
     def _caption(
         self, shown: set[str], title: str | None, ghost_name: str
     ) -> tuple[protocol.Update, protocol.Update]:
-        """The commands for the title, and for the legend of the colours in the picture."""
+        """Return the commands for the title and for the legend of the kinds that are shown."""
         return protocol.page_command("set_title", text=title or ""), legend.command(
             frozenset(shown),
             ghost_name,
@@ -561,12 +586,13 @@ class Viewer(Controls):
 
 
 def _check_texts(**texts: str | None) -> None:
+    """Check that each argument is a string; only the title may be None."""
     for name, value in texts.items():
         as_string(name, "" if value is None and name == "title" else value)
 
 
 def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
-    """The ground as it is drawn; None for None."""
+    """Return the ground as it is drawn, or None for None."""
     if ground is None:
         return None
     from floatbase.simulation import (
@@ -578,8 +604,7 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
     for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
         if z < MIN_VERTICAL:
             raise InputError(
-                f"ground is {[x, y, z]}; the normal of the ground must point upwards, as [0, 0, 1] "
-                f"does."
+                f"ground has the normal {[x, y, z]}; it must point upwards, as [0, 0, 1] does."
             )
         planes.append(Plane((x, y, z), offset))
     return planes[0] if len(planes) == 1 else Planes(tuple(planes))

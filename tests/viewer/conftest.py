@@ -1,4 +1,4 @@
-"""Robots and windows for the viewer's tests, and a page of a real browser where there is one."""
+"""Robots and windows for the viewer's tests, and a page of a real browser if there is one."""
 
 from __future__ import annotations
 
@@ -34,9 +34,7 @@ def contacts(go2: Robot) -> Contacts:
 
 @pytest.fixture
 def forces(go2: Robot) -> np.ndarray:
-    """A quarter of the weight on each foot: one inside its cone, one on it, one outside, one
-    inside.
-    """
+    """A quarter of the weight on each foot: inside its cone, on it, outside, inside."""
     quarter = go2.weight / 4
     tangent = np.array([0.1, 0.6, 0.9, 0.0])
     return quarter * np.stack([tangent, np.zeros(4), np.ones(4)], axis=1)
@@ -62,9 +60,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="package")
 def tab(browser) -> Iterator[Any]:
-    """One page for all tests: a new one costs three times as much as another address in the same
-    one.
-    """
+    """Open one page for all tests: a new page takes three times as long as a new address in it."""
     opened = browser.new_page()
     yield opened
     opened.close()
@@ -72,7 +68,7 @@ def tab(browser) -> Iterator[Any]:
 
 @pytest.fixture
 def page(tab) -> Iterator[Any]:
-    """The page, which fails the test when its script fails."""
+    """Return the page, which fails the test if its script fails."""
     errors: list[str] = []
     hears = {
         "pageerror": lambda error: errors.append(str(error)),

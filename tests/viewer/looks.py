@@ -1,6 +1,4 @@
-"""What the browser tests look with: screenshots, kept in build/screenshots, and the page's own
-scene.
-"""
+"""Screenshots for the browser tests, kept in build/screenshots, and access to the page's scene."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_rend
 
 
 def settle(page, title: str | None = None) -> None:
-    """Wait until the page has drawn, with this title if there is one."""
+    """Wait until the page has drawn, with this title if one is given."""
     titled = (
         "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
     )
@@ -33,14 +31,14 @@ def settle(page, title: str | None = None) -> None:
 
 
 def picture(page, name: str) -> np.ndarray:
-    """A screenshot, kept, as (height, width, 3)."""
+    """Take and keep a screenshot, shape (height, width, 3)."""
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     data = page.screenshot(path=str(SCREENSHOTS / f"{name}.png"))
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
 def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
-    """How many pixels have the colour's hue, whatever the light."""
+    """Count the pixels with the colour's hue, whatever the light."""
     expected = np.array(colour) - np.mean(colour)
     have = image - image.mean(axis=2, keepdims=True)
     length = np.linalg.norm(have, axis=2)

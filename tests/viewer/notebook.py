@@ -1,6 +1,4 @@
-"""Notebooks without Jupyter: pages of a widget that a test plays itself, and a web page that shows
-widgets as notebooks do.
-"""
+"""Notebooks without Jupyter: simulated pages of a widget, and a web page that shows widgets."""
 
 from __future__ import annotations
 
@@ -27,17 +25,17 @@ _CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each 
 
 
 def hear(widget: Any, content: Any) -> None:
-    """Let a widget have a message of its page."""
+    """Deliver a message of a page to a widget."""
     widget.comm.handle_msg(
         {"content": {"data": {"method": "custom", "content": content}}, "buffers": []}
     )
 
 
 class Client:
-    """A page of a widget, as the kernel hears it. It answers only when it is told to.
+    """A simulated page of a widget. It answers only when the test asks for it.
 
-    name: of the page. in_cell: whether what it says is heard by the kernel's main thread, and so
-        only between cells.
+    `name` is the name of the page. `in_cell` tells whether the kernel's main thread receives its
+    messages, and so only between cells.
     """
 
     def __init__(self, widget: Any, name: str = "page", in_cell: bool = False, hello: bool = True):
@@ -70,12 +68,12 @@ class Client:
         return self.messages.get(timeout=PATIENCE)
 
     def frame(self) -> tuple[int, list[dict]]:
-        """Number and commands of the next frame, which is not answered."""
+        """Return number and commands of the next frame, without answering it."""
         content, (data,) = self.message()
         return content["frame"], commands_in(data)
 
     def commands(self) -> list[dict]:
-        """The commands of the next frame, which is taken as drawn."""
+        """Return the commands of the next frame, and answer that it is drawn."""
         number, commands = self.frame()
         self.drawn(number)
         return commands
@@ -132,14 +130,12 @@ window.started = true;
 
 
 class Notebook:
-    """A web server with a page that shows widgets. What pages say is heard in the server's thread,
-    as in a subshell.
+    """A web server with a page that shows widgets.
 
-    At `/sealed` it is a page that cannot reach into its frames, as where a notebook seals its
-    outputs off.
-
-    sizes: bytes of the buffers of all messages to pages. lose: how many frames from now on do not
-        arrive.
+    Messages of pages are handled in the server's thread, as in a subshell. The page at `/sealed`
+    cannot access its frames, like a notebook that isolates its outputs. `sizes` are the bytes of
+    the buffers of all messages to pages. `lose` is the number of subsequent frames that do not
+    arrive.
     """
 
     def __init__(self) -> None:
@@ -172,7 +168,7 @@ class Notebook:
         server.stop()
 
     def show(self, page: Any, widget: Any) -> Any:
-        """Put an output below the others; its frame."""
+        """Put an output below the others; return its frame."""
         self.widgets[widget.model_id] = widget
         widget.send = lambda content, buffers=None: self._send(
             widget.model_id, content, buffers or []
@@ -208,7 +204,7 @@ class Notebook:
         self._send(*self._newest)
 
     def hear(self, widget: Any, content: Any) -> None:
-        """Have a message of a page heard, now or later."""
+        """Deliver a message of a page, now or later."""
         said = self._said
         if said is None:
             hear(widget, content)
@@ -217,9 +213,7 @@ class Notebook:
 
     @contextmanager
     def deaf(self) -> Iterator[list[tuple[Any, Any]]]:
-        """A while in which nothing is heard of pages, as by a kernel that runs a cell; what they
-        say is heard afterwards.
-        """
+        """Delay all messages of pages, like a kernel that runs a cell; deliver them afterwards."""
         said = self._said = []
         try:
             yield said
@@ -228,7 +222,7 @@ class Notebook:
         self._loop.call_soon_threadsafe(lambda: [hear(*each) for each in said])
 
     def end(self) -> None:
-        """End the connections, as a kernel that has gone."""
+        """End the connections, like a kernel that has stopped."""
         self._loop.call_soon_threadsafe(
             lambda: [one.close() for some in self.sockets.values() for one in some]
         )

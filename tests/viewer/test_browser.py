@@ -1,4 +1,4 @@
-"""A real browser looks at the page. Screenshots go to build/screenshots."""
+"""The page in a real browser. Screenshots go to build/screenshots."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ("lacks", "pages", "words"),
     [
         (NO_WEBGL, ("live", "file"), ("needs WebGL", "Switch on hardware acceleration")),
-        ("delete window.DecompressionStream", ("file",), ("too old to open", "Firefox from 113")),
+        ("delete window.DecompressionStream", ("file",), ("too old to open", "Firefox 113")),
     ],
     ids=["WebGL", "DecompressionStream"],
 )

@@ -1,4 +1,4 @@
-"""Films and images: what they show, and what is missing where they cannot be made."""
+"""Films and images: what they show, and errors if they cannot be made."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_film_that_would_take_hours_is_refused(tmp_path: Path) -> None:
 
 
 def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
-    """Which part of the pixels of two images is another."""
+    """Return the fraction of the pixels that differ between two images."""
     return float(np.mean(np.abs(first.astype(int) - second).max(axis=2) > SOME))
 
 

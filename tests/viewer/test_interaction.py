@@ -1,6 +1,4 @@
-"""The picture among other things: wheel and finger, the way home, keys, parts that hide, motion
-that some cannot bear.
-"""
+"""Interaction with the picture: wheel, touch, initial view, keys, hidden parts, reduced motion."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ SCENE = "viewer.scene_tree.children.meshcat.children"
 def framed(
     page, go2: Robot, standing: State, contacts: Contacts, tmp_path: Path
 ) -> Iterator[tuple]:
-    """A page that scrolls, and its frame, with a saved picture, from 300 to 780 pixels."""
+    """Open a page that scrolls, with a saved picture in a frame from 300 to 780 pixels."""
     view = Viewer(go2, facets=4)
     view.show(
         standing,

@@ -1,5 +1,6 @@
-"""What a window goes through: killed browsers, pages that never read, interrupts, restarts; nothing
-hangs, grows or stays.
+"""The life of a window: killed browsers, pages that never read, interrupts, restarts.
+
+Nothing may hang, grow or remain.
 """
 
 from __future__ import annotations
@@ -37,12 +38,12 @@ HUNG = 5.0
 
 
 def memory() -> int:
-    """Bytes of this process in memory."""
+    """Return the memory of this process in bytes."""
     return int(psutil.Process().memory_info().rss)
 
 
 def answers(port: int) -> bool:
-    """Whether anything listens there."""
+    """Return whether anything listens on a port."""
     try:
         socket.create_connection(("127.0.0.1", port), timeout=2).close()
     except OSError:
@@ -94,7 +95,7 @@ def test_a_killed_browser_leaves_nothing_behind(
 
 @pytest.fixture
 def sleeper(window: Window) -> Iterator[socket.socket]:
-    """A page that connects and never reads."""
+    """Open a page that connects and never reads."""
     with socket.create_connection(("127.0.0.1", window.port)) as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.sendall(
@@ -147,17 +148,17 @@ def test_a_page_that_never_reads_is_dropped(
 
 
 class Kernel:
-    """A Jupyter kernel of its own."""
+    """A separate Jupyter kernel."""
 
     def __init__(self) -> None:
         self.manager, self.client = start_new_kernel(kernel_name="python3")
 
     def run(self, code: str) -> str:
-        """What the code prints, and the name of its error."""
+        """Run code; return what it prints, and the name of its error."""
         return "".join(self.told(self.client.execute(code)))
 
     def told(self, request: str) -> Iterator[str]:
-        """What a request prints, and the name of its error, until the kernel has dealt with it."""
+        """Yield what a request prints, and the name of its error, until it is finished."""
         while True:
             message: dict[str, Any] = self.client.get_iopub_msg(timeout=PATIENCE)
             if message["parent_header"].get("msg_id") != request:

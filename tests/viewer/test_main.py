@@ -1,4 +1,4 @@
-"""The bare page: a live robot without a notebook."""
+"""The page of the command line: a live robot without a notebook."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The picture in a notebook: how many frames pages get, busy kernels, pages that are slow, lost or
-strange, what is saved.
-"""
+"""The picture in a notebook: frame rates, busy kernels, slow or foreign pages, saved output."""
 
 from __future__ import annotations
 
@@ -63,7 +61,7 @@ def newest(commands: list[dict]) -> float:
 
 
 def draw_for(window: Window, seconds: float) -> int:
-    """Draw something new again and again; how often."""
+    """Draw something new repeatedly; return how often."""
     drawn, until_then = 0, time.monotonic() + seconds
     while time.monotonic() < until_then:
         drawn += 1
@@ -73,7 +71,7 @@ def draw_for(window: Window, seconds: float) -> int:
 
 
 def frames_of(client: Client) -> int:
-    """How many frames have come by now."""
+    """Return how many frames have arrived by now."""
     time.sleep(2 * BLIND)
     return sum("frame" in client.messages.get()[0] for _ in range(client.messages.qsize()))
 
@@ -121,7 +119,7 @@ def window_of_shell(shell: InteractiveShell) -> Iterator[Window]:
 
 @contextmanager
 def busy(shell: InteractiveShell) -> Iterator[None]:
-    """A cell that runs."""
+    """Run a cell."""
     shell.events.trigger("pre_run_cell", None)
     yield
     shell.events.trigger("post_run_cell", None)

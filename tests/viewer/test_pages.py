@@ -1,4 +1,4 @@
-"""The pages: what is vendored is what its notice says."""
+"""The pages: the vendored files match their notice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings, saved files and plots, from a record made by hand: no physics needed."""
+"""Recordings, saved files and plots of a rollout made by hand, without physics."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
 
 
 def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
-    """Times and values of every track in the scene."""
+    """Return times and values of every track in the scene."""
     found = {}
     for clip in viewer.window.scene.commands()["/", "set_animation", ""]["animations"]:
         for track in clip["clip"]["tracks"]:

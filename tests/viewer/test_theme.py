@@ -1,4 +1,4 @@
-"""Light and dark: a picture follows the page around it, and what is drawn can be seen on either."""
+"""Light and dark: a picture follows the page around it, and everything is visible on both."""
 
 from __future__ import annotations
 

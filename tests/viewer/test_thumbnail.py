@@ -1,6 +1,4 @@
-"""The image of a picture that a notebook keeps: drawn without a browser, it shows what the page
-shows.
-"""
+"""The image of a picture in a notebook: drawn without a browser, it shows the same as the page."""
 
 from __future__ import annotations
 

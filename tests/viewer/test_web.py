@@ -1,4 +1,4 @@
-"""The built JavaScript is that of its sources."""
+"""The built JavaScript matches its sources."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The window: life cycle, many threads, interrupts, slow pages, strangers."""
+"""The window: life cycle, threads, interrupts, slow pages, foreign connections."""
 
 from __future__ import annotations
 
@@ -271,11 +271,10 @@ def test_threads_draw_at_the_same_time(window: Window) -> None:
 
 @contextmanager
 def interrupting() -> Iterator[Callable[[Callable[[], object], float], bool]]:
-    """A function that repeats another until it is interrupted, some time of this process (s) later,
-    and says whether it was.
+    """Yield a function that repeats another until an interrupt, and tells whether there was one.
 
-    The timer of the wall clock is pytest-timeout's. Python drops an interrupt that falls into a
-    destructor.
+    The interrupt comes after a given processor time of this process [s], because pytest-timeout
+    uses the timer of the wall clock. Python drops an interrupt that occurs in a destructor.
     """
 
     def repeat(

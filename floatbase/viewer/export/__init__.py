@@ -1,5 +1,3 @@
-"""Scenes that need no running program: recordings, films and images, thumbnails in stored
-notebooks.
-"""
+"""Scenes without a running program: recordings, films, images, and thumbnails in notebooks."""
 
 __all__: list[str] = []  # its modules are imported by name

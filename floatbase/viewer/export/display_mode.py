@@ -1,6 +1,4 @@
-"""What a viewer displays in a notebook: a live picture, or what a program that stores notebooks
-asks for.
-"""
+"""What a viewer displays in a notebook: a live picture, or a stored form of it."""
 
 from __future__ import annotations
 
@@ -9,13 +7,17 @@ from collections.abc import Callable
 from typing import Any
 
 VARIABLE = "FLOATBASE_VIEWER"  # in the environment
-# display mode -> what makes the mimebundle of a viewer in that mode, with `words` below it;
-# programs that publish notebooks add theirs
+# display mode -> function that returns a viewer's mimebundle, with `words` below it; programs that
+# publish notebooks add their own
 MIMEBUNDLES: dict[str, Callable[..., dict[str, Any]]] = {}
 
 
 def display_mode() -> str:
-    """What displays are to be: "live" by default; "static" scenes that need no kernel; or a key of
-    `MIMEBUNDLES`.
+    """Return the display mode from the environment variable FLOATBASE_VIEWER.
+
+    Returns
+    -------
+    str
+        "live", the default; "static" for scenes that need no kernel; or a key of `MIMEBUNDLES`.
     """
     return os.environ.get(VARIABLE) or "live"

@@ -1,4 +1,4 @@
-"""Films and images of a saved scene, drawn by a browser without a window: .mp4, .gif, .png."""
+"""Films and images of a saved scene (.mp4, .gif, .png), drawn by a headless browser."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FRAME_RATES = {
     ".png": 0,
     ".mp4": 30,
     ".gif": 20,
-}  # pictures a second of each kind of file; 0: only the first one
+}  # pictures per second of each file type; 0: only the first one
 _MAX_DURATION = 120.0  # s
 _MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
 _BROWSERS = (
@@ -45,8 +45,8 @@ _FLAGS = [
 ]
 _TIMEOUT_MS = 60_000  # ms until the page must have drawn
 _REQUIREMENTS = (
-    "that needs a browser (Chromium or Chrome) and two packages: pip install "
-    '"floatbase[video]". A name in .html needs none.'
+    "Films and images need a browser (Chromium or Chrome) and two packages: pip install "
+    '"floatbase[video]". An .html file needs neither.'
 )
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _PREPARE_JS = """() => {
@@ -64,7 +64,23 @@ _SEEK_JS = """t => {
 
 
 def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
-    """Width and height of films, checked: films have even ones."""
+    """Check the width and height of a film; video formats require even numbers.
+
+    Parameters
+    ----------
+    size : array_like, shape (2,)
+        Width and height [pixels].
+
+    Returns
+    -------
+    tuple of int
+        Width and height [pixels].
+
+    Raises
+    ------
+    InputError
+        If a number is odd or not from 100 to 4000.
+    """
     width, height = (
         int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels")
     )
@@ -77,19 +93,28 @@ def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
 
 
 def capture(page: str, target: Path, size: tuple[int, int]) -> None:
-    """Write what a page with a scene shows: its recording as .mp4 or .gif, its first picture as
-    .png.
+    """Write the recording in a page as .mp4 or .gif, or its first picture as .png.
 
-    page: its HTML. size: width and height in pixels, see `checked_size`.
-    Raises `ViewerError` where browser or packages are missing, and for a recording that is too
-    long.
+    Parameters
+    ----------
+    page : str
+        HTML of a page with a scene.
+    target : Path
+        File to write; its extension determines the format.
+    size : tuple of int
+        Width and height [pixels], see `checked_size`.
+
+    Raises
+    ------
+    ViewerError
+        If the browser or a package is missing, or if the recording is too long.
     """
     unfinished = target.with_name(f"{target.stem}.part{target.suffix}")
-    unfinished.touch()  # an `OSError` now, and not after the work
+    unfinished.touch()  # raises `OSError` now instead of after the work
     try:
         with ThreadPoolExecutor(
             1
-        ) as thread:  # playwright refuses one that has an event loop, such as a notebook's
+        ) as thread:  # playwright refuses a thread with an event loop, such as a notebook's
             thread.submit(_capture, page, unfinished, size).result()
         unfinished.replace(target)
     finally:
@@ -97,6 +122,7 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
 
 
 def _capture(page: str, target: Path, size: tuple[int, int]) -> None:
+    """Write the file, in a thread without an event loop."""
     kind = target.suffix.lower()
     pictures = _frames(page, size, FRAME_RATES[kind])
     if kind == ".png":
@@ -109,15 +135,13 @@ def _capture(page: str, target: Path, size: tuple[int, int]) -> None:
 
 
 def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
-    """The recording at `rate` pictures a second of film, played at its speed, or the first picture
-    alone.
-    """
+    """Yield the recording at `rate` pictures per second of film, or only the first picture."""
     try:
         from PIL import Image
         from playwright.sync_api import Error, sync_playwright
     except ImportError as error:
         raise ViewerError(
-            f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}"
+            f"No film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     path = next(filter(None, map(shutil.which, _BROWSERS)), None)
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
@@ -127,7 +151,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
         except Error as error:
             raise ViewerError(
-                f"no browser starts, so no film can be made; {_REQUIREMENTS} "
+                f"No browser could be started, so no film can be made. {_REQUIREMENTS} "
                 f"({str(error).splitlines()[0]})"
             ) from None
         with browser:
@@ -137,8 +161,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             duration = window.evaluate(_PREPARE_JS)
             if rate and duration > _MAX_DURATION:
                 raise ViewerError(
-                    f"the film would last {duration:.0f} s, and may last {_MAX_DURATION:g} s: play "
-                    f"less, or faster."
+                    f"The film would last {duration:.0f} s; the limit is {_MAX_DURATION:g} s. "
+                    f"Play a shorter rollout, or play it faster."
                 )
             times = np.arange(0.0, duration + 1e-9, 1.0 / rate) if rate else np.zeros(1)
             for t in tqdm(times, desc="film", unit="picture", leave=False, disable=not rate):
@@ -147,11 +171,12 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
 
 
 def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
+    """Write pictures as an animated GIF with one palette."""
     from PIL.Image import Dither, Quantize
 
     none = Dither.NONE
-    # one palette for all, since a palette for each flickers; the octree keeps the colour of a small
-    # thing, such as an arrow
+    # one palette for all, since separate palettes flicker; the octree keeps the colours of small
+    # things, such as arrows
     first = next(pictures).quantize(method=Quantize.FASTOCTREE, dither=none)
     rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
     first.save(
@@ -160,18 +185,19 @@ def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
 
 
 def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -> None:
+    """Write pictures as an H.264 film."""
     try:
         import av
     except ImportError as error:
         raise ViewerError(
-            f"a film cannot be made, {error.name} is not installed; {_REQUIREMENTS}"
+            f"No film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
         stream = film.add_stream(
             "libx264", rate=Fraction(FRAME_RATES[".mp4"]), options={"crf": "20"}
         )
         stream.width, stream.height = size
-        stream.pix_fmt = "yuv420p"  # what browsers and slides play
+        stream.pix_fmt = "yuv420p"  # which browsers and presentation programs can play
         for picture in pictures:
             film.mux(stream.encode(av.VideoFrame.from_image(picture)))
         film.mux(stream.encode())

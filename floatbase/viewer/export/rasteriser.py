@@ -1,4 +1,4 @@
-"""Meshes as pixels: triangles with a depth buffer, in numpy, for images without a browser."""
+"""A rasteriser for meshes: triangles with a depth buffer in numpy, for images without a browser."""
 
 from __future__ import annotations
 
@@ -13,18 +13,26 @@ from floatbase._validation import Array
 from floatbase.viewer.scene.shapes import Item
 from floatbase.viewer.scene.threejs import Shape
 
-NEAR_PLANE = 0.05  # m from the camera: what is nearer is not drawn
+NEAR_PLANE = 0.05  # m from the camera: anything nearer is not drawn
 _AMBIENT, _DIFFUSE = 0.62, 0.42
 _LIGHT_DIRECTION = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
-_MAX_SAMPLES = 1 << 20  # samples, so that many triangles take no more memory than few
-_MAX_BOX = 32  # pixels: a box around a longer triangle has much that is not in the triangle
-_BOX_STEP = 8  # pixels: boxes whose sides differ by less are made equal, to be filled together
+_MAX_SAMPLES = 1 << 20  # samples at once, so that memory does not grow with the number of triangles
+_MAX_BOX = 32  # pixels: a box around a longer triangle has many pixels outside the triangle
+_BOX_STEP = 8  # pixels: boxes whose sides differ by less are made equal and filled together
 Pixels = npt.NDArray[np.float32]
 
 
 class Camera(NamedTuple):
-    """eye, target: (3,), m, world. angle: vertical field of view, degrees. size: width and height
-    of the image, pixels.
+    """A perspective camera.
+
+    Parameters
+    ----------
+    eye, target : ndarray, shape (3,)
+        Position of the camera, and the point that it looks at, in the world frame [m].
+    angle : float
+        Vertical field of view [degrees].
+    size : tuple of int
+        Width and height of the image [pixels].
     """
 
     eye: Array
@@ -33,8 +41,18 @@ class Camera(NamedTuple):
     size: tuple[int, int]
 
     def project(self, points: Array) -> Array:
-        """Pixels from the left and from the top, and the distance along the view, m; shape (n, 3)
-        from (n, 3) m, world.
+        """Project points to the image.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            Points in the world frame [m].
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Distance from the left and from the top of the image [pixels], and distance along the
+            view [m].
         """
         forward = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -50,11 +68,16 @@ class Camera(NamedTuple):
 
     @property
     def pixels_at_one_metre(self) -> float:
+        """Size in the image of a length of 1 m at a distance of 1 m [pixels]."""
         return 0.5 * self.size[1] / float(np.tan(np.radians(self.angle) / 2))
 
 
 class _Mesh(NamedTuple):
-    """vertices, normals: (n, 3). faces: (m, 3). colours: (n, 3) from 0 to 1, without light."""
+    """A mesh.
+
+    `vertices` and `normals` have shape (n, 3), `faces` (m, 3), and `colours` (n, 3), from 0 to 1,
+    without light.
+    """
 
     vertices: Array
     normals: Array
@@ -63,8 +86,10 @@ class _Mesh(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """What triangles cover. at: number of a pixel, row by row. depth: -1/m, less is nearer. colour:
-    (n, 3).
+    """The pixels that triangles cover.
+
+    `at` is the index of a pixel, row by row. `depth` is negative inverse distance [1/m]; less is
+    nearer. `colour` has shape (n, 3).
     """
 
     at: npt.NDArray[np.int64]
@@ -73,8 +98,16 @@ class _Samples(NamedTuple):
 
 
 def draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
-    """Opaque meshes first, then translucent ones from far to near, then what is drawn over whatever
-    is in front of it.
+    """Draw opaque meshes, then translucent ones from far to near, then items always on top.
+
+    Parameters
+    ----------
+    items : sequence of Item
+        The meshes.
+    camera : Camera
+        The camera.
+    canvas : ndarray, shape (height, width, 3)
+        The image, RGB from 0 to 1, dimensionless; it is changed in place.
     """
     pixels, depth = (
         canvas.reshape(-1, 3),
@@ -97,14 +130,14 @@ def draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
 
 
 def _draw_nearest(samples: _Samples, pixels: Pixels, depth: Pixels) -> None:
-    """Draw the nearest of the samples where it is nearer than what is there."""
+    """Draw the nearest samples where they are nearer than what is already drawn."""
     np.minimum.at(depth, samples.at, samples.depth)
     seen = samples.depth == depth[samples.at]
     pixels[samples.at[seen]] = samples.colour[seen]
 
 
 def _concatenated(parts: Iterable[_Samples]) -> list[_Samples]:
-    """The parts as one, or none."""
+    """Return the parts as one, or an empty list if there are none."""
     all_of = list(parts)
     at, depth, colour = ([part[i] for part in all_of] for i in range(3))
     return (
@@ -115,9 +148,7 @@ def _concatenated(parts: Iterable[_Samples]) -> list[_Samples]:
 
 
 def _blend(samples: _Samples, depth: Pixels, item: Item, pixels: Pixels) -> None:
-    """Lay what a translucent mesh covers over what is there; samples of one pixel count as layers
-    of their mean colour.
-    """
+    """Blend a translucent mesh; samples of one pixel count as layers of their mean colour."""
     seen = samples.depth < depth[samples.at]
     where, which, layers = np.unique(samples.at[seen], return_inverse=True, return_counts=True)
     sums = [np.bincount(which, samples.colour[seen, i], len(where)) for i in range(3)]
@@ -128,7 +159,7 @@ def _blend(samples: _Samples, depth: Pixels, item: Item, pixels: Pixels) -> None
 
 
 def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
-    """What the triangles of a mesh cover, with its colours as the light makes them."""
+    """Yield the pixels that the triangles of a mesh cover, with lit colours."""
     mesh, pose = _mesh(item.shape), item.matrix
     points = mesh.vertices @ pose[:3, :3].T + pose[:3, 3]
     colours = (
@@ -148,7 +179,7 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
     forward = (seen[:, 2] > NEAR_PLANE)[mesh.faces].all(axis=1)
     seen[:, 2] = -1.0 / np.maximum(
         seen[:, 2], NEAR_PLANE
-    )  # linear over a triangle in the image, as the distance is not
+    )  # unlike the distance, linear over a triangle in the image
     corners = np.concatenate([seen, colours], axis=1)[mesh.faces[forward]].astype(np.float32)
     corners, low, sides = _split(corners, camera.size)
     kinds = sides @ (_MAX_BOX + 1, 1)  # one number for both sides
@@ -162,9 +193,7 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
 def _split(
     corners: Pixels, size: tuple[int, int]
 ) -> tuple[Pixels, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The triangles in the image, long ones in pieces, and of a box around each its first pixel and
-    its sides.
-    """
+    """Return the triangles in the image, long ones split, and the start and sides of boxes."""
     while True:
         a, b, c = (corners[:, i, :2] for i in range(3))
         low = np.floor(np.maximum(np.minimum(np.minimum(a, b), c), 0.0)).astype(np.int64)
@@ -187,12 +216,14 @@ def _split(
 def _rasterised(
     corners: Pixels, start: npt.NDArray[np.int64], sides: tuple[int, int], size: tuple[int, int]
 ) -> _Samples:
-    """The pixels in triangles. corners: (n, 3, 6), place, depth and colour. start, sides: of a box
-    around each, pixels.
+    """Return the pixels in triangles.
+
+    `corners` has shape (n, 3, 6): position, depth and colour. `start` and `sides` describe a box
+    around each triangle, in pixels.
     """
     (ax, ay), (bx, by), (cx, cy) = (corners[:, i, :2].T for i in range(3))
     area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    area = np.where(area == 0.0, np.float32(np.nan), area)  # seen from the side: it covers nothing
+    area = np.where(area == 0.0, np.float32(np.nan), area)  # edge-on: it covers no pixel
     px, py = (start + 0.5).astype(np.float32).T
     across, down = (np.arange(side, dtype=np.float32) for side in sides)
     v = _linear_function(
@@ -219,8 +250,9 @@ def _rasterised(
 def _linear_function(
     at_start: Pixels, along_x: Pixels, along_y: Pixels, area: Pixels, across: Pixels, down: Pixels
 ) -> Pixels:
-    """A linear function on boxes of pixels, (n, tall, wide), from its value at their first pixels
-    and its slopes.
+    """Evaluate a linear function on boxes of pixels, shape (n, tall, wide).
+
+    It is given by its value at the first pixel of each box and by its slopes.
     """
     first, x, y = (part[:, None] / area[:, None] for part in (at_start, along_x, along_y))
     return (first + y * down)[:, :, None] + (x * across)[:, None, :]
@@ -228,7 +260,7 @@ def _linear_function(
 
 @lru_cache(maxsize=256)
 def _mesh(shape: Shape) -> _Mesh:
-    """The triangles of a shape, as `threejs.mesh` packed them."""
+    """Return the triangles of a shape, as `threejs.mesh` packed them."""
     data, material = shape.data["geometries"][0]["data"], shape.data["materials"][0]
     vertices: Array = unpacked(data["attributes"]["position"]) * shape.data["object"]["matrix"][0]
     faces = unpacked(data["index"]).reshape(-1, 3).astype(np.int64)
@@ -255,25 +287,40 @@ _TYPES = {
 
 
 def unpacked(packed: dict[str, Any]) -> Any:
-    """The numbers of an attribute as `threejs` packed it, shape (n, itemSize)."""
+    """Unpack the numbers of an attribute that `threejs` packed.
+
+    Parameters
+    ----------
+    packed : dict
+        The packed attribute.
+
+    Returns
+    -------
+    ndarray, shape (n, itemSize)
+        The numbers.
+    """
     return np.frombuffer(packed["array"].data, _TYPES[packed["type"]]).reshape(
         -1, packed["itemSize"]
     )
 
 
 def _opacity(item: Item) -> float:
+    """Return the opacity of an item, from 0 to 1."""
     return float(
         item.shape.data["materials"][0]["opacity"] if item.colour is None else item.colour[3]
     )
 
 
 def _is_on_top(item: Item) -> bool:
+    """Return whether an item is drawn over whatever is in front of it."""
     return not item.shape.data["materials"][0]["depthTest"]
 
 
 def _hides_back(item: Item) -> bool:
+    """Return whether the front of a translucent item hides its back."""
     return bool(item.shape.data["materials"][0]["depthWrite"])
 
 
 def _rgb(code: int) -> tuple[int, int, int]:
+    """Return the components of a colour code, from 0 to 255."""
     return code >> 16, code >> 8 & 255, code & 255

@@ -1,4 +1,4 @@
-"""Animations: a list of pictures as one command, which the page plays, seeks and slows down."""
+"""Animations: lists of pictures as one command, which the page can play, seek and slow down."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from floatbase.viewer.scene.shapes import Item, Picture, with_normal_paths
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-REPETITIONS = 10_000  # meshcat's default is 1: it plays once and returns to the start
-_MAX_RATE = 1e4  # a second: more than any record has rows
-# m, and 1 for colours and quaternions: what changes less gets no track; single precision would not
-# show it
+REPETITIONS = 10_000  # meshcat's default, 1, plays once and returns to the start
+_MAX_RATE = 1e4  # 1/s: more rows per second than any rollout has
+# m, and dimensionless for colours and quaternions: smaller changes get no track, because single
+# precision does not resolve them
 MIN_CHANGE = 1e-7
-SMOOTHING_TIME = 0.3  # s, standard deviation of the weights over which a followed place is a mean
+SMOOTHING_TIME = 0.3  # s, standard deviation of the weights of the mean of a followed position
 _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 
 
@@ -41,8 +41,14 @@ _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 class Animation:
     """Pictures in time.
 
-    first: every item that ever appears, as it first appears. command: the command that moves them.
-        duration: s.
+    Parameters
+    ----------
+    first : Picture
+        Every item that ever appears, as it first appears.
+    command : Update
+        The command that moves the items.
+    duration : float
+        Duration [s].
     """
 
     first: Picture
@@ -54,10 +60,9 @@ class Animation:
 class _ItemHistory:
     """One item in n pictures.
 
-    item: as it first appears. present: (n,), whether the picture shows it. matrices: (n, 4, 4).
-        colours: (n, 4), or None.
-    Where it is not present, matrices and colours are those of the last picture before that shows
-    it, else of the first.
+    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show it.
+    `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not present,
+    matrices and colours are those of the last picture before that shows it, else of the first.
     """
 
     item: Item
@@ -73,13 +78,30 @@ def animate(
     speed: float = 1.0,
     paused: bool = False,
 ) -> Animation:
-    """The animation of some pictures.
+    """Make an animation of pictures.
 
-    times: (n,), s; picture i is shown from times[i] on.
-    pictures: n pictures, path -> item each.
-    root: the path below which all items lie.
-    speed: 1 for real time.
-    paused: whether the reader must press play first.
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        Times [s]; picture i is shown from `times[i]` on.
+    pictures : sequence of Picture
+        n pictures, items by path.
+    root : str
+        Path below which all items lie.
+    speed : float, optional
+        Playback speed, dimensionless; 1 is real time.
+    paused : bool, optional
+        Whether playback waits until the reader presses play.
+
+    Returns
+    -------
+    Animation
+        The animation.
+
+    Raises
+    ------
+    InputError
+        If there are no pictures, or if `times` has another length.
     """
     if (
         not isinstance(pictures, Sequence)
@@ -87,7 +109,7 @@ def animate(
         or not pictures
     ):
         raise InputError(
-            f"pictures must be a list of one picture or more, path -> item each, not "
+            f"pictures must be a list of at least one picture (items by path), not "
             f"{short_repr(pictures)}."
         )
     t, root = as_array("times", times, (len(pictures),), "s"), as_string("root", root)
@@ -110,29 +132,58 @@ def animate(
 
 
 def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
-    """The rows of a record to draw: the first, the last, and `rate` rows a second between. times:
-    (n,), s, of all rows.
+    """Choose the rows of a rollout to draw: the first, the last, and `rate` per second between.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        Times of all rows [s].
+    rate : float
+        Rows per second [1/s].
+
+    Returns
+    -------
+    ndarray
+        Indices of the rows.
+
+    Raises
+    ------
+    InputError
+        If `times` is empty.
     """
     t, rate = (
         as_array("times", times, (None,), "s"),
         as_positive("rate", rate, "1/s", maximum=_MAX_RATE),
     )
     if not t.size:
-        raise InputError("times holds no time, so there is nothing to draw.")
+        raise InputError(
+            "times is empty, so there is nothing to draw; it must have at least one entry."
+        )
     ticks = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
     return np.unique(np.clip(np.searchsorted(t, ticks - 1e-9), 0, len(t) - 1))
 
 
 def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
-    """Places without what lasts less than a stride: weighted means over about a second around each
-    time; straight ways stay.
+    """Remove motion that is shorter than a stride from positions; straight paths do not change.
 
-    times: (n,), s, evenly spaced. places: (n, 3), m, world.
+    Each result is a weighted mean over about one second around its time.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        Times, evenly spaced [s].
+    places : array_like, shape (n, 3)
+        Positions in the world frame [m].
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Smoothed positions in the world frame [m].
     """
     t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
         raise InputError(
-            f"there are {len(t)} times and {len(x)} places; each place needs one time."
+            f"times has {len(t)} entries and places has {len(x)}; they must have equally many."
         )
     if len(t) < 3 or not t[-1] > t[0]:
         return x
@@ -146,17 +197,39 @@ def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
 
 
 def as_rollout(rollout: Rollout) -> Rollout:
-    """The record, after checking that it is one."""
-    from floatbase.simulation import Rollout  # loads the physics, which pictures do without
+    """Return the rollout, after checking its type.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The rollout.
+
+    Returns
+    -------
+    Rollout
+        The rollout.
+    """
+    from floatbase.simulation import Rollout  # loads the physics, which pictures do not need
 
     return as_instance("rollout", rollout, Rollout)
 
 
 def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array] | None:
-    """Frame and force (N, world) of the push that acts at a row of a record; None without one. Of
-    several, the newest.
+    """Find the push that acts at a row of a rollout; if there are several, the newest.
 
-    linger: s that a push is still shown after its end.
+    Parameters
+    ----------
+    rollout : Rollout
+        The rollout.
+    row : int
+        Index of the row.
+    linger : float, optional
+        Time that a push is still shown after its end [s].
+
+    Returns
+    -------
+    tuple or None
+        Frame, and force in the world frame, shape (3,) [N]; None if no push acts.
     """
     now = float(as_rollout(rollout).time[as_integer("row", row, -len(rollout), len(rollout) - 1)])
     linger = as_positive("linger", linger, "s", allow_zero=True)
@@ -167,8 +240,19 @@ def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array
 
 
 def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
-    """Those whose forces act at points, and which columns of λ, (k,), are theirs; the others cannot
-    be drawn.
+    """Select the contacts whose forces act at points; the others cannot be drawn.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        All contacts.
+
+    Returns
+    -------
+    contacts : Contacts
+        The contacts whose forces act at points.
+    columns : ndarray of bool, shape (k,)
+        Which entries of λ are theirs.
     """
     as_instance("contacts", contacts, Contacts)
     drawn = np.array([isinstance(c, FrictionContact) for c in contacts], dtype=bool)
@@ -179,14 +263,25 @@ def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.b
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
-    """Names of the feet that swing at a row of a record: its contacts that the controller does not
-    have then.
+    """Find the swing feet at a row of a rollout: contacts that the controller does not use then.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The rollout.
+    row : int
+        Index of the row.
+
+    Returns
+    -------
+    frozenset of str
+        Names of the feet.
     """
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
-    """Every item in time. A path that shows several shapes in turn becomes several items."""
+    """Return every item in time; a path whose shape changes becomes several items."""
     appearances: dict[str, dict[int, Item]] = {}
     for i, picture in enumerate(pictures):
         for path, item in with_normal_paths(picture).items():
@@ -201,16 +296,17 @@ def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
 
 
 def _item_history(items: dict[int, Item], n: int) -> _ItemHistory:
+    """Return one item in n pictures, from the pictures that show it."""
     rows = np.array(sorted(items))
-    held = rows[np.clip(np.searchsorted(rows, np.arange(n), side="right") - 1, 0, None)]
-    matrices = np.array([items[i].matrix for i in rows])[np.searchsorted(rows, held)]
+    shown_rows = rows[np.clip(np.searchsorted(rows, np.arange(n), side="right") - 1, 0, None)]
+    matrices = np.array([items[i].matrix for i in rows])[np.searchsorted(rows, shown_rows)]
     first = items[rows[0]]
-    colours = None if first.colour is None else np.array([items[i].colour for i in held])
+    colours = None if first.colour is None else np.array([items[i].colour for i in shown_rows])
     return _ItemHistory(first, np.isin(np.arange(n), rows), matrices, colours)
 
 
 def _tracks(history: _ItemHistory, t: Array) -> Iterator[dict[str, Any]]:
-    """A track for each property that changes."""
+    """Yield a track for each property that changes."""
     # scale has its own track, because a scaled matrix has no quaternion
     scales = np.linalg.norm(history.matrices[:, :3, :3], axis=1)
     quaternions = _quaternions(history.matrices[:, :3, :3] / scales[:, None, :])
@@ -232,6 +328,7 @@ def _tracks(history: _ItemHistory, t: Array) -> Iterator[dict[str, Any]]:
 def _track(
     name: str, kind: str, t: Array, values: Array, interpolation: int = _LINEAR
 ) -> Iterator[dict[str, Any]]:
+    """Yield the track of one property, if it changes."""
     if np.ptp(values, axis=0).max() < MIN_CHANGE:
         return
     yield {
@@ -244,12 +341,14 @@ def _track(
 
 
 def _packed_floats(values: Array) -> umsgpack.Ext:
+    """Pack numbers as single-precision floats."""
     return umsgpack.Ext(0x17, np.ascontiguousarray(values, dtype="<f4").tobytes())
 
 
 def _quaternions(rotations: Array) -> Array:
-    """Rotations (n, 3, 3) as quaternions x y z w, shape (n, 4); of q and -q the one that is nearer
-    to the one before.
+    """Return rotations (n, 3, 3) as quaternions x y z w, shape (n, 4).
+
+    Of q and -q, it is the one nearer to the previous quaternion.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,6 +1,6 @@
-"""A picture as an image, drawn without a browser: for notebooks that are read where nothing runs.
+"""Images of pictures, drawn without a browser, for notebooks that are read without a kernel.
 
-It looks like the page's, more plainly: one light, no gloss, no shadows, lines always behind.
+An image resembles the page, but is simpler: one light, no gloss, no shadows, lines always behind.
 Drawing takes some tenths of a second.
 """
 
@@ -29,17 +29,30 @@ from floatbase.viewer.scene.label_image import FONT_SIZE, font
 from floatbase.viewer.scene.shapes import Item, Picture
 from floatbase.viewer.scene.store import Scene
 
-SUPERSAMPLING = 2  # pixels drawn for each of the image, across and down
+SUPERSAMPLING = 2  # pixels drawn per pixel of the image, in each direction
 _ASPECT, _SCALE = (
     1.7,
     0.8,
-)  # width over height, and the size of the image over that of the picture in the page
+)  # width / height, and size of the image / size of the picture in the page
 _COLOURS = 256
 
 
 def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
-    """A picture as a PNG file, with the settings of its scene: camera, background, title and
-    legend. height: in the page.
+    """Draw a picture as a PNG file, with its scene's camera, background, title and legend.
+
+    Parameters
+    ----------
+    picture : Picture
+        The picture.
+    scene : Scene
+        The scene with the settings.
+    height : int
+        Height of the picture in the page [pixels].
+
+    Returns
+    -------
+    bytes
+        The PNG file.
     """
     size = SUPERSAMPLING * round(_ASPECT * _SCALE * height), SUPERSAMPLING * round(_SCALE * height)
     background = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
@@ -56,7 +69,18 @@ def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
 
 
 def side_by_side(files: Sequence[bytes]) -> bytes:
-    """Several PNG files of pictures as one, from left to right."""
+    """Join several PNG files of pictures from left to right.
+
+    Parameters
+    ----------
+    files : sequence of bytes
+        The PNG files.
+
+    Returns
+    -------
+    bytes
+        The joined PNG file.
+    """
     images = [Image.open(io.BytesIO(file)).convert("RGB") for file in files]
     whole = Image.new(
         "RGB",
@@ -69,12 +93,20 @@ def side_by_side(files: Sequence[bytes]) -> bytes:
 
 
 def with_thumbnail(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What a notebook stores of a widget, and beside it an image of the pictures in it, for
-    wherever no widget can be.
+    """Add an image to a stored widget, for readers that cannot show widgets.
 
-    bundle: of the widget, as `_repr_mimebundle_` returns it.
-    pictures: widgets of viewers. Those that hold a copy of a scene as HTML, as `Viewer.widget`
-        says, are stored as that copy.
+    Parameters
+    ----------
+    bundle : dict or tuple
+        Mimebundle of the widget, as `_repr_mimebundle_` returns it.
+    *pictures : Widget
+        Widgets of viewers. Those that hold a copy of a scene as HTML (see `Viewer.widget`) are
+        stored as that copy.
+
+    Returns
+    -------
+    tuple of dict
+        Data and metadata.
     """
     data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
     scenes = [picture.value for picture in pictures if not hasattr(picture, "thumbnail")]
@@ -92,17 +124,19 @@ def with_thumbnail(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[st
 
 
 def _png_bytes(image: Image.Image) -> bytes:
+    """Return an image as a PNG file."""
     file = io.BytesIO()
     image.quantize(_COLOURS, Image.Quantize.FASTOCTREE).save(file, "png")
     return file.getvalue()
 
 
 def _setting(scene: Scene, kind: str, default: dict[str, Any]) -> dict[str, Any]:
+    """Return the command of one kind in the scene, or `default` if there is none."""
     return scene.command(("/", kind, "")) or default
 
 
 def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
-    """The camera, moved with what it follows, at the same height over the ground."""
+    """Return the camera, moved with what it follows, at a constant height above the ground."""
     set_to = _setting(
         scene, "set_camera", {"position": [2.0, 1.0, 0.0], "target": [0.0, 0.0, 0.0], "fov": 32.0}
     )
@@ -118,6 +152,7 @@ def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
 
 
 def _ground(scene: Scene) -> Plane | Planes:
+    """Return the scene's ground."""
     planes = _setting(scene, "set_ground", {"planes": []})["planes"]
     return (
         Planes(
@@ -129,18 +164,20 @@ def _ground(scene: Scene) -> Plane | Planes:
 
 
 def _from_threejs(point: Sequence[float]) -> Array:
-    """A point of three.js, y up, in our coordinates, z up: the inverse of `protocol`'s."""
+    """Convert a point of three.js (y up) to our coordinates (z up), inverting `protocol`."""
     x, y, z = point
     return np.array([x, -z, y])
 
 
 def _background(size: tuple[int, int], background: tuple[RGB, ...]) -> Pixels:
+    """Return an image of the background, a vertical gradient."""
     down = np.linspace(0.0, 1.0, size[1], dtype=np.float32)[:, None, None]
     top, bottom = (np.array(colour, dtype=np.float32) for colour in background[:2])
     return np.ascontiguousarray(np.broadcast_to(top + down * (bottom - top), (size[1], size[0], 3)))
 
 
 def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
+    """Draw line segments."""
     image = Image.fromarray((255.0 * canvas).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     for item in items:
@@ -164,6 +201,7 @@ def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
 
 
 def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> None:
+    """Draw labels."""
     for item in items:
         ((x, y, far),) = camera.project(item.matrix[None, :3, 3])
         size = (
@@ -173,9 +211,9 @@ def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> N
         )
         if far <= NEAR_PLANE or not (size >= 1.0).all() or (size > camera.size).any():
             continue
-        about = item.shape.data["images"][0]["url"]
-        data = np.frombuffer(about["data"].data, np.uint8).reshape(
-            about["height"], about["width"], 2
+        texture = item.shape.data["images"][0]["url"]
+        data = np.frombuffer(texture["data"].data, np.uint8).reshape(
+            texture["height"], texture["width"], 2
         )[::-1]
         made = Image.fromarray(np.ascontiguousarray(data), "LA").resize(
             (round(size[0]), round(size[1]))
@@ -188,6 +226,7 @@ def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> N
 
 
 def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
+    """Draw the title and the legend."""
     draw, ink = ImageDraw.Draw(image), hex_code(text)
     for i, line in enumerate(_setting(scene, "set_title", {"text": ""})["text"].splitlines()):
         draw.text(
@@ -210,4 +249,5 @@ def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
 
 
 def _hex_code(code: int) -> str:
+    """Return a colour as CSS writes it."""
     return f"#{code:06x}"

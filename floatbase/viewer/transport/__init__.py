@@ -1,5 +1,3 @@
-"""How a scene gets to a page: the window and its server, the notebook's widget, and the connections
-to the pages.
-"""
+"""Transport of a scene to its pages: window, server, notebook widget and connections."""
 
 __all__: list[str] = []  # its modules are imported by name

@@ -1,8 +1,8 @@
-"""A page and what it is owed: the rules of all pages, whatever the way to them.
+"""Connections to pages: what each page has received, and when it receives the rest.
 
-A `Connection` knows what its page shows and has seen, and sends the rest when the way is free. A
-`Channel` is the way: a websocket
-(`server`) or a notebook's own connection (`notebook`).
+A `Connection` sends the changes of the scene that its page has not received, as fast as the page
+draws. It uses a `Channel`: a websocket (`server`) or the notebook's own connection
+(`notebook_widget`).
 """
 
 from __future__ import annotations
@@ -19,16 +19,18 @@ from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.store import Scene
 
-TIMEOUT = 30.0  # s; a page that takes longer over one frame is let go, and connects again by itself
-# s from frame to frame for a page whose answers wait until a cell has ended
+TIMEOUT = (
+    30.0  # s; a page that takes longer for one frame is disconnected, and reconnects by itself
+)
+# s between frames for a page whose answers are delayed until a cell has ended
 UNANSWERED_INTERVAL = 0.05
 MAX_UNANSWERED = (
     32 << 20
-)  # bytes under way to it: half an hour of a walking robot's frames, or the whole scene many times
+)  # bytes in flight to it: half an hour of a walking robot's frames, or the whole scene many times
 
 
 class Host(Protocol):
-    """What a connection needs of its server."""
+    """What a connection needs from its server."""
 
     scene: Scene
     clients: list[Connection]
@@ -39,14 +41,10 @@ class Host(Protocol):
 
 
 class Channel:
-    """The way to one page.
+    """A way to send frames to one page.
 
-    max_in_flight: frames that may be under way, not yet drawn by the page. min_interval: least time
-        from one frame to
-    the next, s; 0 leaves it
-    to the server. answers_since: time from which on the page's answers arrive; None while they do
-    not, however well it draws. Then frames go at the pace `UNANSWERED_INTERVAL`, as long as those
-    under way hold fewer bytes than `MAX_UNANSWERED`.
+    `max_in_flight` is the number of frames that may be sent but not yet drawn by the page.
+    `min_interval` is the minimum time between two frames [s]; with 0, the server sets the pace.
     """
 
     max_in_flight = 1
@@ -54,40 +52,73 @@ class Channel:
 
     @property
     def answers_since(self) -> float | None:
+        """Time from which the page's answers arrive [s]; None while they are delayed.
+
+        While they are delayed, frames are sent every `UNANSWERED_INTERVAL`, as long as fewer than
+        `MAX_UNANSWERED` bytes are unanswered.
+        """
         return 0.0
 
     def send_frame(self, number: int, data: bytes) -> None:
-        """Send frame `number`, see `protocol.frame`."""
+        """Send a frame.
+
+        Parameters
+        ----------
+        number : int
+            Number of the frame.
+        data : bytes
+            The frame, see `protocol.frame`.
+        """
         raise NotImplementedError
 
     def close_page(self, reason: str) -> None:
-        """Let the page go. It may come back as a new one."""
+        """Disconnect the page. It may connect again as a new one.
+
+        Parameters
+        ----------
+        reason : str
+            Reason for the page.
+        """
         raise NotImplementedError
 
 
 class Connection:
-    """One page. While frames are under way to it, what changes goes into the next one.
+    """The connection to one page.
 
-    sent: number of the newest change of the host's scene that it was sent.
+    Changes that occur while frames are in flight share the next frame. `sent` is the number of the
+    newest change of the host's scene that was sent to the page.
+
+    Parameters
+    ----------
+    host : Host
+        The server.
+    channel : Channel
+        Way to the page.
     """
 
     def __init__(self, host: Host, channel: Channel):
         self.host, self.channel = host, channel
         self.sent = 0
-        self._frames, self._last = 0, 0.0  # how many were sent, and when the last one
+        self._frames, self._last = 0, 0.0  # number of frames sent, and time of the last one
         self._in_flight: deque[tuple[int, float, int]] = (
             deque()
-        )  # number of a frame, when it was sent, bytes
+        )  # number, time and size of each frame
         host.clients.append(self)
 
     def close(self) -> None:
-        """The page has gone."""
+        """Remove the page from its server."""
         if self in self.host.clients:
             self.host.clients.remove(self)
 
     def receive(self, message: str | bytes) -> None:
-        """Deal with what the page says. What no page of ours says is ignored: any program of this
-        machine can connect.
+        """Handle a message from the page.
+
+        Unknown messages are ignored, because any program on this machine can connect.
+
+        Parameters
+        ----------
+        message : str or bytes
+            The message, JSON.
         """
         try:
             answer = json.loads(message)
@@ -101,19 +132,17 @@ class Connection:
             self._control(answer.get("name"), answer.get("value"), str(answer.get("by"))[:40])
 
     def _drawn(self, number: Any) -> None:
-        """The page has drawn the frames up to `number`, or, when it does not say, the oldest under
-        way.
-        """
+        """Note that the page has drawn the frames up to `number`, or the oldest if it is None."""
         if self._in_flight and number is None:
             self._in_flight.popleft()
         while self._in_flight and isinstance(number, int) and self._in_flight[0][0] <= number:
             self._in_flight.popleft()
 
     def _control(self, name: Any, value: Any, page: str) -> None:
-        """Show the new value of a control in every page, and report it to the window."""
+        """Show a control's new value in every page, and report it to the window."""
         try:
             value = self.host.scene.set_control_value(name, value, page)
-        except (ViewerError, UnicodeEncodeError):  # half a character in the page's name
+        except (ViewerError, UnicodeEncodeError):  # an unpaired surrogate in the page's name
             return
         self.host.flush()
         try:
@@ -122,11 +151,17 @@ class Connection:
         except (
             Exception
         ):  # an error in the user's callback is reported, and must not end the connection
-            logging.getLogger("floatbase.viewer").exception("the control %r failed", name)
+            logging.getLogger("floatbase.viewer").exception(
+                "The callback of the control %r failed.", name
+            )
 
     def next_frame(self) -> float:
-        """Send what the page has not seen, if it may be sent now; s after which to try again,
-        infinite for none.
+        """Send the changes that the page has not received, if a frame may be sent now.
+
+        Returns
+        -------
+        float
+            Time after which to try again [s]; infinite if there is no need.
         """
         now = time.monotonic()
         wait = self._wait(now)
@@ -142,7 +177,7 @@ class Connection:
         return math.inf
 
     def _wait(self, now: float) -> float:
-        """How long the next frame must wait, s. It may let the page go."""
+        """Return how long the next frame must wait [s]; disconnect a page that has timed out."""
         if not self._frames:
             return 0.0
         answers_since, rest = (
@@ -154,6 +189,6 @@ class Connection:
             return math.inf if is_full else max(self._last + UNANSWERED_INTERVAL - now, 0.0)
         if self._in_flight and now - max(self._in_flight[0][1], answers_since or 0.0) > TIMEOUT:
             self.close()
-            self.channel.close_page("the page does not read")
+            self.channel.close_page("the page does not respond")
             return math.inf
         return math.inf if len(self._in_flight) >= self.channel.max_in_flight else max(rest, 0.0)

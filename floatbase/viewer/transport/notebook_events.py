@@ -1,4 +1,4 @@
-"""When cells of a notebook run."""
+"""The times at which cells of a notebook run."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import Any
 
 
 class CellEvents:
-    """Whether a cell runs. Outside IPython none ever does.
+    """Whether a notebook cell is running; outside IPython, none ever is.
 
-    is_running: whether one runs now. ended_at: when the last one ended, s of `time.monotonic`.
+    `is_running` tells whether a cell runs now, `ended_at` when the last one ended, in the time of
+    `time.monotonic` [s].
     """
 
     def __init__(self) -> None:
         shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-        self.is_running = shell is not None  # what asks for this is part of a cell
+        self.is_running = shell is not None  # the code that creates this object runs in a cell
         self.ended_at = 0.0
         self._events = None if shell is None else shell.events
         self._hooks = {"pre_run_cell": self._begin, "post_run_cell": self._end}
@@ -25,25 +26,31 @@ class CellEvents:
                 self._events.register(name, hook)
 
     def unregister(self) -> None:
-        """Listen no more."""
+        """Stop listening to the notebook's events."""
         if self._events is not None:
             for name, hook in self._hooks.items():
-                with suppress(ValueError):  # it is registered no more
+                with suppress(ValueError):  # it is no longer registered
                     self._events.unregister(name, hook)
         self.is_running = False
 
     def _begin(self, _: object) -> None:
+        """Note that a cell has started."""
         self.is_running = True
 
     def _end(self, _: object) -> None:
+        """Note that a cell has ended."""
         self.is_running, self.ended_at = False, time.monotonic()
 
 
 def receive_during_cells(widget: Any) -> None:
-    """Let a new widget be heard while a cell runs too, where the notebook asks for it, by a
-    subshell of the kernel.
+    """Let a new widget receive messages while a cell runs, where the notebook uses subshells.
 
-    ipykernel 7.4 gives a page's messages to the thread that opened the widget, and not to the one
-    that the page asks for.
+    ipykernel 7.4 delivers a page's messages to the thread that opened the widget, instead of the
+    thread that the page requests.
+
+    Parameters
+    ----------
+    widget : Widget
+        The new widget.
     """
     getattr(widget.comm, "__dict__", {}).pop("_reply_subshell_id", None)

@@ -1,10 +1,9 @@
-"""The picture in a notebook: a widget whose frames travel over the kernel's own connection, as a
-slider's values do.
+"""The picture in a notebook: a widget whose frames use the kernel's own connection, like sliders.
 
-So it works wherever sliders work, with no port of its own: JupyterLab, Notebook, VS Code, Colab, a
-hub, Voilà. The widget is `anywidget`'s, which brings what each of these needs in one package and
-leaves the rest to us: widget.js, which holds the page in a frame. The page's code is sent once to
-each page of the notebook that asks for it.
+It works wherever sliders work, without a port of its own: JupyterLab, Notebook, VS Code, Colab,
+JupyterHub, Voilà. The base class, `anywidget`'s, contains what each of these needs; our part is
+widget.js, which shows the page in a frame. The page's code is sent once to each page of the
+notebook that requests it.
 """
 
 from __future__ import annotations
@@ -27,20 +26,28 @@ from floatbase.viewer.web import pages
 
 FRAME_INTERVAL = (
     1.0 / 30.0
-    # s from frame to frame: every one is a message of the kernel, of which Jupyter takes 1000 a
-    # second at most
+    # s between frames: each is a message of the kernel, and Jupyter accepts at most 1000 a second
 )
-_MAX_IN_FLIGHT = 2  # frames: so a page far away gets one for each half of the way there and back
-_MAX_PAGES = 50  # of one display; one that is closed without a word is forgotten after them
+_MAX_IN_FLIGHT = 2  # frames: so a distant page gets one per half of the round-trip time
+_MAX_PAGES = 50  # of one display; a page that closed silently is dropped after this many others
 
 
 class NotebookWidget(anywidget.AnyWidget):
     """One display of a window's scene.
 
-    name: what the picture shows, for screen readers. height: pixels. thumbnail: a PNG of the scene
-        as it is when the display opens, for the time until the page has drawn, for places where no
-        page can, and for the time after a newer display has opened; empty for none.
-    is_live: whether this is the newest display. An earlier one shows the thumbnail.
+    `is_live` tells whether this is the newest display. An earlier one shows the thumbnail.
+
+    Parameters
+    ----------
+    server : Server
+        Server of the window.
+    name : str
+        What the picture shows, for screen readers.
+    height : int
+        Height of the picture [pixels].
+    thumbnail : bytes, optional
+        A PNG of the scene when the display opens; empty for none. It is shown until the page has
+        drawn, where no page can draw, and after a newer display has opened.
     """
 
     _esm = pages.asset("widget.js")
@@ -63,8 +70,9 @@ class NotebookWidget(anywidget.AnyWidget):
 
 
 class _OutputPages:
-    """The pages of one widget. `receive` may be called in any thread; all else is done in the
-    server's.
+    """The pages of one widget.
+
+    Any thread may call `receive`; everything else runs in the server's thread.
     """
 
     def __init__(self, widget: NotebookWidget, server: Server):
@@ -76,7 +84,7 @@ class _OutputPages:
         server.on_stop.append(weakref.WeakMethod(self._stop))
 
     def receive(self, _: Any, content: Any, buffers: Any) -> None:
-        """A message of a page, {page, say}; what no page of ours sends is ignored."""
+        """Handle a message {page, say} of a page; ignore anything else."""
         server = self._server()
         if server is None or not server.is_running:
             return self._send_closed()
@@ -98,6 +106,7 @@ class _OutputPages:
     def _handle(
         self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context
     ) -> None:
+        """Handle a message in the server's thread."""
         known = self._pages.get(name)
         if known is not None:
             known.answers_wait, known.context = answers_wait, context
@@ -109,11 +118,12 @@ class _OutputPages:
             if say == "hello":
                 self._connect(server, _WidgetChannel(self, server, name, answers_wait, context))
         elif known is None:
-            channel.close_page("it was let go")
+            channel.close_page("the page was disconnected")
         else:
             known.page.receive(say)
 
     def _connect(self, server: Server, channel: _WidgetChannel) -> None:
+        """Connect a page; drop the oldest ones if there are too many."""
         for name in list(self._pages)[: 1 - _MAX_PAGES]:
             self.drop(name)
         self._pages[channel.name] = channel
@@ -121,12 +131,12 @@ class _OutputPages:
         channel.page.next_frame()
 
     def drop(self, name: str) -> None:
-        """The page has gone."""
+        """Forget a page."""
         if name in self._pages:
             self._pages.pop(name).page.close()
 
     def drop_all(self) -> None:
-        """Send no more frames. Any thread may call this."""
+        """Send no more frames; any thread may call this."""
         if (server := self._server()) is not None:
             server.call(self._drop_all)
 
@@ -137,27 +147,27 @@ class _OutputPages:
             widget.send(content, list(buffers))
 
     def _stop(self) -> None:
-        """The window closes: the pages keep their pictures."""
+        """End the connections because the window closes; the pages keep their pictures."""
         self._drop_all()
         self._send_closed()
 
     def _drop_all(self) -> None:
+        """Forget all pages."""
         for name in list(self._pages):
             self.drop(name)
 
     def _send_closed(self) -> None:
+        """Tell the pages that the viewer is closed."""
         self.send({"closed": True})
 
 
 class _WidgetChannel(Channel):
-    """The way to one page: messages of the widget that name the page, so that no other page takes
-    them.
+    """The way to one page: messages that name the page, so that other pages ignore them.
 
-    answers_wait: whether what the page says is heard only between cells. Where the notebook sends
-        it to a subshell of
-    the kernel, it
-    is heard at once. context: of a message of the page; what is sent in it is an answer, so the
-    page's next words go the same way.
+    `answers_wait` tells whether the page's messages are received only between cells. Where the
+    notebook sends them to a subshell of the kernel, they are received at once. `context` is that of
+    a message from the page; anything sent in it is an answer, so the page's next messages go the
+    same way.
     """
 
     max_in_flight, min_interval = _MAX_IN_FLIGHT, FRAME_INTERVAL
@@ -177,6 +187,7 @@ class _WidgetChannel(Channel):
 
     @property
     def answers_since(self) -> float | None:
+        """Time from which the page's answers arrive [s]; None while a cell delays them."""
         if not self.answers_wait:
             return 0.0
         return None if self._cells.is_running else self._cells.ended_at
@@ -186,16 +197,18 @@ class _WidgetChannel(Channel):
         self.context.run(self._display.send, {**content, "page": self.name}, *buffers)
 
     def send_frame(self, number: int, data: bytes) -> None:
+        """Send a frame to this page."""
         self.send({"frame": number}, data)
 
     def close_page(self, reason: str) -> None:
+        """Disconnect this page."""
         self._display.drop(self.name)
         self.send({"lost": reason})
 
 
 @cache
 def _page_code() -> tuple[str, tuple[bytes, bytes]]:
-    """The name of this page's version, its HTML and the viewer's code, each packed by gzip."""
+    """Return the hash of the page's version, and its HTML and the viewer's code, both gzipped."""
     parts = pages.notebook_page().encode(), pages.viewer_code()
     packed = gzip.compress(parts[0], 9, mtime=0), gzip.compress(parts[1], 9, mtime=0)
     return hashlib.sha256(b"".join(parts)).hexdigest()[:16], packed

@@ -1,6 +1,4 @@
-"""The server of a window: a thread with the connections to all pages, and a web server if one is
-asked for.
-"""
+"""The server of a window: a thread with connections to all pages, and a web server on request."""
 
 from __future__ import annotations
 
@@ -27,10 +25,16 @@ MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest report
 
 
 class Server:
-    """The thread that serves one scene. It has no reference to its `Window`, so a window that
-    nobody refers to can end it.
+    """The thread that serves one scene.
 
-    port: the port that it listens on; None until `listen`: a notebook needs none.
+    It has no reference to its `Window`, so a window without references can be garbage-collected and
+    stop it. `port` is the port that the server listens on; None until `listen`, since a notebook
+    needs none.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene to serve.
     """
 
     def __init__(self, scene: Scene):
@@ -39,12 +43,11 @@ class Server:
         self.cells = CellEvents()
         self.clients: list[Connection] = []
         self.on_control: Callable[[str, Any], None] | None = None
-        # called when the window closes, in the server's thread, as far as their owners still exist
+        # called in the server's thread when the window closes, if their owners still exist
         self.on_stop: list[weakref.WeakMethod[Callable[[], None]]] = []
         self._http: tornado.httpserver.HTTPServer | None = None
         self._loop = asyncio.new_event_loop()
-        # the newest change for which a wake-up was requested, and the newest that a wake-up has
-        # dealt with
+        # newest change for which a wake-up was requested, and newest that a wake-up has handled
         self._requested = self._sent = 0
         self._last_flush = 0.0
         self._timer: asyncio.TimerHandle | None = None
@@ -56,25 +59,36 @@ class Server:
         ready.wait()
 
     def listen(self, sockets: list[socket.socket]) -> None:
-        """Serve the page on these sockets too."""
+        """Serve the page on sockets too.
+
+        Parameters
+        ----------
+        sockets : list of socket
+            Sockets that are bound to the same port.
+        """
         self.port = sockets[0].getsockname()[1]
         self.call(self._listen, sockets)
 
     def notify(self, number: int) -> None:
-        """Have change `number` sent. Any thread may call this; it costs little while a wake-up is
-        under way.
+        """Request that a change be sent; cheap while a wake-up is pending.
+
+        Any thread may call this.
+
+        Parameters
+        ----------
+        number : int
+            Number of the change.
         """
         if not self.clients:
             self.scene.sent_to_all = number
         elif self._requested <= self._sent:
             self.call(self.flush)
-            # after the call: an interrupt between the two causes a second wake-up, not a missing
-            # one
+            # after the call, so an interrupt between them adds a wake-up instead of losing one
             self._requested = number
 
     @property
     def is_running(self) -> bool:
-        """Whether it serves pages still."""
+        """Whether the server still serves pages."""
         return self._thread.is_alive()
 
     def stop(self) -> None:
@@ -85,11 +99,20 @@ class Server:
             self._thread.join(timeout=5.0)
 
     def call(self, function: Callable[..., Any], *args: Any) -> None:
-        """Call a function in the server's thread, where all that concerns pages is done."""
+        """Call a function in the server's thread, where everything about pages happens.
+
+        Parameters
+        ----------
+        function : callable
+            The function.
+        *args
+            Its arguments.
+        """
         with suppress(RuntimeError):  # the loop may have closed since the caller checked
             self._loop.call_soon_threadsafe(function, *args)
 
     def _run(self, ready: threading.Event) -> None:
+        """Run the event loop until it is stopped."""
         asyncio.set_event_loop(self._loop)
         self._loop.call_soon(ready.set)
         try:
@@ -99,10 +122,12 @@ class Server:
             self._loop.close()
 
     def _listen(self, sockets: list[socket.socket]) -> None:
+        """Start the web server."""
         self._http = tornado.httpserver.HTTPServer(_application(self))
         self._http.add_sockets(sockets)
 
     async def _shutdown(self) -> None:
+        """Disconnect the pages, stop the web server and cancel the remaining tasks."""
         if self._http is not None:
             self._http.stop()
         for stop_callback in [stop_callback() for stop_callback in self.on_stop]:
@@ -118,8 +143,14 @@ class Server:
         await asyncio.gather(*rest, return_exceptions=True)
 
     def flush(self, wait: float = 0.0) -> None:
-        """Send a frame after `wait` s, once the last one is `FRAME_INTERVAL` old. Runs in the
-        loop's thread.
+        """Send a frame, at least `FRAME_INTERVAL` after the last one.
+
+        Only the server's thread may call this.
+
+        Parameters
+        ----------
+        wait : float, optional
+            Minimum delay [s].
         """
         when = max(self._last_flush + FRAME_INTERVAL, self._loop.time() + wait)
         if self._timer is not None:
@@ -129,9 +160,7 @@ class Server:
         self._timer = self._loop.call_at(when, self._flush)
 
     def _flush(self) -> None:
-        """Send a frame to every page whose way is free. The others call `flush` when they have
-        drawn theirs.
-        """
+        """Send a frame to every page that can take one; the others call `flush` after drawing."""
         self._timer, self._last_flush = None, self._loop.time()
         self._sent = max(self.scene.newest, self._requested)
         wait = min([client.next_frame() for client in list(self.clients)], default=math.inf)
@@ -143,23 +172,28 @@ class Server:
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Answers only requests to 127.0.0.1 or localhost, so that no foreign page reaches us under a
-    host name of its own.
-    """
+    """Handler that refuses foreign host names; it serves only 127.0.0.1 and localhost."""
 
     def prepare(self) -> None:
+        """Refuse requests to another host name."""
         if self.request.host_name not in ("127.0.0.1", "localhost"):
             raise tornado.web.HTTPError(403)
 
 
 class _Page(_Guarded):
+    """Handler that serves the live page."""
+
     def get(self) -> None:
+        """Send the page."""
         self.set_header("Cache-Control", "no-store")
         self.finish(pages.live_page())
 
 
 class _Code(_Guarded):
+    """Handler that serves meshcat's viewer."""
+
     def get(self) -> None:
+        """Send the code."""
         self.set_header("Content-Type", "text/javascript; charset=utf-8")
         self.finish(pages.viewer_code())
 
@@ -168,31 +202,38 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
     """Websocket to a page. tornado's `check_origin` refuses pages of other servers."""
 
     def initialize(self, server: Server) -> None:
+        """Store the server."""
         self.server = server
 
     def open(self, *_: str, **__: str) -> None:
+        """Connect the page."""
         self.set_nodelay(True)
         self.page = Connection(self.server, self)
         self.page.next_frame()
 
     def on_close(self) -> None:
+        """Disconnect the page."""
         self.page.close()
 
     def on_message(self, message: str | bytes) -> None:
+        """Handle a message of the page."""
         self.page.receive(message)
 
     def send_frame(self, number: int, data: bytes) -> None:
         # when the page has gone, `on_close` cleans up
+        """Send a frame."""
         with suppress(tornado.websocket.WebSocketClosedError):
             self.write_message(data, binary=True).add_done_callback(
                 lambda done: done.cancelled() or done.exception()
             )
 
     def close_page(self, reason: str) -> None:
+        """Close the websocket."""
         self.close(1001, reason)
 
 
 def _application(server: Server) -> tornado.web.Application:
+    """Return the web application: the page, its code and the websocket."""
     return tornado.web.Application(
         [(r"/", _Page), (r"/main\.min\.js", _Code), (r"/socket", _Socket, {"server": server})],
         log_function=lambda handler: None,  # do not print refused requests into the notebook

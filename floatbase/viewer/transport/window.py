@@ -1,8 +1,7 @@
-"""The window: a thread of this process serves meshcat's viewer, to its own notebook and, when
-asked, to this machine.
+"""The window: a thread of this process that serves the page.
 
-meshcat's own server is another process, which listens on all interfaces, outlives the kernel, and
-waits for a browser.
+It serves its own notebook and, on request, this machine. meshcat's own server is a separate
+process, which listens on all interfaces, outlives the kernel, and waits for a browser.
 """
 
 from __future__ import annotations
@@ -29,14 +28,22 @@ ADDRESS = "127.0.0.1"
 class Window:
     """A meshcat window in this process.
 
-    port: the port to listen on, at once; 0, the default, takes a free one when `port` or `web_url`
-        asks for it. So a window that only notebooks show listens nowhere, and no other user
-        of the machine reaches it. Raises `ViewerError` when the port is taken.
-
     Any thread may draw, and an interrupt while it draws does no harm. The window stores the scene:
     a page that opens late receives all of it, and a page that reads slowly receives the newest
-    value of everything. Neither costs more memory. The window closes with `close()`, when nothing
-    refers to it any more, and when Python exits.
+    value of everything. Neither costs more memory. The window closes with `close()`, when there is
+    no reference to it any more, and when Python exits.
+
+    Parameters
+    ----------
+    port : int, optional
+        Port to listen on from the start; 0 takes a free port when `port` or `web_url` is first
+        read. So a window that is only displayed in notebooks opens no port, and no other user of
+        the machine can reach it.
+
+    Raises
+    ------
+    ViewerError
+        If the port is already in use.
     """
 
     def __init__(self, port: int = 0):
@@ -51,8 +58,9 @@ class Window:
 
     @property
     def port(self) -> int:
-        """The port that the window listens on, from now on. Raises `ViewerError` when it is closed
-        and never had one.
+        """Port that the window listens on; reading it opens one.
+
+        It raises `ViewerError` if the window is closed and never had a port.
         """
         with self._opening:
             if self._server.port is None:
@@ -63,7 +71,7 @@ class Window:
 
     @property
     def is_listening(self) -> bool:
-        """Whether the window has a port; to ask for it or for its address opens one."""
+        """Whether the window has a port; reading `port` or `web_url` opens one."""
         return self._server.port is not None
 
     @property
@@ -72,18 +80,36 @@ class Window:
         return f"http://{ADDRESS}:{self.port}/"
 
     def widget(self, name: str, height: int, thumbnail: bytes = b"") -> NotebookWidget:
-        """A display in a notebook, which needs no port. It is live until the next one opens; then
-        it shows its thumbnail.
+        """Make a display for a notebook, which needs no port.
 
-        name: what it shows. height: pixels. thumbnail: a PNG of the same.
-        Raises `ViewerError` without anywidget.
+        It is live until the next display is made; then it shows its thumbnail.
+
+        Parameters
+        ----------
+        name : str
+            What the picture shows.
+        height : int
+            Height of the picture [pixels].
+        thumbnail : bytes, optional
+            A PNG of the picture.
+
+        Returns
+        -------
+        NotebookWidget
+            The display.
+
+        Raises
+        ------
+        ViewerError
+            If anywidget is not installed.
         """
         try:  # loads ipywidgets, which no script needs
             from floatbase.viewer.transport.notebook_widget import NotebookWidget
         except ImportError as error:
             raise ViewerError(
                 f"A viewer in a notebook needs the package {error.name}, which is not installed. "
-                'Install it with: pip install "floatbase[viewer]". The page at `url` needs none.'
+                'Install it with: pip install "floatbase[viewer]". The page at `url` does not need '
+                "it."
             ) from None
         if (before := self._newest_display()) is not None:
             before.retire()
@@ -93,7 +119,7 @@ class Window:
 
     @property
     def n_pages(self) -> int:
-        """How many pages are connected."""
+        """Number of connected pages."""
         return len(self._server.clients)
 
     @property
@@ -102,20 +128,33 @@ class Window:
         return self._finalizer.alive
 
     def put(self, updates: Iterable[protocol.Update]) -> None:
-        """Draw several updates (key and command, see `protocol`) in one frame. Raises `ViewerError`
-        when the window is closed.
+        """Draw several updates in one frame.
+
+        Parameters
+        ----------
+        updates : iterable of Update
+            Keys and commands, see `protocol`.
+
+        Raises
+        ------
+        ViewerError
+            If the window is closed.
         """
         self._check_open("nothing can be drawn")
         self._server.notify(self.scene.put(updates))
 
     def on_control(self, callback: Callable[[str, Any], None] | None) -> None:
-        """Call `callback(name, value)` in the window's thread when a page's control is used."""
+        """Set the function that is called when the reader uses a control.
+
+        Parameters
+        ----------
+        callback : callable or None
+            Called as `callback(name, value)` in the window's thread; None for nothing.
+        """
         self._server.on_control = callback
 
     def close(self) -> None:
-        """Stop serving: the thread ends and the port is free. To close a closed window does
-        nothing.
-        """
+        """Stop serving: end the thread and free the port. Closing a closed window does nothing."""
         self._finalizer()
 
     def __enter__(self) -> Window:
@@ -129,26 +168,26 @@ class Window:
         return f"Window({address}{'open' if self.is_open else 'closed'})"
 
     def _check_open(self, lost: str) -> None:
+        """Raise `ViewerError` if the window is closed."""
         if not self._finalizer.alive:
-            raise ViewerError(f"the viewer window is closed, so {lost}; open a new one.")
+            raise ViewerError(f"The viewer's window is closed, so {lost}. Open a new one.")
 
 
 def _checked_port(port: int) -> int:
-    """The number of a port, 0 for any. Raises `ViewerError` when it is none."""
+    """Return a port number, 0 for any; raise `ViewerError` if it is invalid."""
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
         raise ViewerError(
-            f"port is {port!r}; it must be a whole number from 0 (a free one) to 65535."
+            f"port is {port!r}; it must be a whole number from 0 (any free port) to 65535."
         )
     return port
 
 
 def _bound_sockets(port: int) -> list[socket.socket]:
-    """Sockets listening on the loopback address. Raises `ViewerError` for a port in use."""
+    """Return sockets that listen on the loopback address; raise `ViewerError` if it fails."""
     try:
         return tornado.netutil.bind_sockets(port, ADDRESS, family=socket.AF_INET)
     except OSError as error:
         raise ViewerError(
-            f"port {port} of {ADDRESS} cannot be used ({error.strerror}). Close what listens "
-            f"there, choose another port, "
-            "or leave the port out to get a free one."
+            f"Cannot listen on port {port} of {ADDRESS} ({error.strerror}). Stop the program that "
+            "uses it, choose another port, or leave the port out to get a free one."
         ) from None

@@ -1,9 +1,9 @@
-"""The page in its four modes, put together from the built files in `dist`.
+"""The page in its four modes, assembled from the built files in `dist`.
 
-The live page and that in a notebook follow a window. The file contains a scene and needs no server.
-The page in a frame shows the scenes that a page around it gives it, one after the other. All load
-meshcat's viewer and draw the same frames (see `protocol.frame`). `make web` builds `dist` from
-`src`, where page.js says more about the modes.
+The live page and the notebook page follow a window. The file page contains a scene and needs no
+server. The embedded page shows scenes that the surrounding page gives it, one after the other. All
+load meshcat's viewer and draw the same frames (see `protocol.frame`). `make web` builds `dist` from
+`src`; page.js describes the modes.
 """
 
 from __future__ import annotations
@@ -25,20 +25,42 @@ DIST = Path(__file__).with_name("dist")
 
 @cache
 def viewer_code() -> bytes:
-    """meshcat's viewer, one JavaScript file; vendor/README.md says where it comes from."""
+    """Return meshcat's viewer, one JavaScript file; vendor/README.md documents its origin.
+
+    Returns
+    -------
+    bytes
+        The code.
+    """
     return Path(__file__).with_name("vendor").joinpath("meshcat.min.js").read_bytes()
 
 
 @cache
 def live_page() -> str:
-    """The page that a window serves."""
+    """Return the page that a window serves.
+
+    Returns
+    -------
+    str
+        HTML of the page.
+    """
     return _page("live", '<script src="main.min.js"></script>')
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
-    """A page that contains the viewer (0.3 MB) and a scene, and needs neither server nor network.
+    """Return a page with the viewer (0.3 MB) and a scene, which needs neither server nor network.
 
-    commands: of the scene, as `Scene.file_commands` gives them.
+    Parameters
+    ----------
+    commands : iterable of bytes
+        Commands of the scene, as `Scene.file_commands` returns them.
+    title : str, optional
+        Title of the page.
+
+    Returns
+    -------
+    str
+        HTML of the page.
     """
     scene = _embedded_data("scene", protocol.frame(commands))
     return _page("file", _embedded_viewer_code() + scene, title)
@@ -46,37 +68,64 @@ def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
 
 @cache
 def embedded_page(code: str) -> str:
-    """A page for a frame inside another page, which gives it scenes. code: address of meshcat's
-    viewer.
+    """Return a page for a frame inside another page, which gives it scenes.
+
+    Parameters
+    ----------
+    code : str
+        Address of meshcat's viewer.
+
+    Returns
+    -------
+    str
+        HTML of the page.
     """
     return _page("frame", f'<script src="{html.escape(code)}"></script>')
 
 
 @cache
 def notebook_page() -> str:
-    """A page for a frame in a notebook, which gives it meshcat and a port to the kernel."""
+    """Return a page for a frame in a notebook, which gives it meshcat and a port to the kernel.
+
+    Returns
+    -------
+    str
+        HTML of the page.
+    """
     return _page("notebook")
 
 
 @cache
 def asset(name: str) -> str:
-    """The text of a built file."""
+    """Return the text of a built file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file in `dist`.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     return (DIST / name).read_text(encoding="utf-8")
 
 
 @cache
 def _embedded_viewer_code() -> str:
+    """Return meshcat's viewer as a script element."""
     return _embedded_data("viewer-code", viewer_code())
 
 
 def _embedded_data(name: str, data: bytes) -> str:
-    """Data as a script element with the id `name`: gzip in base64, as loader.js unpacks it."""
+    """Return data as a script element: gzip in base64, as loader.js unpacks it."""
     packed = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="text/plain" id="{name}">{packed}</script>'
 
 
 def _page(mode: str, data: str = "", title: str = "floatbase") -> str:
-    """The page in one of its modes. data: script elements that come before its own."""
+    """Return the page in one of its modes, with script elements `data` before its own."""
     config = {
         "mode": mode,
         "backgrounds": {name: [*map(hex_code, colours)] for name, colours in BACKGROUNDS.items()},

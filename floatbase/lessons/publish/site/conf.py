@@ -34,6 +34,7 @@ autosummary_generate = False  # `reference` writes the pages
 napoleon_google_docstring = False
 napoleon_use_param = False  # a shape such as (nv,) in a type is no link
 napoleon_use_rtype = False
+napoleon_use_ivar = True
 default_role = "py:obj"  # `name` in a docstring links to that name
 python_use_unqualified_type_names = True
 maximum_signature_line_length = 90
@@ -48,6 +49,7 @@ myst_heading_anchors = 4
 suppress_warnings = [
     "myst.header",  # a lesson may begin a part with a small heading
     "ref.citation",  # not every reference is cited by a docstring
+    "ref.python",  # the d of a type "shape (d,)" has the name of several attributes
 ]
 
 html_context = {"default_mode": "auto"}

@@ -1,19 +1,19 @@
-// The camera: it follows a node over the ground and fits the picture into what is left of the
-// window. meshcat's own camera node cannot move the point that the mouse turns around.
+// The camera: it follows a node above the ground and fits the picture into the free part of the
+// window. meshcat's own camera node cannot move the point around which the mouse turns.
 
 import {element} from "./dom.js";
 import {beforeRender, findNode, pathNames, three} from "./meshcat.js";
 
-const LAG = 0.3; // s by which it is behind what it follows, so that it does not shake with a step
-const SLOWEST = 1000; // ms between pictures that count: with few of them it must not fall behind
-const WIDE = 1.2; // width over height of a picture that fits a robot; a narrower one is smaller
+const LAG = 0.3; // s, delay behind what it follows, so that it does not shake with each step
+const SLOWEST = 1000; // ms, longest time between pictures that counts: at low rates it must keep up
+const WIDE = 1.2; // width / height of a picture that fits a robot; a narrower picture is zoomed out
 const MIN_ZOOM = 0.2; // in the smallest window
 const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
 const LOW_JUMP = 0.2; // m: the camera stays down if the robot rises by less, however low it stands
-const REST = 1e-3; // m: closer than this it has arrived
+const REST = 1e-3; // m: closer than this, it has arrived
 const COMPANIONS = [
   ["meshcat", "scale"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"],
-]; // nodes that go along with it
+]; // nodes that move with it
 
 // m: height of the ground under or over a point {x, z}, y up. planes: normal and offset, n·p = d.
 export function groundHeight(planes, {x, z}) {
@@ -22,19 +22,19 @@ export function groundHeight(planes, {x, z}) {
   );
 }
 
-// m: how far the camera rises with what it follows, which began at `before` over the ground and is
-// at `now`. It ignores steps and jumps up to twice the first height, and then catches up.
+// m: how far the camera rises with an object that was at `before` above the ground and is at `now`.
+// It ignores steps and jumps up to twice the first height, and then catches up.
 export function liftOf(before, now) {
   const rise = now - before, ignored = Math.max(before, LOW_JUMP);
   return Math.max(0, Math.min(rise, 2 * (rise - ignored)));
 }
 
-// The fraction of what remains that the camera goes in `elapsed` ms.
+// The fraction of the remaining distance that the camera moves in `elapsed` ms.
 export function followFraction(elapsed) {
   return 1 - Math.exp(-Math.min(elapsed, SLOWEST) / 1000 / LAG);
 }
 
-// The zoom of a picture of width × height pixels of which a panel takes some.
+// The zoom of a picture of width × height pixels, part of which a panel covers.
 export function zoomFor({width, height, panelWidth, panelHeight}) {
   const fits = Math.min(
     1, (width - panelWidth) / height / WIDE, (height - panelHeight) / height,
@@ -44,10 +44,10 @@ export function zoomFor({width, height, panelWidth, panelHeight}) {
 
 export const labelScale = (zoom) => Math.min(1 / zoom, MAX_LABEL_SCALE);
 
-// panel: its width() and height() are pixels that it takes from the picture.
+// panel: its width() and height() are the pixels that it takes from the picture.
 export function createCamera(viewer, panel) {
   const {Vector3} = three();
-  // how far the camera has gone with what it follows; where the scale and the lights began
+  // how far the camera has moved with what it follows; initial position of the scale and the lights
   const gone = new Vector3(), begin = new Vector3(), from = new Vector3();
   let path = [], planes = [{normal: [0, 1, 0], offset: 0}], clock = 0;
   let isSmooth = false, isFirst = true;
@@ -59,13 +59,13 @@ export function createCamera(viewer, panel) {
     return (element("player").offsetHeight + panel.height() - board) / 2;
   };
 
-  // Go with what is followed, at one height over the ground unless it flies away. Returns whether
-  // it is on its way.
+  // Follow at a constant height above the ground, and rise with an object that flies away. Returns
+  // whether the camera is still moving.
   function follow() {
     const now = performance.now();
     const fraction = isSmooth && !isFirst ? followFraction(now - clock) : 1;
     clock = now;
-    // searched each time, because another picture has another object there, or none
+    // searched each time, because another picture may have another object there, or none
     const found = findNode(viewer, path);
     if (!found) return false;
     const at = found.object.getWorldPosition(new Vector3());

@@ -1,4 +1,4 @@
-// The arithmetic of light and dark. Colours are numbers, 0xrrggbb, or codes, "#rrggbb".
+// Arithmetic for light and dark themes. Colours are numbers, 0xrrggbb, or codes, "#rrggbb".
 
 export const toNumber = (code) => parseInt(code.slice(1), 16);
 export const toCode = (number) => `#${number.toString(16).padStart(6, "0")}`;
@@ -13,7 +13,7 @@ export function darkShades({backgrounds, shades}, name) {
   return new Map([...Object.entries(shades), ...own].map((pair) => pair.map(toNumber)));
 }
 
-// Whether a colour as styles give it, rgb(255, 255, 255) or color(srgb 1 1 1), is a light one.
+// Whether a CSS colour, such as rgb(255, 255, 255) or color(srgb 1 1 1), is light.
 export function isLight(style) {
   const full = style.startsWith("color(") ? 1 : 255;
   const [red, green, blue] = style.match(/[\d.]+/g).map(Number);

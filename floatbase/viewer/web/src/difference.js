@@ -1,11 +1,11 @@
-// A scene of the site is a map from number of key to number of command; keys are [path, type]. What
-// a slider shows was computed before: a sample is a list of what differs from the first scene.
+// A scene of the site is a map from number of key to number of command; keys are [path, type].
+// Slider samples are precomputed: each is a list of the differences from the first scene.
 
 const GONE = -1;
 // of the commands of a difference; others, such as the camera, come between
 const ORDER = {set_object: 1, set_transform: 2, set_property: 3, set_animation: 5};
 
-// A scene with changes [key, command, key, command, …] put over it.
+// A scene with changes [key, command, key, command, …] applied to it.
 export function over(scene, changes) {
   const made = new Map(scene);
   for (let i = 0; i < changes.length; i += 2) {
@@ -16,8 +16,8 @@ export function over(scene, changes) {
 }
 
 // What leads from one scene to another: whether an animation ends, the paths that are deleted, and
-// which commands follow, in order. An item whose colour no command can take back, or whose shape is
-// another, is drawn anew.
+// which commands follow, in order. An item whose colour cannot be reset by a command, or whose
+// shape changes, is drawn again.
 export function difference(now, goal, keys) {
   const inPicture = (key) => keys[key][0].startsWith("/meshcat/");
   const animation = (scene) => [...scene].find(([key]) => keys[key][1] === "set_animation")?.[1];

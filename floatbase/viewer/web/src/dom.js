@@ -1,4 +1,4 @@
-// Short names for what every part of the page does with its document.
+// Short helpers for the document that every part of the page uses.
 
 export const element = (id) => document.getElementById(id);
 
@@ -9,7 +9,7 @@ export function make(tag, properties = {}, ...children) {
   return made;
 }
 
-// Show a text in the middle of the page, in place of a picture or over it.
+// Show a text in the middle of the page, instead of a picture or over it.
 export function showNotice(text) {
   element("notice").textContent = text;
   element("notice").style.display = "block";

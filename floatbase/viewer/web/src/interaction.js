@@ -1,5 +1,5 @@
-// Scrolling, keyboard and view controls: the picture leaves the wheel and the finger to the page
-// around it, has a way back to its first view, and shows or hides its parts.
+// Scrolling, keyboard and view controls: the wheel and touch gestures scroll the page around the
+// picture, a button returns to the initial view, and parts can be shown or hidden.
 
 import {element, make} from "./dom.js";
 import {beforeRender, three} from "./meshcat.js";
@@ -24,8 +24,8 @@ const KEYS = new Map(Object.entries({
 // What a key does, undefined for nothing: turn or approach {orbit}, show a {view}, or {play}.
 export const actionOf = (key) => KEYS.get(key);
 
-// Who has the wheel in a frame: the page around scrolls, until the reader clicks into the picture
-// with a mouse. Escape, or leaving the picture, gives the wheel back.
+// Whether the wheel acts on the picture: it scrolls the page around the frame until the reader
+// clicks into the picture with a mouse. Escape, or leaving the picture, returns it to the page.
 export function createWheelOwner() {
   let isEntered = false;
   return {
@@ -67,7 +67,7 @@ export function createInteraction(viewer, camera) {
     };
     menu.append(make("label", {}, box, name));
   }
-  beforeRender(viewer, () => { // a part that is hidden may come and go in a recording
+  beforeRender(viewer, () => { // a hidden part may appear and disappear in a recording
     for (const [name, shown] of isShown) if (!shown) setVisible(name, false);
   });
 

@@ -1,5 +1,5 @@
-// The legend, at the lower left. Where it would cover what the camera looks at, it is folded into a
-// button: pointing at it or reaching it by the keyboard opens it, a click keeps it open, Escape
+// The legend, at the lower left. If it would cover what the camera looks at, it is collapsed into a
+// button: pointing at it or focusing it with the keyboard opens it, a click keeps it open, Escape
 // closes it.
 
 import {element, make} from "./dom.js";
@@ -36,7 +36,7 @@ export function createLegend(camera, shade) {
   };
   const keep = (now) => { open(isKept = now); };
   function fold() {
-    legend.classList.remove("folded"); // to measure it as it is when open
+    legend.classList.remove("folded"); // to measure its open size
     const player = box("player").width > 0 ? box("player") : null;
     const crowded = isCrowded({
       lines: box("lines"), player, titleBottom: box("title").bottom,

@@ -1,10 +1,10 @@
-// Packed data and frames of commands: what every page and the notebook's widget must open.
+// Packed data and frames of commands, which every page and the notebook's widget must read.
 
 import {TOO_OLD} from "./messages.js";
 
 export const canUnpack = () => "DecompressionStream" in globalThis;
 
-// The bytes that gzip has packed, as an ArrayBuffer. packed: a Uint8Array, or its base64 text.
+// Unpack gzipped bytes into an ArrayBuffer. packed: a Uint8Array, or its base64 text.
 export async function unpack(packed) {
   if (!canUnpack()) throw new Error(TOO_OLD);
   const data = typeof packed === "string"
@@ -16,8 +16,8 @@ export async function unpack(packed) {
 
 export const unpackText = async (packed) => new TextDecoder().decode(await unpack(packed));
 
-// The commands of a frame (an ArrayBuffer), each as a Uint8Array. In the frame its length in bytes
-// is before it, as a little-endian uint32.
+// The commands of a frame (an ArrayBuffer), each as a Uint8Array. In the frame, each command is
+// preceded by its length in bytes, as a little-endian uint32.
 export function splitFrame(frame) {
   const view = new DataView(frame), commands = [];
   for (let at = 0; at < frame.byteLength;) {

@@ -1,5 +1,5 @@
-// meshcat's viewer, and all that we change in it. MeshCat is the one global name: its script is
-// loaded before a viewer is made, in the pages in different ways.
+// meshcat's viewer, and all our changes to it. MeshCat is the only global name: its script is
+// loaded before a viewer is made, in a different way in each page.
 
 /* global MeshCat */
 
@@ -7,7 +7,7 @@ export const three = () => MeshCat.THREE;
 
 export const pathNames = (path) => path.split("/").filter((name) => name);
 
-// Run meshcat's script, where the page does not load it by itself.
+// Run meshcat's script if the page does not load it itself.
 export function runMeshcat(code) {
   const script = document.createElement("script");
   script.textContent = code;
@@ -15,13 +15,13 @@ export function runMeshcat(code) {
   detachGifWorker();
 }
 
-// Why: the script contains a worker of gif.js. Where it is not run as a worker, it takes the page's
-// own `onmessage` and answers every message to the page with another one to itself.
+// Why: the script contains a worker of gif.js. If it does not run as a worker, it replaces the
+// page's own `onmessage` and answers every message to the page with another one to itself.
 export function detachGifWorker() {
   window.onmessage = null;
 }
 
-// meshcat's viewer in an element. Throws where the browser has no WebGL.
+// meshcat's viewer in an element. Throws an error if the browser has no WebGL.
 export function createViewer(pane) {
   const viewer = new MeshCat.Viewer(pane);
   // meshcat lists all objects there; the page has a panel and a menu of its own
@@ -29,7 +29,7 @@ export function createViewer(pane) {
   return viewer;
 }
 
-// Call hook() before each picture is drawn; where it returns true, another picture follows.
+// Call hook() before each picture is drawn; if it returns true, another picture follows.
 // Why: meshcat announces no picture, and a camera that follows must move before it is used.
 export function beforeRender(viewer, hook) {
   const render = viewer.render.bind(viewer);
@@ -40,9 +40,9 @@ export function beforeRender(viewer, hook) {
   };
 }
 
-// Have commands done by our own handlers, type -> function(command, meshcat's function), and the
-// others by meshcat. after(command, made) is called after each; made: the object that it has made.
-// Why: meshcat ignores types that it does not know, and a theme repaints what a command makes.
+// Execute commands with our own handlers, type -> function(command, meshcat's function), and the
+// others with meshcat. after(command, made) is called after each; made: the object it has made.
+// Why: meshcat ignores types that it does not know, and a theme recolours what a command makes.
 export function interceptCommands(viewer, handlers, after) {
   const meshcat = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {

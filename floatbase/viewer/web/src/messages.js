@@ -1,9 +1,10 @@
-// What the pages and the notebook's widget say in place of a picture.
+// Messages that the pages and the notebook's widget show instead of a picture.
 
-export const CLOSED = "The viewer is closed, or its kernel was restarted: run its cell again.";
+export const CLOSED =
+  "The viewer was closed or its kernel was restarted. To show it again, run its cell again.";
 
 export const RETIRED =
-  "This viewer is live in a newer output. Run this cell again to have it here.";
+  "This viewer is live in a newer output. Run this cell again to show it here.";
 
 export const NO_WEBGL =
   "This 3-D picture needs WebGL, which this browser does not have or has switched off. Switch on " +
@@ -11,7 +12,7 @@ export const NO_WEBGL =
   "browser.";
 
 export const TOO_OLD =
-  "This browser is too old to open the 3-D picture. Open it in a current one: Chrome or Edge " +
-  "from 92, Firefox from 113, Safari from 16.4.";
+  "This browser is too old to open the 3-D picture. Use Chrome or Edge 92, Firefox 113, " +
+  "Safari 16.4, or a newer version.";
 
-export const WAITING = "The 3-D picture comes here. Where it does not, run its cell.";
+export const WAITING = "The 3-D picture appears here. If it does not, run its cell.";

@@ -1,6 +1,6 @@
 // floatbase's page, `floatbase.open(config)`. Its modes differ in where frames come from:
-// "live" follows a window, "notebook" a kernel by way of the page around it, "file" holds one
-// scene, and "frame" shows the scenes that a page around it gives it.
+// "live" follows a window, "notebook" follows a kernel through the page around it, "file" contains
+// one scene, and "frame" shows the scenes that the page around it sends.
 
 import {element, showNotice} from "./dom.js";
 import {canUnpack, unpack, unpackText} from "./loader.js";
@@ -19,8 +19,9 @@ export function open(config) {
 
 // The live page. When the window closes, it waits for one at the same address.
 function live(config) {
-  if (!window.MeshCat) return comeBack(); // the window has closed while the page was loading
-  element("notice").textContent = `${CLOSED} A page with the same address comes back by itself.`;
+  if (!window.MeshCat) return comeBack(); // the window was closed while the page was loading
+  element("notice").textContent =
+    `${CLOSED} This page reconnects when a viewer opens at the same address.`;
   startWhenSeen(config, (scene) => {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/socket`);
@@ -64,14 +65,14 @@ function notebook(config) {
     };
     startWhenSeen(config, (scene) => {
       receive = receiver(scene, (text) => port.postMessage(text));
-      window.receiveMessage = receive; // which the widget calls where it may; see widget.js
+      window.receiveMessage = receive; // the widget calls it if it may; see widget.js
       port.postMessage("hello");
     });
   });
   parent.postMessage({ready: true}, "*");
 }
 
-// The file: it contains meshcat's code and the scene, packed.
+// The file page: it contains meshcat's code and the scene, packed.
 async function file(config) {
   if (!canUnpack()) return showNotice(TOO_OLD);
   runMeshcat(await unpackText(element("viewer-code").textContent));
@@ -79,13 +80,13 @@ async function file(config) {
   startWhenSeen(config, (scene) => show(scene, frame));
 }
 
-// The page in a frame of the site: it says that it is ready. The page around it says whether it is
-// near the window, {seen}, and what is to change in the picture, see `change`.
+// The page in a frame of the site: it reports that it is ready. The page around it reports whether
+// the frame is near the visible area, {seen}, and what to change in the picture, see `change`.
 function frame(config) {
   let setNear = null, scene = null;
   const waiting = [];
   window.addEventListener("message", ({data, origin}) => {
-    // a page of another site has this one in a frame
+    // a page of another site contains this page in a frame
     if (location.protocol !== "file:" && origin !== self.origin) return;
     if ("seen" in data) setNear(data.seen);
     else if (scene === null) waiting.push(data);
@@ -98,7 +99,7 @@ function frame(config) {
   parent.postMessage({ready: true}, "*");
 }
 
-// ended: whether an animation is over. gone: paths of what is no more. frame: commands.
+// ended: whether an animation has ended. gone: paths of removed items. frame: commands.
 function change(scene, {ended, gone, frame: commands}) {
   if (ended) {
     scene.handle({type: "set_animation", path: "", animations: [], options: {play: false}});

@@ -8,11 +8,11 @@ import {createPlot} from "./plot.js";
 const COLUMNS = ["", "model", "reality"];
 const COPIED_FOR = 2000; // ms
 
-// report(message): sends a message to the window. redraw(): has the picture drawn again.
+// report(message): sends a message to the window. redraw(): redraws the picture.
 export function createPanel({report: send, redraw}) {
   const {report, isNews} = createReports(send);
   const root = element("panel"), foldButton = element("fold"), sections = new Map();
-  const controls = Object.create(null); // in it no name has a meaning, not even "constructor"
+  const controls = Object.create(null); // without predefined names, not even "constructor"
   foldButton.onclick = () => {
     const closed = document.body.classList.toggle("folded-panel");
     foldButton.setAttribute("aria-expanded", !closed);
@@ -118,8 +118,8 @@ export function createPanel({report: send, redraw}) {
     return {getValue: () => press, show() {}, fire: () => made.click()};
   }
 
-  // A term of an equation over the picture: its symbol shows its arrows, the two boxes switch it
-  // off in belief and world.
+  // A term of an equation, above the picture: its symbol shows its arrows, the two boxes switch it
+  // off in the controller's model and in the simulated world.
   function toggle({name, value: first, term, part}) {
     const board = element("board");
     let cell = [...board.children].find(({dataset}) => dataset.term === term);
@@ -151,11 +151,11 @@ export function createPanel({report: send, redraw}) {
 
   return {
     controls,
-    // pixels that it takes of the picture: on a phone it lies below, else at the right
+    // pixels that it takes from the picture: on a phone it is below, else at the right
     width: () => isBelow() ? 0 : root.offsetWidth,
     height: () => isBelow() ? root.offsetHeight : 0,
     addControl(command) {
-      const old = controls[command.name]; // there when a cell is run again
+      const old = controls[command.name]; // exists when a cell is run again
       if (!old) controls[command.name] = kinds[kindOf(command)](command);
       else if (old.remake) old.remake(command);
       else old.show(command.value);
@@ -188,7 +188,7 @@ function copyButton(source) {
     try {
       await navigator.clipboard.writeText(source.textContent);
       made.textContent = "copied";
-    } catch { // a page in a frame may not write: select it, for Ctrl-C
+    } catch { // a page in a frame may not write to the clipboard: select the text, for Ctrl-C
       getSelection().selectAllChildren(source);
       made.textContent = "selected: press Ctrl-C";
     }

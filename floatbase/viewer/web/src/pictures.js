@@ -12,7 +12,7 @@ const NEAR = "900px 0px", SEEN = "150px 0px"; // around the window: load, and dr
 const files = new Map(); // name -> {parts, take}
 
 // The parts of a file, loaded once for all pictures. Files are scripts that call
-// `floatbasePictures.take`: a browser loads these where there is no server, too.
+// `floatbasePictures.take`: a browser can load these without a server, too.
 function load(name) {
   if (!files.has(name)) {
     const file = {};
@@ -34,8 +34,8 @@ async function contents(name) {
   return {...head, commands: head.at.map((number) => all[number])};
 }
 
-// One picture in its frame. show(scene) may be called at any time; what was not drawn yet is left
-// out.
+// One picture in its frame. show(scene) may be called at any time; scenes that were not drawn yet
+// are skipped.
 function startScene(place, {keys, commands}) {
   const frame = make("iframe", {title: place.querySelector("img").alt});
   let isReady = false, now = new Map(), goal = null, isSeen = true;

@@ -6,7 +6,7 @@ export function createPlayer(viewer) {
   const bar = element("player"), button = bar.querySelector("button");
   const slider = bar.querySelector("input"), speed = bar.querySelector("select");
   const clock = bar.querySelector("output");
-  const animator = () => viewer.animator; // another one after each animation
+  const animator = () => viewer.animator; // replaced with each animation
   let isTicking = false;
   function tick() {
     isTicking = bar.style.display !== "none";
@@ -37,7 +37,7 @@ export function createPlayer(viewer) {
       animator().mixer.timeScale = options.speed;
       if (options.paused || prefersReducedMotion()) {
         animator().pause();
-        animator().seek(0); // the first picture; before this, items that come later are seen, too
+        animator().seek(0); // the first picture; until then, items that appear later are visible
       }
       if (!isTicking) tick();
     },

@@ -1,11 +1,11 @@
-// The last seconds of a number, as a line in the panel.
+// A plot of a quantity over the last seconds, in the panel.
 
 import {make} from "./dom.js";
 
 const HISTORY = 8; // s
 const MARGIN = 4; // pixels above and below the line
 
-// The points [t, value] after another one. Time that goes back begins anew.
+// The points [t, value] with another one added. If time goes back, the plot starts again.
 export function withPoint(points, t, value) {
   const before = points.length && t < points.at(-1)[0] ? [] : points;
   return [...before, [t, value]].filter(([when]) => when > t - HISTORY);
@@ -16,7 +16,7 @@ const peakOf = (points) => Math.max(...points.map(([, value]) => value));
 
 export function plotText({name, value, unit}, points) {
   const peak = rounded(peakOf(points));
-  return `${name}: ${rounded(value)} ${unit} (up to ${peak} in ${HISTORY} s)`;
+  return `${name}: ${rounded(value)} ${unit} (at most ${peak} in the last ${HISTORY} s)`;
 }
 
 // The line through points in a picture of w × h pixels: the last point at its right edge.

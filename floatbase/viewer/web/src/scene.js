@@ -1,5 +1,4 @@
-// The scene of a page: meshcat's viewer with our commands. It draws the frames that it is given,
-// wherever they come from.
+// The scene of a page: meshcat's viewer with our commands. It draws frames from any source.
 
 import {createAddress} from "./address.js";
 import {createCamera} from "./camera.js";
@@ -13,8 +12,8 @@ import {createPanel} from "./panel.js";
 import {createPlayer} from "./player.js";
 import {createTheme} from "./theme.js";
 
-// config: {mode, backgrounds, shades}, see page.js and theme.js. Throws where the browser has no
-// WebGL.
+// config: {mode, backgrounds, shades}, see page.js and theme.js. Throws an error if the browser has
+// no WebGL.
 export function createScene(config) {
   const viewer = createViewer(element("meshcat-pane"));
   let send = () => {};
@@ -67,10 +66,10 @@ export function createScene(config) {
     if (made) camera.scaleLabels(made);
     theme.afterCommand(command, made);
   });
-  viewer.gui_controllers = panel.controls; // where whoever drives the page from outside finds them
+  viewer.gui_controllers = panel.controls; // for programs that control the page from outside
   return {
     viewer,
-    // Draw a frame. A command that fails is reported; the others are still done.
+    // Draw a frame. A command that fails is reported; the others are still executed.
     apply(frame) {
       for (const command of splitFrame(frame)) {
         try {
@@ -85,7 +84,7 @@ export function createScene(config) {
     fit: () => viewer.set_3d_pane_size(),
     // a PNG as a data URL
     capture: () => viewer.capture_image(),
-    // Where what the reader does is sent: call(message), an object.
+    // Set the function that receives the reader's actions: call(message), an object.
     onMessage(call) { send = call; },
   };
 }

@@ -1,11 +1,11 @@
-// The frames between a kernel and a page: each has the number after the one before it.
+// The frames between a kernel and a page, which are numbered consecutively.
 
-// What a widget knows of the page in its frame. It begins as lost, until the page says hello.
+// What a widget knows about the page in its frame. The page counts as lost until it says hello.
 export function createSequence() {
   let received = 0, drawn = 0, isLost = true;
   return {
     isLost: () => isLost,
-    // The page has loaded, or will be loaded anew: what still comes is an earlier page's.
+    // The page has loaded, or will be reloaded: frames that still arrive belong to an earlier page.
     lose() { isLost = true; },
     begin() {
       received = drawn = 0;
@@ -13,8 +13,8 @@ export function createSequence() {
     },
     // The number of the frame that the page has drawn now.
     nextDrawn: () => ++drawn,
-    // What to do with a frame of this number: "draw"; "skip", where it is of an earlier connection;
-    // or "reload", where one got lost, so that all it said must come again.
+    // What to do with a frame of this number: "draw"; "skip" if it is from an earlier connection;
+    // or "reload" if a frame was lost, so that its content must be sent again.
     receive(number) {
       if (isLost) return "skip";
       if (number !== received + 1) return received ? "reload" : "skip";

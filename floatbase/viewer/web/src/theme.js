@@ -1,17 +1,17 @@
-// Light or dark. A picture that was made for "white" or "light" is dark where the page around it
-// is, or the browser. The configuration has the backgrounds, and the shades that a dark one needs.
+// Light or dark. A picture that was made for "white" or "light" is dark if the page around it or
+// the browser is dark. The configuration has the backgrounds, and the shades for a dark one.
 
 import {
   copyGreys, darkShades, hasDarkLetters, isLight, toChannels, toCode, toNumber,
 } from "./colours.js";
 
-const GLOW = 0x181b1f; // that robots have of their own in the dark; black parts would not be seen
+const GLOW = 0x181b1f; // emitted by robots in the dark; black parts would be invisible otherwise
 const WHITE = 0xffffff; // of materials that take their colours from elsewhere
-const RETRY = 400; // ms after the page around has changed: its style may come later than its mark
+const RETRY = 400; // ms after the page around has changed: its style may follow its attributes
 const DARK_BROWSER = "(prefers-color-scheme: dark)";
 
-// Whether the words around this page's frame are lighter than its paper; of a page on its own,
-// what the browser prefers.
+// Whether the text around this page's frame is light; without a frame, whether the browser prefers
+// dark.
 function isDarkAround() {
   const around = window.frameElement?.parentElement;
   return around ? isLight(getComputedStyle(around).color) : matchMedia(DARK_BROWSER).matches;
@@ -28,7 +28,7 @@ function watchAround(look) {
   for (const node of [around.documentElement, around.body]) {
     observer.observe(node, {attributes: true});
   }
-  // else the page around keeps the whole of a frame that it has removed
+  // otherwise the page around keeps a removed frame in memory
   window.addEventListener("pagehide", () => observer.disconnect());
 }
 

@@ -1,5 +1,5 @@
 // When a page draws. A browser has 16 WebGL contexts for all its pages, so a page in a frame starts
-// when it is first seen. While it is out of sight it returns its context and shows an image.
+// when it is first visible. While it is out of sight, it releases its context and shows an image.
 
 import {element, showNotice} from "./dom.js";
 import {NO_WEBGL} from "./messages.js";
@@ -8,15 +8,15 @@ import {createScene} from "./scene.js";
 const REST_AFTER = 1000; // ms out of sight
 const UNSEEN = 500; // ms; a picture that is never scrolled to is not drawn at all
 
-// changed(isSeen) is called at first and whenever the page comes into sight or leaves it.
+// changed(isSeen) is called initially and whenever the page enters or leaves the visible area.
 function watchSight(changed) {
   if (window.top === window) return changed(true);
   const observer = new IntersectionObserver((entries) => changed(entries.at(-1).isIntersecting));
   observer.observe(document.documentElement);
 }
 
-// Call start(scene) once, when the page is first seen, and manage its context from then on.
-// watch: what reports whether it is seen, as `watchSight` does.
+// Call start(scene) once, when the page is first visible, and manage its context from then on.
+// watch: function that reports whether the page is visible, as `watchSight` does.
 export function startWhenSeen(config, start, watch = watchSight) {
   let rest = null, isBlind = false;
   watch((isSeen) => {
@@ -24,7 +24,7 @@ export function startWhenSeen(config, start, watch = watchSight) {
       const scene = sceneOrNotice(config);
       isBlind = scene === null;
       if (isBlind) return;
-      window.viewer = scene.viewer; // for whoever drives the page from outside, as for a film
+      window.viewer = scene.viewer; // for programs that control the page, such as for a film
       rest = createRest(scene);
       start(scene);
     }
@@ -32,7 +32,7 @@ export function startWhenSeen(config, start, watch = watchSight) {
   });
 }
 
-// The scene; where the browser cannot draw, null and a text in the page.
+// The scene; if the browser cannot draw, null and a message in the page.
 function sceneOrNotice(config) {
   try {
     return createScene(config);
@@ -75,8 +75,8 @@ function createRest({viewer, capture}) {
   };
 }
 
-// Call once the next picture is drawn, or after half a second. Why: what the window or the notebook
-// does then must not delay the picture.
+// Call a function once the next picture is drawn, or after half a second, so that the work of the
+// window or the notebook does not delay the picture.
 export function afterDrawing(call) {
   if (document.hidden) return call();
   let timer = 0, next = 0;
@@ -86,5 +86,5 @@ export function afterDrawing(call) {
     call();
   };
   timer = setTimeout(go, UNSEEN);
-  next = requestAnimationFrame(go); // after the viewer's own, which it has asked for before
+  next = requestAnimationFrame(go); // after the viewer's own, which was requested before
 }

@@ -1,16 +1,16 @@
 // The picture in a notebook, as anywidget loads it: a frame that holds floatbase's page, and the
-// messages between it and the kernel. The page's code comes once for all pictures of this page of
-// the notebook, although each widget loads this module for itself.
+// messages between it and the kernel. The page's code is sent once for all pictures of this page of
+// the notebook, although each widget loads this module separately.
 
 import {make} from "./dom.js";
 import {canUnpack, unpackText} from "./loader.js";
 import {CLOSED, RETIRED, TOO_OLD, WAITING} from "./messages.js";
 import {createSequence} from "./sequence.js";
 
-const PATIENCE = 20000; // ms for another picture's request for the code, which may have gone
+const PATIENCE = 20000; // ms to wait for another picture's request for the code, which may be lost
 const FILLING = "position: absolute; width: 100%; height: 100%";
 
-// Notebook 7 takes the arrow keys of a slider, to go from heading to heading; JupyterLab leaves
+// Notebook 7 uses the arrow keys to go from heading to heading, even in a slider; JupyterLab leaves
 // them to the slider.
 function keepSliderKeys() {
   window.addEventListener("keydown", ({target, key, ctrlKey, altKey, metaKey}) => {
@@ -48,7 +48,7 @@ async function loadCode(model, page) {
     ?? Promise.race([codes.get(version), requestCode(model, page)]);
 }
 
-// The saved image, and a line of text over it, until the page has drawn.
+// Show the saved image, with a line of text over it, until the page has drawn.
 function showThumbnail(model, box) {
   const data = model.get("thumbnail"), image = make("img");
   const line = make("div");
@@ -85,7 +85,7 @@ async function render({model, el}) {
   let port = null, isClosed = false, hasEnded = false;
   const tell = (say) => { if (!hasEnded && !isClosed) model.send({page, say}); };
 
-  // The page in the frame has loaded, perhaps anew: a frame that is moved in a document does.
+  // The page in the frame has loaded, perhaps again: a frame that is moved in a document reloads.
   async function connect({source, data}) {
     if (source === null || source !== frame.contentWindow || !data?.ready) return;
     const channel = new MessageChannel();
@@ -105,8 +105,8 @@ async function render({model, el}) {
     source.postMessage({code: viewer}, "*", [channel.port2]);
     if (isClosed) port.postMessage({notice: CLOSED});
   }
-  // At once, where the notebook lets its pages reach into their frames: a port's message waits
-  // behind all that the notebook has to do, such as its busy sign.
+  // Immediately, if the notebook lets its pages access their frames: a message to a port waits
+  // until the notebook has finished other work, such as its busy indicator.
   function give(message) {
     let receive = null;
     try {
@@ -118,7 +118,7 @@ async function render({model, el}) {
   function reload() {
     if (sequence.isLost()) return;
     sequence.lose();
-    // eslint-disable-next-line no-self-assign -- this is how a frame loads its page anew
+    // eslint-disable-next-line no-self-assign -- this reloads the page of a frame
     frame.srcdoc = frame.srcdoc;
   }
   function receive(message, buffers) {
@@ -138,7 +138,7 @@ async function render({model, el}) {
     else thumbnail.setText(CLOSED);
   }
   // The connections of all widgets end together. A model hides its own, but that of its layout is
-  // there to see.
+  // accessible.
   function watchConnection() {
     setTimeout(() => {
       const wasClosed = isClosed;

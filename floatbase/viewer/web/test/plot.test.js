@@ -21,7 +21,8 @@ test("its line ends at the right and has its peak below the upper edge", () => {
 test("its text says the value now and the largest", () => {
   const points = [[0, 12.34], [1, 0.04]], name = "forces differ by";
   assert.equal(
-    plotText({name, value: 0.04, unit: "N"}, points), "forces differ by: 0 N (up to 12 in 8 s)",
+    plotText({name, value: 0.04, unit: "N"}, points),
+    "forces differ by: 0 N (at most 12 in the last 8 s)",
   );
   assert.match(plotText({name, value: 3.21, unit: "N"}, points), /^forces differ by: 3\.2 N/);
 });

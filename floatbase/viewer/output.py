@@ -1,0 +1,151 @@
+"""Output of a viewer: saved files, static pages, and displays in notebooks."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from floatbase._validation import as_string
+from floatbase.errors import ViewerError
+from floatbase.robots import Robot
+from floatbase.viewer.export import film, thumbnail
+from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
+from floatbase.viewer.scene.diff import DiffRenderer
+from floatbase.viewer.transport.window import Window
+from floatbase.viewer.web import pages
+
+if TYPE_CHECKING:
+    from ipywidgets import Widget
+
+
+class Output:
+    """Saved files and notebook displays of a viewer's scene."""
+
+    robot: Robot
+    height: int
+    window: Window
+    renderer: DiffRenderer
+
+    def save(
+        self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
+    ) -> Path:
+        """Write the scene to a file in the format of its extension.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write. An .html file is one page, still or moving, that needs neither server nor
+            network. .mp4 and .gif files contain the recording at the speed of `play`, a .png file
+            its first picture; these need a browser and `pip install "floatbase[video]"`.
+        title : str, optional
+            Title of the page.
+        size : tuple of int, optional
+            Width and height of films and images [pixels], even numbers.
+
+        Returns
+        -------
+        Path
+            Path of the file.
+
+        Raises
+        ------
+        ViewerError
+            If nothing has been drawn yet, if the extension is unknown, or if the file cannot be
+            written.
+        """
+        target = Path(path if isinstance(path, Path) else as_string("path", path))
+        if self.window.scene.is_empty:
+            raise ViewerError(
+                "Nothing has been drawn yet, so there is nothing to save. Call show(state) or "
+                "play(rollout) first."
+            )
+        size = film.checked_size(size)
+        if target.suffix.lower() not in (".html", ".htm", *film.FRAME_RATES):
+            raise ViewerError(
+                f"Cannot save {target.name!r}: unknown file type. Use a name that ends in .html, "
+                f".mp4, .gif or .png."
+            )
+        try:
+            if target.suffix.lower() in film.FRAME_RATES:
+                film.capture(self.static_html(title), target, size)
+            else:
+                target.write_text(self.static_html(title), encoding="utf-8")
+        except OSError as error:
+            raise ViewerError(
+                f"Cannot write {target} ({error.strerror}). Choose an existing folder in which you "
+                f"may write."
+            ) from None
+        return target
+
+    def static_html(self, title: str | None = None) -> str:
+        """Return the current scene as one HTML page that needs neither server nor network.
+
+        Parameters
+        ----------
+        title : str, optional
+            Title of the page; by default, the robot's name.
+
+        Returns
+        -------
+        str
+            HTML of the page.
+        """
+        title = "" if title is None else as_string("title", title)
+        return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
+
+    def widget(self) -> Widget:
+        """Make a widget that shows the picture, for use in panels.
+
+        It is live until the viewer is displayed again; then it shows the image with which it
+        opened. If the environment variable FLOATBASE_VIEWER is "static", or if the viewer is
+        closed, the widget is a static copy of the scene.
+
+        Returns
+        -------
+        Widget
+            The widget.
+
+        Raises
+        ------
+        ViewerError
+            If anywidget is not installed.
+        """
+        if self._is_static:
+            import ipywidgets
+
+            return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
+        return self.window.widget(
+            self.robot.name,
+            self.height,
+            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
+        )
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        """Return the live picture, and an image of it for readers that cannot show widgets.
+
+        A program that stores notebooks can replace both, see `MIMEBUNDLES`.
+        """
+        if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
+            return bundle(self)
+        if self._is_static:
+            return {"text/html": self._static_frame()}
+        picture = self.widget()
+        data, metadata = thumbnail.with_thumbnail(picture._repr_mimebundle_(**kwargs), picture)
+        return {**data, "text/plain": repr(self)}, metadata
+
+    @property
+    def _is_static(self) -> bool:
+        """Whether a display is only a copy of the scene."""
+        return display_mode() == "static" or not self.window.is_open
+
+    def _static_frame(self) -> str:
+        """Return the current scene as an HTML frame that needs no kernel."""
+        name, style = (
+            html.escape(self.robot.name),
+            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
+        )
+        return (
+            f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
+            f'style="{style}"></iframe>'
+        )
