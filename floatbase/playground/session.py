@@ -12,6 +12,7 @@ import pinocchio as pin
 
 import floatbase as fb
 from floatbase._geometry import rotation_z
+from floatbase._validation import as_instance
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import SimulationWarning
@@ -48,8 +49,10 @@ class Session:
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
-        self.robot = robot
-        self.settings = Settings() if settings is None else settings
+        self.robot = as_instance("robot", robot, Robot)
+        self.settings = (
+            Settings() if settings is None else as_instance("settings", settings, Settings)
+        )
         self.last: fb.Rollout | None = None
         self.refusal = ""
         self.sim = self._make_simulation(self.settings)
