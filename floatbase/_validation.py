@@ -104,7 +104,7 @@ def refuse_new_attributes(self: object, name: str, value: object) -> None:
     """Set an attribute, as `__setattr__` of a class whose public attributes are properties.
 
     Any other public name raises `AttributeError`: a misspelled one would be set and never read.
-    Classes derived from such a class may set attributes of their own.
+    Classes derived from such a class may set further attributes.
     """
     cls = type(self)
     if not name.startswith("_") and not hasattr(cls, name) and "__setattr__" in vars(cls):

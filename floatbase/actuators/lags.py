@@ -41,7 +41,7 @@ class Delay:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Set the torques that are on their way.
+        """Set the torques that have been requested but have not arrived yet.
 
         Parameters
         ----------

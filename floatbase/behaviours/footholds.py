@@ -81,7 +81,7 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
 
 
 def _horizontal_part(name: str, vector: npt.ArrayLike, unit: str) -> Array:
-    """Return x and y of a vector of two or three."""
+    """Return x and y of a vector with two or three entries."""
     array = as_array(name, vector, (None,), unit)
     if len(array) not in (2, 3):
         raise InputError(

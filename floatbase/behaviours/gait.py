@@ -46,7 +46,7 @@ class Gait(Value):
     start : float, optional
         Time before which no foot lifts off [s].
     stop : float or None, optional
-        Time from which on no foot lifts off [s]; feet in the air at that time still come down. With
+        No foot lifts off from this time on [s]; feet in the air at that time still come down. With
         None, the gait does not stop.
 
     Raises
@@ -249,7 +249,7 @@ class Gait(Value):
         Parameters
         ----------
         t : float
-            Time from which on to look [s].
+            Time at which the search starts [s].
         n : int
             Largest number of periods.
         max_duration : float, optional
@@ -331,7 +331,7 @@ def check_always_supported(gait: Gait) -> None:
     """Raise `InputError` for a gait that has all feet in the air at some time.
 
     All contacts are assumed to be feet of the gait. It suffices to check each lift-off: the fewest
-    feet stand when one has just lifted.
+    feet stand when one has just lifted off.
     """
     if not any(gait.next_swing(foot, gait.start) for foot in gait.feet):
         return

@@ -41,7 +41,7 @@ _MIN_SIDE_FRACTION = 0.25
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What a `Walk` planned when its stance changed, or when it kept standing and its plan ended.
+    """Plan that a `Walk` makes when its stance changes, or when its plan ends while it stands.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """`Walk`: a walking controller.
 
-It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan by
-the whole-body controller, eqs. (26), (27).
+It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan
+with the whole-body controller, eqs. (26), (27).
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ class Walk:
     `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
     next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
     position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
-    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
+    the legs reach. One `WholeBodyController` for each stance does the rest. If no contact
     forces can hold the feet, their contacts become soft.
 
-    If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
+    If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
     value of `Walk.contacts`.
 
@@ -64,11 +64,11 @@ class Walk:
     robot : Robot
         The robot; its feet are point feet or flat feet.
     contacts : Contacts
-        All its contacts, such as `Contacts.feet(robot)`.
+        All contacts of the robot, such as `Contacts.feet(robot)`.
     gait : Gait
         The contact schedule; at least one foot must stand at any time. It can be set while walking:
-        feet no longer lift off by the former gait, and the new gait begins once all feet stand,
-        without its earlier lift-offs.
+        feet no longer lift off according to the former gait, and the new gait begins once all feet
+        stand, without its earlier lift-offs.
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
         and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it stand, set
@@ -100,8 +100,8 @@ class Walk:
 
     Notes
     -----
-    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion,
-    see [Englsberger2015]_.
+    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion
+    [Englsberger2015]_.
 
     Examples
     --------

@@ -86,7 +86,7 @@ class AnalyticController(Value):
     Raises
     ------
     InputError
-        If an argument has a wrong type, shape or value, or if `state` belongs to another robot.
+        If an argument has a wrong type, shape or value, or if `state` belongs to a different robot.
 
     Notes
     -----
@@ -130,7 +130,7 @@ class AnalyticController(Value):
         if state.robot != robot:
             raise InputError(
                 f"state belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{robot.name}."
+                f"{robot.name}. Give a state of that robot."
             )
         equations_of_motion(state, contacts)  # unknown frames raise here, not in the loop
         weight_share = robot.weight / max(contacts.n_points, 1)
@@ -163,13 +163,13 @@ class AnalyticController(Value):
         Raises
         ------
         InputError
-            If the equations belong to another robot.
+            If the equations belong to a different robot.
         """
         state = as_instance("eom", eom, EquationsOfMotion).state
         if state.robot != self.robot:
             raise InputError(
                 f"eom belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{self.robot.name}."
+                f"{self.robot.name}. Give the equations of that robot."
             )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R = state.frame_pose("base").rotation

@@ -54,15 +54,15 @@ class WholeBodyController:
         `floatbase.objectives.Task`. If no task acts on forces, or none on torques, a `ForceTask()`
         or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets : int, optional
-        Number of facets of the friction polyhedra, see `floatbase.friction.FrictionPolyhedron`.
+        Number of facets of the friction polyhedra; see `floatbase.friction.FrictionPolyhedron`.
     inner_approximation : bool, optional
         Whether the polyhedra lie inside the friction cones.
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
     min_normal_force, max_normal_force : float or mapping, optional
-        Bounds of the normal force at every contact point, so at each corner of a flat foot [N].
-        Each is one number, or a mapping from names of contacts to numbers or functions of t [s],
-        for example to unload a foot. A bound may name a foot that is not in contact: it has no
+        Bounds of the normal force at every contact point, and thus at each corner of a flat foot
+        [N]. Each is one number, or a mapping from names of contacts to numbers or functions of t
+        [s], for example to unload a foot. A bound may name a foot that is not in contact: it has no
         effect until `replace(contacts=...)` adds the foot. Any other unknown name is an error. The
         defaults are 0 and no maximum.
     torque_limits : float or array_like, shape (d,), optional
@@ -194,7 +194,7 @@ class WholeBodyController:
             reason = compiled.warm_up()
         if reason and backend == "compiled":
             raise InputError(
-                f'backend="compiled" is not possible: {reason}. backend="auto" takes the fastest '
+                f'backend="compiled" is not possible: {reason}. backend="auto" uses the fastest '
                 f"backend that supports the problem."
             )
         self._compiled = None if reason else compiled

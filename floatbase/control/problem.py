@@ -104,14 +104,14 @@ class Problem(Value):
         Raises
         ------
         InputError
-            If the state belongs to another robot, or if names or shapes do not fit.
+            If the state belongs to a different robot, or if names or shapes do not fit.
         InfeasibleError
             If the motion constraints of the contacts are inconsistent.
         """
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(
-                f"state belongs to another robot, {state.robot!r}. The robot of the problem is "
-                f"{self.robot!r}."
+                f"state belongs to a different robot, {state.robot!r}. The robot of the problem is "
+                f"{self.robot!r}. Give a state of that robot."
             )
         eom = equations_of_motion(state, self.contacts, t)
         qp = build_qp(eom, self.tasks, self.limits, t)

@@ -221,7 +221,8 @@ def fixed_frame(frame: str) -> LinearConstraint:
     Returns
     -------
     LinearConstraint
-        The constraint "bolts of …", whose λ is force [N] and moment [N·m] in world axes.
+        The constraint "bolts of …", whose λ consists of a force [N] and a moment [N·m] in world
+        axes.
     """
     return LinearConstraint(
         f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame)

@@ -214,7 +214,7 @@ def view_from_rotating_frame(
     ------
     InputError
         If the times do not increase, or if the frame turns more than about 160 times between two of
-        them. Also if `omega` is a function and `omega_rate` is missing.
+        them, or if `omega` is a function and `omega_rate` is missing.
 
     Notes
     -----

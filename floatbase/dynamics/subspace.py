@@ -338,10 +338,10 @@ def internal_forces(eom: EquationsOfMotion) -> Array:
 
     Notes
     -----
-    If J has full row rank, torques can produce all internal forces without moving anything:
-    the change -J_jᵀ λ of the torques changes ζ(τ) by λ. If J loses rank (solo8 on four feet), the
-    k - rank J directions of null(Jᵀ) are among the internal forces. No torques can produce those,
-    which leaves rank J - rank J_b directions to the torques.
+    If J has full row rank, torques can produce all internal forces without moving anything: the
+    change -J_jᵀ λ of the torques changes ζ(τ) by λ. If J loses rank (solo8 on four feet), the k -
+    rank J directions of null(Jᵀ) are among the internal forces. No torques can produce these
+    forces, which leaves rank J - rank J_b directions to the torques.
     """
     as_instance("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)

@@ -137,7 +137,7 @@ class WrenchSet(Value):
         return self._halfspaces[1]
 
     def margin(self, wrench: npt.ArrayLike) -> float:
-        """Return how far inside their facets all contact forces can be when they make a wrench.
+        """Return the largest margin that all contact forces can have when they produce a wrench.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class WrenchSet(Value):
         -------
         float
             The largest t for which forces f_i exist with margin ≥ t each, and at least t below the
-            limit of the normal force [N]. It is -inf if no forces make the wrench (see
+            limit of the normal force [N]. It is -inf if no forces produce the wrench (see
             `equalities`), and +inf if contacts that face each other can be squeezed without limit.
         """
         w = as_array("wrench", wrench, (6,))
@@ -169,7 +169,7 @@ class WrenchSet(Value):
         return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
 
     def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Return whether contact forces can make a wrench.
+        """Return whether contact forces can produce a wrench.
 
         Parameters
         ----------
@@ -420,7 +420,7 @@ def wrench_set(
         Number of facets of the friction polyhedron of every point. The defaults of this argument
         and the next two are those of the controller.
     inner_approximation : bool, optional
-        Whether the polyhedra lie inside the friction cones, see `FrictionPolyhedron`.
+        Whether the polyhedra lie inside the friction cones; see `FrictionPolyhedron`.
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
     max_normal_force : float or array_like, shape (P,), optional

@@ -52,7 +52,7 @@ NO_ANSWER = Verdict(
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
-    """Return the minimiser of a learner's cost, or a verdict that says what is wrong with the cost.
+    """Return the minimizer of a learner's cost, or a verdict that says what is wrong with the cost.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
     block : str
         Name of these variables, for the message.
     hint : str, optional
-        Advice for a cost with another number of variables.
+        Advice for a cost with a different number of variables.
 
     Returns
     -------
     ndarray, shape (n,), or Verdict
-        The minimiser, or what is wrong.
+        The minimizer, or what is wrong.
     """
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
@@ -77,7 +77,7 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
         return Verdict(
             False,
             f"The answer must be the cost, an fb.Quadratic on {block}, not {given}. Its "
-            f"minimiser is not asked for.",
+            f"minimizer is not asked for.",
             "no_cost",
         )
     if answer.n != n:
@@ -157,7 +157,7 @@ def array_judge(
 
 
 def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
-    """Return an answer that is a function, or a verdict that says that it is not.
+    """Return an answer that is a function, or a verdict that the answer is not a function.
 
     Parameters
     ----------

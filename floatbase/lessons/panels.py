@@ -173,7 +173,7 @@ def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlid
 def _slider(
     text: str, low: float, first: float, high: float, step: float, on_release: bool
 ) -> widgets.FloatSlider:
-    """Return a slider that shows as many decimals as its step has.
+    """Return a slider that shows as many decimals as its step.
 
     With `on_release` its value changes only when it is released.
     """
@@ -192,10 +192,10 @@ def _slider(
 
 
 def _round_step(*bounds: float) -> float:
-    """Return a round step for a slider with at least 50 steps from the lowest to the highest bound.
+    """Return a round slider step that divides the range into at least 50 steps.
 
-    It is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If none does,
-    because a bound is not round, the step is too small for that to be visible.
+    It is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If there is none,
+    because a bound is not round, the step is so small that the difference is not visible.
     """
     most = (max(bounds) - min(bounds)) / 50
     power = math.floor(math.log10(most)) if most > 0 else 0

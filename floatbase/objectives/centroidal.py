@@ -450,7 +450,7 @@ def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
 def _normal_matrix(contacts: Contacts) -> Array:
     """Return N with the normal of each point as a column, shape (k, n).
 
-    Nᵀ λ are the normal components of the forces, and N Nᵀ λ are the normal parts as vectors.
+    Nᵀ λ holds the normal components of the forces, and N Nᵀ λ the normal parts as vectors.
     """
     _require_point_forces(contacts)
     return (np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]).reshape(

@@ -286,7 +286,7 @@ class Playground:
             )
 
     def _on_status(self, status: str) -> None:
-        """Show over the last picture why the run stopped."""
+        """Show the reason why the run stopped, over the last picture."""
         self.outcome = "" if status == "running" else status_message(status, self.run.reason)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:

@@ -120,7 +120,7 @@ class Robot(Value):
     Raises
     ------
     InputError
-        If the arguments do not fit together, if nothing of the robot can move, or if its inertia
+        If the arguments do not fit together, if no part of the robot can move, or if its inertia
         matrix M of eq. (1) is singular.
 
     Notes
@@ -209,7 +209,7 @@ class Robot(Value):
         ).digest()
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the other is the same robot, even if loaded again or unpickled."""
+        """Return whether `other` is the same robot, even if loaded again or unpickled."""
         return self is other or (
             isinstance(other, Robot) and self._fingerprint == other._fingerprint
         )

@@ -80,7 +80,7 @@ def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
 
 
 def _parse_error(urdf: str, error: Exception) -> str:
-    """Return why a text is not a URDF; Pinocchio prints the reason instead of raising it."""
+    """Return why text is not a URDF; Pinocchio prints the reason instead of raising it."""
     if "xacro:" in urdf:
         return (
             f"{str(error).rstrip('.')}. The file is written in xacro. Run xacro first, as in "

@@ -49,7 +49,7 @@ _RELATIVE_ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Ground(Value):
-    """The ground: a plane, or several planes that are all solid below, as the sides of a valley.
+    """The ground: a plane, or several planes that are solid below, such as the sides of a valley.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class Simulation:
     collide with it, too (`link_collisions`).
 
     Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
-    copy has a `model` and `data` of its own.
+    copy has its own `model` and `data`.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class Simulation:
         )  # origin and z axis
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore a copy, which has MuJoCo data of its own."""
+        """Restore a copy, which has its own MuJoCo data."""
         vars(self).update(state)
         self._refresh_views()
 
@@ -254,13 +254,13 @@ class Simulation:
         Raises
         ------
         InputError
-            If the state belongs to another robot.
+            If the state belongs to a different robot.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
         if state.robot != self.robot:
             raise InputError(
-                f"The state belongs to another robot than this simulation, which has "
-                f"{self.robot.name}. Give a state of the simulation's robot."
+                f"The state belongs to a different robot. This simulation is for "
+                f"{self.robot.name}. Give a state of that robot."
             )
         self.link_collisions = False
         mujoco.mj_resetData(self.model, self.data)

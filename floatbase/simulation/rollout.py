@@ -235,7 +235,7 @@ def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -
 def _check_arguments(
     sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None
 ) -> None:
-    """Raise `InputError` for arguments of the wrong type or of another robot."""
+    """Raise `InputError` for arguments of the wrong type or for a different robot."""
     as_instance("sim", sim, Simulation)
     timestep = sim.model.opt.timestep
     if timestep != sim.timestep:

@@ -190,7 +190,7 @@ def _grid_points(grid: Any) -> list[Row]:
             f"The grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
         )
     if not points:
-        raise InputError("The grid has no points. Give at least one.")
+        raise InputError("The grid has no points. Give at least one point.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
@@ -214,7 +214,7 @@ def _function_name(function: Any, file: Any) -> str:
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
-    """Raise `InputError` if the function does not fit the parameters or setup is no function."""
+    """Raise `InputError` if the function does not fit the grid or `setup` is not a function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)

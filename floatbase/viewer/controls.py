@@ -181,7 +181,7 @@ class Controls:
         )
 
     def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
-        """Write a text into the panel, or change it.
+        """Write text into the panel, or change it.
 
         Parameters
         ----------
@@ -267,6 +267,6 @@ def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
     ):
         raise InputError(
             f'column of {name!r} is {column!r}; it must be "model" or "reality", and the name must '
-            f"end in it."
+            f"end in the same word."
         )
     return {"section": as_string("section", section), **({"column": column} if column else {})}

@@ -124,7 +124,7 @@ class Output:
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the live picture, and an image of it for readers that cannot show widgets.
 
-        A program that stores notebooks can replace both, see `MIMEBUNDLES`.
+        A program that stores notebooks can replace both; see `MIMEBUNDLES`.
         """
         if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             return bundle(self)

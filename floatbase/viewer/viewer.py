@@ -202,7 +202,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the state belongs to another robot, if forces are given without contacts or in the
+            If the state belongs to a different robot, if forces are given without contacts or in the
             wrong number, or if a value is NaN.
         ViewerError
             If the window is closed.
@@ -306,7 +306,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the walk or the state belongs to another robot.
+            If the walk or the state belongs to a different robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
         self.painter.check_robot("state", as_instance("state", state, State).robot)
@@ -332,7 +332,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the state belongs to another robot.
+            If the state belongs to a different robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.step_overlay(step, t, state, self._overlay_style)
@@ -419,7 +419,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the rollout belongs to another robot or is empty.
+            If the rollout belongs to a different robot or is empty.
         """
         self.painter.check_robot("rollout", recording.as_rollout(rollout).robot)
         if not len(rollout.time):

@@ -36,7 +36,7 @@ _JOINTS = (
 
 @contextmanager
 def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
-    """Print a text on the error stream if the enclosed work takes more than `after` seconds.
+    """Print a message to stderr if the enclosed code takes more than `after` seconds.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class CompiledTick:
     default_inputs : TickInputs
         Inputs without a state: zeros for time-varying targets, nothing user-defined.
     workspace : tuple of ndarray
-        Memory of the tick, for real and for whole numbers.
+        Memory of the tick, for real numbers and for integers.
 
     Raises
     ------

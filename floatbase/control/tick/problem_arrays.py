@@ -1,6 +1,6 @@
 """A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays.
 
-Pinocchio overwrites its arrays in place. What belongs to one robot or one contact is made once, so
+Pinocchio overwrites its arrays in place. The arrays of one robot or one contact are made once, so
 that a controller with other contacts is cheap.
 """
 

@@ -52,7 +52,7 @@ class UserTerms:
     any : bool
         Whether the problem has user-defined objects.
     varies : bool
-        Whether they, or a bound of a normal force, must be evaluated at every tick.
+        Whether these objects, or a bound of a normal force, must be evaluated at every tick.
     """
 
     def __init__(self, problem: Problem):

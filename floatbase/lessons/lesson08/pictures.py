@@ -37,7 +37,7 @@ _HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")
 
 
 def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
-    """Draw from above where the centre of mass may be while a foot is lifted, and where it is.
+    """Draw from above the centre of mass, and where it may be while a foot is lifted.
 
     Parameters
     ----------

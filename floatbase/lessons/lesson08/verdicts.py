@@ -49,7 +49,7 @@ def com_shift() -> Array:
 
 
 def shift_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the shift of this mistake."""
+    """Return, for each hint, a function that computes the shift of this mistake."""
     state = uneven_stance()
     feet = dict(
         zip(
@@ -144,7 +144,7 @@ def hardest_push() -> float:
 
 
 def push_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the force of this mistake."""
+    """Return, for each hint, a function that computes the force of this mistake."""
 
     def push(
         mass: str = "mass",

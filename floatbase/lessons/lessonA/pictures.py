@@ -196,7 +196,7 @@ def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
 
 
 def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
-    """Plot errors over speed on logarithmic axes, with the slope between the ends of each curve.
+    """Plot errors against speed on logarithmic axes, with the slope between the ends of each curve.
 
     Parameters
     ----------

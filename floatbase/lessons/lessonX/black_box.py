@@ -23,7 +23,7 @@ class BlackBox(Value):
     name : str
         Name of the case.
     robot : Robot
-        Data sheet of the robot, which is right.
+        Data sheet of the robot, which is correct.
     contacts : Contacts
         What the controller assumed about the ground: feet, friction, normals.
     time : ndarray, shape (n,)

@@ -155,7 +155,7 @@ def _without_outputs(notebook: Any) -> Any:
 
 
 def _digest(name: str, data: bytes) -> str:
-    """Compute a digest of a file; of a notebook without what running it adds."""
+    """Compute a digest of a file, without what running a notebook adds to it."""
     if name.endswith(".ipynb"):
         try:
             data = json.dumps(_authored_content(json.loads(data)), sort_keys=True).encode()

@@ -102,7 +102,7 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     target : Path
         File to write; its extension determines the format.
     size : tuple of int
-        Width and height [pixels], see `checked_size`.
+        Width and height [pixels]; see `checked_size`.
 
     Raises
     ------

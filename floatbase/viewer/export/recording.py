@@ -101,7 +101,7 @@ def animate(
     Raises
     ------
     InputError
-        If there are no pictures, or if `times` has another length.
+        If there are no pictures, or if `times` has a different length.
     """
     if (
         not isinstance(pictures, Sequence)
@@ -183,7 +183,7 @@ def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
     t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
         raise InputError(
-            f"times has {len(t)} entries and places has {len(x)}; they must have equally many."
+            f"times has {len(t)} entries and places has {len(x)}; their lengths must be equal."
         )
     if len(t) < 3 or not t[-1] > t[0]:
         return x
@@ -348,7 +348,7 @@ def _packed_floats(values: Array) -> umsgpack.Ext:
 def _quaternions(rotations: Array) -> Array:
     """Return rotations (n, 3, 3) as quaternions x y z w, shape (n, 4).
 
-    Of q and -q, it is the one nearer to the previous quaternion.
+    Of q and -q, the one nearer to the previous quaternion is returned.
     """
     from scipy.spatial.transform import Rotation
 

@@ -99,7 +99,7 @@ class Painter:
         Raises
         ------
         InputError
-            If the state belongs to another robot, or if the forces do not match the contacts.
+            If the state belongs to a different robot, or if the forces do not match the contacts.
         """
         chosen = PictureOptions(**options)
         self._check_state(state)
@@ -250,8 +250,8 @@ class Painter:
     def cone_height(self, contacts: Contacts) -> float:
         """Return the height of the friction cones.
 
-        It is that of 1.5 times the normal force at rest. It is reduced where the cones would hide
-        the robot, or where cones at the corners of one foot would meet.
+        It corresponds to 1.5 times the normal force at rest. It is reduced where the cones would
+        hide the robot, or where cones at the corners of one foot would meet.
 
         Parameters
         ----------

@@ -67,7 +67,7 @@ class Channel:
         number : int
             Number of the frame.
         data : bytes
-            The frame, see `protocol.frame`.
+            The frame; see `protocol.frame`.
         """
         raise NotImplementedError
 

@@ -1,6 +1,6 @@
 """The picture in a notebook: a widget whose frames use the kernel's own connection, like sliders.
 
-It works wherever sliders work, without a port of its own: JupyterLab, Notebook, VS Code, Colab,
+It works wherever sliders work, without its own port: JupyterLab, Notebook, VS Code, Colab,
 JupyterHub, Voilà. The base class, `anywidget`'s, contains what each of these needs; our part is
 widget.js, which shows the page in a frame. The page's code is sent once to each page of the
 notebook that requests it.

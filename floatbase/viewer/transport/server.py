@@ -172,7 +172,7 @@ class Server:
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Handler that refuses foreign host names; it serves only 127.0.0.1 and localhost."""
+    """Handler that serves 127.0.0.1 and localhost, and refuses other host names."""
 
     def prepare(self) -> None:
         """Refuse requests to another host name."""

@@ -133,7 +133,7 @@ class Window:
         Parameters
         ----------
         updates : iterable of Update
-            Keys and commands, see `protocol`.
+            Keys and commands; see `protocol`.
 
         Raises
         ------
