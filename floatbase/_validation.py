@@ -27,7 +27,7 @@ _MAX_REPR = 60  # characters of a value that a message shows
 class cached_property(functools.cached_property[T]):
     """A property computed on first use and then kept; threads that compete get the first result.
 
-    It takes no lock, unlike the one of functools in Python 3.11. A value computes the same result
+    No lock is taken, unlike in functools of Python 3.11. A value computes the same result
     every time, and a lock that another thread holds during a fork is never released in the child.
     """
 

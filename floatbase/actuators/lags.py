@@ -1,6 +1,6 @@
 """Two simple models of slow actuators, a pure delay and a first-order lag.
 
-They serve as a comparison for the hydraulic actuators. [FBR]_, App. B.
+The models serve as a comparison for the hydraulic actuators. [FBR]_, App. B.
 """
 
 from __future__ import annotations

@@ -225,7 +225,7 @@ class Planner:
     ) -> list[ZMPSegment]:
         """Return the ZMP of the next phases.
 
-        It is in the middle of the standing feet, and shifts while all feet stand.
+        The ZMP is in the middle of the standing feet, and shifts while all feet stand.
         """
         centres = self._stance_centres(ref, phases, foothold)
         zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
@@ -279,7 +279,7 @@ class Planner:
     def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
         """Return the best centre of pressure of a foot whose frame is at `position`, (2,) [m].
 
-        It is the middle of a sole, or the point below the centre of a ball.
+        The best point is the middle of a sole, or the point below the centre of a ball.
         """
         contact = self.contacts.friction_contact(foot)
         to_ground = (

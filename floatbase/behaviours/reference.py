@@ -205,7 +205,7 @@ class Reference:
     def normal_force_bound(self, foot: str, t: float, ramp: float, full_load: float) -> float:
         """Return the upper bound of a normal force while all feet stand [N].
 
-        It falls from `full_load` to 0 within `ramp` [s] before the foot lifts off, and rises
+        The bound falls from `full_load` to 0 within `ramp` [s] before the foot lifts off, and rises
         likewise after touchdown. If the stance is too short for both, each takes half of the
         stance.
         """

@@ -1,6 +1,6 @@
 """`Walk`: a walking controller.
 
-It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan
+`Walk` plans footholds and a linear inverted pendulum at each change of stance, and follows the plan
 with the whole-body controller, eqs. (26), (27).
 """
 
@@ -48,7 +48,7 @@ _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot,
 class Walk:
     """A controller that walks with a given gait and velocity.
 
-    It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
+    A `Walk` can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
     `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
     next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
     position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
@@ -66,16 +66,16 @@ class Walk:
     contacts : Contacts
         All contacts of the robot, such as `Contacts.feet(robot)`.
     gait : Gait
-        The contact schedule; at least one foot must stand at any time. It can be set while walking:
-        feet no longer lift off according to the former gait, and the new gait begins once all feet
-        stand, without its earlier lift-offs.
+        The contact schedule; at least one foot must stand at any time. The gait can be set while
+        walking: feet no longer lift off according to the former gait, and the new gait begins once
+        all feet stand, without its earlier lift-offs.
     velocity : array_like, shape (2,), optional
-        Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
-        and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it stand, set
-        `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
+        Desired velocity of the body, forwards and to the left [m/s]. The velocity can be set while
+        walking, and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it
+        stand, set `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
     yaw_rate : float, optional
-        Desired yaw rate, to the left [rad/s]. It can be set while walking, and is approached at 1
-        rad/s².
+        Desired yaw rate, to the left [rad/s]. The yaw rate can be set while walking, and is
+        approached at 1 rad/s².
     clearance : float, optional
         Height of the swings [m].
     reach : float, optional

@@ -60,7 +60,7 @@ class AnalyticController(Value):
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     state : State
         Desired posture, with the desired orientation of the base.
     com : array_like, shape (3,), optional

@@ -48,7 +48,7 @@ class WholeBodyController:
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     tasks : sequence of Task
         Tasks such as `fb.CoMTask`, or user-defined objects of the form of
         `floatbase.objectives.Task`. If no task acts on forces, or none on torques, a `ForceTask()`
@@ -112,8 +112,8 @@ class WholeBodyController:
     reference backend takes over, and `Command.backend` is "reference".
 
     Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
-    and in the standing posture. They must therefore be defined at t = 0, also if a trajectory
-    starts later.
+    and in the standing posture. Functions and objects must therefore be defined at t = 0, even if a
+    trajectory starts later.
 
     Examples
     --------
@@ -374,8 +374,8 @@ class WholeBodyController:
     ) -> WholeBodyController:
         """Return a controller with other contacts, tasks or limits and otherwise equal settings.
 
-        It is fast enough to be called in the control loop. To change limits, pass for example
-        `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+        This method is fast enough to be called in the control loop. To change limits, pass for
+        example `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
 
         Parameters
         ----------

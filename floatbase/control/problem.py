@@ -51,7 +51,7 @@ class Problem(Value):
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     tasks : sequence of Task
         Tasks. A `ForceTask()` or a `TorqueTask()` of small weight is added if no task acts on
         forces, or none on torques.

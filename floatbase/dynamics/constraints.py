@@ -37,7 +37,7 @@ class LinearConstraint(Value):
 
     A holonomic constraint φ(q, t) = 0 has A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t². A nonholonomic
     constraint g(q, q̇) = 0 leads to eq. (6). The constraint force is Aᵀ λ, with one multiplier λ for
-    each row in the unit of that row. It has no point of application and no friction cone.
+    each row in the unit of that row. The force has no point of application and no friction cone.
 
     Something physical must supply the force, such as a hinge or a rope, because a controller relies
     on it. If the motors alone are to bring a motion about, use a task or a pair of

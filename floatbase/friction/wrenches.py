@@ -122,8 +122,9 @@ class WrenchSet(Value):
     def face_matrix(self) -> Array:
         """Facets of the set, shape (m, 6): face_matrix @ w ≤ 0, together with equalities @ w = 0.
 
-        It is empty if every wrench can be produced. A row (a, b) has ‖a‖² + ‖max_lever_arm b‖² = 1,
-        so face_matrix @ w is in N. A set with limits on the normal force raises `InputError`.
+        The matrix is empty if every wrench can be produced. A row (a, b) has ‖a‖² + ‖max_lever_arm
+        b‖² = 1, so face_matrix @ w is in N. A set with limits on the normal force raises
+        `InputError`.
         """
         return self._halfspaces[0]
 
@@ -244,7 +245,8 @@ class WrenchSet(Value):
         forces : ndarray, shape (n,)
             `max_scaling` of each direction from (0, 0, weight, 0, 0, 0) [N], +inf if there is no
             limit. Divided by `weight`, they are the largest accelerations of the centre of mass as
-            fractions of g. They are limited by the facets and by the height of the centre of mass.
+            fractions of g. The facets and the height of the centre of mass limit these
+            accelerations.
 
         Raises
         ------
@@ -309,9 +311,9 @@ class WrenchSet(Value):
         Notes
         -----
         The region contains every c for which forces in the polyhedra carry the weight without a
-        moment about c. It does not depend on the height of the CoM or on `reference_point`. On
-        level ground it is the support polygon, the convex hull of the feet. The method is that of
-        [BretlLall2008]_.
+        moment about c. The region does not depend on the height of the CoM or on `reference_point`.
+        On level ground it is the support polygon, the convex hull of the feet. The method is that
+        of [BretlLall2008]_.
         """
         origin = self.points.mean(axis=0)
         rays = np.vstack(
@@ -375,7 +377,8 @@ class WrenchSet(Value):
     ) -> tuple[Array, Array] | None:
         """Return the limits of the normal force as inequalities on the weights of the rays.
 
-        They are in N divided by `scale`, and `extra_columns` columns of zeros follow the weights.
+        The limits are in N divided by `scale`, and `extra_columns` columns of zeros follow the
+        weights.
         """
         limited = np.isfinite(self.max_normal_force)
         if not np.any(limited):

@@ -142,7 +142,7 @@ def array_judge(
     Returns
     -------
     callable
-        The decorator. It turns a function of an array into a function of any answer.
+        Decorator that turns a function of an array into a function of any answer.
     """
 
     def decorate(judge: Callable[[Array], Verdict]) -> Callable[[Any], Verdict]:
@@ -188,8 +188,8 @@ def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | V
     Parameters
     ----------
     run : callable
-        Function without arguments that returns the `Rollout`. It raises `InputError` if the answer
-        cannot be simulated.
+        Function without arguments that returns the `Rollout`. The function raises `InputError` if
+        the answer cannot be simulated.
     why : str, optional
         Sentence that is added if the run ends early.
 

@@ -61,7 +61,7 @@ class Control:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS or not 0 <= self.first < len(self.values):
             raise ViewerError(
-                f"A control of the kind {self.kind!r} cannot start at stop {self.first} of "
+                f"A control of the kind {self.kind!r} cannot start at position {self.first} of "
                 f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the stop must "
                 f"exist."
             )

@@ -329,7 +329,7 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
     """Make the cost Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖² on contact forces.
 
-    It is a preference, not a limit: it keeps no force inside its friction cone, and it allows
+    The cost is a preference, not a limit: it keeps no force inside its friction cone, and it allows
     forces that pull.
 
     Parameters

@@ -32,8 +32,8 @@ _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 class Playground:
     """A live simulated robot with controls for its model, its physics and its controller.
 
-    It also offers challenges. In a notebook, it displays itself as the last line of a cell.
-    Elsewhere, open `playground.url` in a browser.
+    The playground also offers challenges. In a notebook, it displays itself as the last line of a
+    cell. Elsewhere, open `playground.url` in a browser.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def clamp_to_limits(model: pin.Model, q: Array) -> Array:
 def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
     """Return a standing configuration, shape (nq,), after checking that it is valid.
 
-    Its quaternions have length 1, and its joints are within their limits.
+    The quaternions of a valid configuration have length 1, and its joints are within their limits.
     """
     layout = (
         f"7 numbers for the base, then {model.nq - 7} for the joints"

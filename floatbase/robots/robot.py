@@ -238,7 +238,7 @@ class Robot(Value):
     def nv(self) -> int:
         """Length of v, of q̈ and of each row of J.
 
-        It is d + 6 for a floating base and d for a fixed base.
+        The length is d + 6 for a floating base and d for a fixed base.
 
         Notes
         -----

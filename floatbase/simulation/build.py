@@ -178,7 +178,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 def body_name(link: str) -> str:
     """Return MuJoCo's name of a floating robot's link.
 
-    It is the link's own name, except for "world": MuJoCo would weld that link to the ground.
+    The name is that of the link, except for "world": MuJoCo would weld that link to the ground.
     """
     return "world of the robot" if link == "world" else link
 

@@ -112,8 +112,9 @@ class LiveSimulation:
     def status(self) -> Status:
         """Status of the run.
 
-        It is "running", "paused", "idle" (paused after `idle_timeout`), or the reason why the run
-        ended: "fell", "diverged", "controller failed", or "stopped" by the exception in `error`.
+        The status is "running", "paused", "idle" (paused after `idle_timeout`), or the reason why
+        the run ended: "fell", "diverged", "controller failed", or "stopped" by the exception in
+        `error`.
         """
         return self._status
 

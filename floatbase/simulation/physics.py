@@ -221,10 +221,10 @@ class Simulation:
     def link_collisions(self) -> bool:
         """Whether the links can collide with the ground, too, through hulls of their shapes.
 
-        They are off until a fall, so that only feet touch the ground, as in eq. (7), and a reset
-        switches them off again. `rollout(..., settling_time=1.0)` switches them on after a fall, so
-        that the robot comes to lie on its links. Links that are below the ground at that time come
-        out slowly. Links never collide with each other.
+        These collisions are off until a fall, so that only feet touch the ground, as in eq. (7),
+        and a reset switches them off again. `rollout(..., settling_time=1.0)` switches them on
+        after a fall, so that the robot comes to lie on its links. Links that are below the ground
+        at that time come out slowly. Links never collide with each other.
         """
         return self._link_collisions
 
@@ -288,7 +288,7 @@ class Simulation:
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep without the checks of `step`.
 
-        It is meant for loops that have checked the torques.
+        This method is meant for loops that have checked the torques.
 
         Parameters
         ----------

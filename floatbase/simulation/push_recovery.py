@@ -179,7 +179,7 @@ def push_recovery(
     observation_time : float, optional
         Time after the push [s]. A fall is noticed only if it happens within this time.
     initial_force : float, optional
-        First push to try, by default the robot's weight [N]. It is doubled as long as it is
+        First push to try, by default the robot's weight [N]. The push is doubled as long as it is
         survived.
     resolution : float, optional
         Spacing of the pushes to try [N]: all pushes are multiples of it.
@@ -342,7 +342,7 @@ def _unit_vectors(directions: Any) -> Array:
 def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> float:
     """Return the largest multiple of a push that the stance withstands together with the weight.
 
-    It is 0 if rounding puts the weight itself outside the set.
+    The result is 0 if rounding puts the weight itself outside the set.
     """
     try:
         return max(0.0, wrenches.max_scaling(push, weight_wrench))

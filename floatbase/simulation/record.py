@@ -206,7 +206,7 @@ class Rollout(Value):
     def rolling_displacement(self) -> Array:
         """Compute how far the ball at each contact point has rolled.
 
-        It is the integral of ω × radius · normal.
+        The displacement is the integral of ω × radius · normal.
 
         Returns
         -------

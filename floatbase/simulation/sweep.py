@@ -78,7 +78,7 @@ def sweep(
         Number of processes, by default one for each core. Each process uses one thread for linear
         algebra, so that the rows are bit-identical for any number of workers.
     cluster : distributed.Client or str, optional
-        A Dask client or the address of a scheduler, to run the sweep there. It needs `pip install
+        A Dask client or the address of a scheduler, to run the sweep there. Dask needs `pip install
         "floatbase[cluster]"`.
     progress : bool, optional
         Whether to show a progress bar.
@@ -363,7 +363,8 @@ _this_thread = threading.local()  # of a worker: function and token of its prese
 def _run_point(job: _Job, point: Row) -> Row | Exception:
     """Return the results of a point, or the exception that ends the sweep.
 
-    It runs in a worker. It does not raise, because Dask would log the exception for each point.
+    This function runs in a worker. It does not raise, because Dask would log the exception for each
+    point.
     """
     try:
         return _evaluate(job, point)

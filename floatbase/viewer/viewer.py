@@ -202,8 +202,8 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the state belongs to a different robot, if forces are given without contacts or in the
-            wrong number, or if a value is NaN.
+            If the state belongs to a different robot, if forces are given without contacts or in
+            the wrong number, or if a value is NaN.
         ViewerError
             If the window is closed.
 
@@ -244,8 +244,9 @@ class Viewer(Controls, Output):
         """Make labels for the multipliers of active friction constraints, for `extra` of `show`.
 
         The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
-        force on top of the cone. It tells how much the objective would decrease if its constraint
-        were relaxed by one newton; two significant digits are shown. To draw the labels::
+        force on top of the cone. A multiplier tells by how much the objective would decrease if its
+        constraint were relaxed by one newton; two significant digits are shown. To draw the
+        labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
@@ -286,8 +287,8 @@ class Viewer(Controls, Output):
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
         """Make markers for the plan of a `Walk`, for `extra` of `show`.
 
-        They mark the planned footholds, the swing paths, the capture point and the planned ZMP. To
-        draw them::
+        The markers show the planned footholds, the swing paths, the capture point and the planned
+        ZMP. To draw them::
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 

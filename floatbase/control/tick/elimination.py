@@ -142,8 +142,8 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
 def parametrise(B, pivots, m, free_columns, V, beta_index):
     """Write V and beta_index of `Parametrisation` from the reduced rows of `eliminate`.
 
-    The first m reduced rows are motion rows. They still contain the pivots of the later rows, which
-    are substituted here. free_columns: (nb,), memory.
+    The first m reduced rows are motion rows. These rows still contain the pivots of the later rows,
+    which are substituted here. free_columns: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):

@@ -1,9 +1,9 @@
 """The inequalities G β ≤ h of eqs. (27), (28), assembled only for the rows that β violates.
 
 Rows are numbered: F facets and the minimum normal force of each of P points, then their P maximum
-normal forces, d upper torque limits, d lower ones, and the user-defined rows. What every problem
-needs is inlined into the search (`jit_forceinline`); what few problems need is not. Without this
-choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
+normal forces, d upper torque limits, d lower ones, and the user-defined rows. Code that every
+problem needs is inlined into the search (`jit_forceinline`); code that few problems need is not.
+Without this choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations

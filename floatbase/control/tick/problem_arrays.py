@@ -233,7 +233,7 @@ def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
 def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
     """Return tasks (N, 3), gains (N, 3) and frames (N, 12), targets, and the time-varying tasks.
 
-    The tables are those of `costs.TaskTable`. They contain the built-in tasks only, so the
+    The tables are those of `costs.TaskTable`. Only the built-in tasks are included, so the
     positions of user-defined tasks in the list do not matter.
     """
     known = [

@@ -82,7 +82,7 @@ def moment_mistakes() -> dict[str, Callable[[], Any]]:
 def force_by_momentum() -> Array:
     """Compute the force from the rate of momentum of all links.
 
-    It takes any q̈ with the desired acceleration of the centre of mass.
+    Any q̈ with the desired acceleration of the centre of mass will do.
     """
     state = standing_go2_eom().state
     rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]

@@ -47,7 +47,7 @@ class ConeController:
     robot : Robot
         The robot.
     contacts : Contacts
-        Its contacts with the ground. Each gets a polyhedron of 4 facets inside its cone.
+        Contacts of the robot with the ground. Each gets a polyhedron of 4 facets inside its cone.
     state : State
         Where to stand.
     moment_weight : float, optional

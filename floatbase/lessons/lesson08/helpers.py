@@ -26,7 +26,7 @@ _ROW_STEP = 3  # the margin is computed in every third row: every 12 ms of a cra
 def make_controller() -> Stand:
     """Return the controller of the lesson's push-recovery map.
 
-    It makes go2 stand, and trot on the spot when it must.
+    The controller makes go2 stand, and trot on the spot when necessary.
     """
     robot = fb.load("go2")
     return Stand(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))

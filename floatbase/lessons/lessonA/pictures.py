@@ -135,7 +135,7 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
     """Draw a robot in the air that moves to its left and turns, and its fictitious base force.
 
     The force is the velocity part of h on the base, written in the base's axes (dark) and in the
-    world's (light). It is grey, because no other body exerts it.
+    world's (light). The force is grey, because no other body exerts it.
 
     Parameters
     ----------

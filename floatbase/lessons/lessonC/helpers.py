@@ -269,7 +269,7 @@ def longest_step(
     G : ndarray, shape (m, n)
         Matrix of the inequality constraints G x ≤ h.
     h : ndarray, shape (m,)
-        Their right-hand side.
+        Right-hand side of the constraints.
     W : sequence of int
         Indices of the constraints in the working set, which cannot block.
 

@@ -86,7 +86,7 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
     case : Case
         The case.
     box : BlackBox
-        Its black box.
+        Black box of the case.
     line : str
         The line.
 

@@ -252,7 +252,7 @@ def _linear_function(
 ) -> Pixels:
     """Evaluate a linear function on boxes of pixels, shape (n, tall, wide).
 
-    It is given by its value at the first pixel of each box and by its slopes.
+    The function is given by its value at the first pixel of each box and by its slopes.
     """
     first, x, y = (part[:, None] / area[:, None] for part in (at_start, along_x, along_y))
     return (first + y * down)[:, :, None] + (x * across)[:, None, :]

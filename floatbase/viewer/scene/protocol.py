@@ -1,8 +1,8 @@
 """Commands for the page, encoded as bytes.
 
-They are the commands of meshcat and some custom ones. Each command has a key: path, type, property.
-Of two commands with the same key only the later one counts, so a scene is a dict from key to the
-newest command. It does not grow when something is drawn again.
+The commands are those of meshcat and some custom ones. Each command has a key: path, type,
+property. Of two commands with the same key only the later one counts, so a scene is a dict from key
+to the newest command. The dict does not grow when something is drawn again.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def encode(command: Mapping[str, Any]) -> Update:
 def set_transform(path: str, matrix: Array) -> Update:
     """Place an object by a homogeneous transform.
 
-    Most commands are of this type, so it is packed by hand.
+    Most commands are of this type, so they are packed by hand.
 
     Parameters
     ----------

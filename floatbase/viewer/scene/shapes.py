@@ -182,7 +182,7 @@ def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     vector : ndarray, shape (3,)
         The vector [m].
     length : float
-        Its length [m].
+        Length of the vector [m].
 
     Raises
     ------

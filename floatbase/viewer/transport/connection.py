@@ -1,7 +1,7 @@
 """Connections to pages: what each page has received, and when it receives the rest.
 
 A `Connection` sends the changes of the scene that its page has not received, as fast as the page
-draws. It uses a `Channel`: a websocket (`server`) or the notebook's own connection
+draws. A connection uses a `Channel`: a websocket (`server`) or the notebook's own connection
 (`notebook_widget`).
 """
 
@@ -72,7 +72,7 @@ class Channel:
         raise NotImplementedError
 
     def close_page(self, reason: str) -> None:
-        """Disconnect the page. It may connect again as a new one.
+        """Disconnect the page. The page may connect again as a new one.
 
         Parameters
         ----------

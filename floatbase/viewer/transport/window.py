@@ -1,6 +1,6 @@
 """The window: a thread of this process that serves the page.
 
-It serves its own notebook and, on request, this machine. meshcat's own server is a separate
+The thread serves its own notebook and, on request, this machine. meshcat's own server is a separate
 process, which listens on all interfaces, outlives the kernel, and waits for a browser.
 """
 
@@ -82,7 +82,7 @@ class Window:
     def widget(self, name: str, height: int, thumbnail: bytes = b"") -> NotebookWidget:
         """Make a display for a notebook, which needs no port.
 
-        It is live until the next display is made; then it shows its thumbnail.
+        The display is live until the next one is made; then it shows its thumbnail.
 
         Parameters
         ----------
