@@ -62,8 +62,8 @@ class Control:
         if self.kind not in _KINDS or not 0 <= self.first < len(self.values):
             raise ViewerError(
                 f"A control of the kind {self.kind!r} cannot start at position {self.first} of "
-                f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the stop must "
-                f"exist."
+                f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the "
+                f"position must exist."
             )
 
 

@@ -151,8 +151,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
         except Error as error:
             raise ViewerError(
-                f"No browser could be started, so no film can be made. {_REQUIREMENTS} "
-                f"({str(error).splitlines()[0]})"
+                f"No browser could be started ({str(error).splitlines()[0]}), so no film can be "
+                f"made. {_REQUIREMENTS}"
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})
