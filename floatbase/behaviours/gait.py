@@ -24,7 +24,7 @@ from floatbase.robots import Robot
 # s: times of a schedule that differ by less count as equal, because sums of periods are rounded
 TIME_TOLERANCE = 1e-9
 _MAX_PERIOD = 100.0  # s, of a period: a larger number must be in another unit
-_MAX_PHASES = 1000  # at most, in one call
+_MAX_PHASES = 1000  # periods of constant stance in one call
 
 
 @dataclass(frozen=True, eq=False)

@@ -355,7 +355,7 @@ class Walk:
     def _path_at(self, t: float) -> tuple[Array, float, Array]:
         """Return position, yaw and velocity of the path at t [s].
 
-        The path does not move before the first lift-off, and after the last touchdown.
+        The path does not move before the first lift-off or after the last touchdown.
         """
         ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
         walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)

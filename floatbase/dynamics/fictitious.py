@@ -18,7 +18,7 @@ from floatbase.robots import State
 VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 # rad per step of the integrated rotation: the error is 1e-10 rad after a full turn
 _MAX_ROTATION_STEP = 0.01
-_MAX_STEPS = 100_000  # between two times: 160 turns, which take some seconds to compute
+_MAX_STEPS = 100_000  # steps between two times: 160 turns, which take some seconds to compute
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from floatbase.qp._linear_programs import linear_program
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-# of a friction polyhedron: they miss the cone by 5e-6 of μ, which is never known as accurately
+# facets of a friction polyhedron: so many miss the cone by 5e-6 of μ, which is never known as accurately
 MAX_FACETS = 1000
 # fraction of the size below which a set is flat or a point lies on a facet: above a linear
 # program's rounding

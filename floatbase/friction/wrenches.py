@@ -96,8 +96,8 @@ class WrenchSet(Value):
         limits = numeric_copy(self.max_normal_force)  # +inf is allowed
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             raise InputError(
-                f"max_normal_force must be one number > 0, or {len(points)} of them, one for each "
-                f"contact point [N]."
+                f"max_normal_force must be one number > 0, or {len(points)} numbers > 0, one for "
+                f"each contact point [N]."
             )
         object.__setattr__(self, "max_normal_force", read_only(limits))
 
@@ -456,7 +456,7 @@ def wrench_set(
     without_cone = [c.name for c in contacts if not isinstance(c, FrictionContact)]
     if without_cone:
         raise InputError(
-            f"Contacts without a friction cone: {', '.join(without_cone)}. Leave them out with "
+            f"These contacts have no friction cone: {', '.join(without_cone)}. Leave them out with "
             f"contacts.without(…)."
         )
     point_data = zip(contacts.normals, contacts.mus, strict=True)

@@ -170,7 +170,7 @@ def _describe_error(said: Any, result: Any, unit: str) -> str:
 def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
     """Save what is new about a prediction; return what went wrong, or "".
 
-    What cannot be saved is remembered as long as this process runs.
+    A prediction that cannot be saved is remembered as long as this process runs.
     """
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):

@@ -86,7 +86,7 @@ def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
 
 
 def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """Draw what `plot_push_recovery` plots on the ground below the robot.
+    """Draw the map of `plot_push_recovery` on the ground below the robot.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ class Playground:
             self._redraw()
 
     def _update_text(self) -> None:
-        """Update the texts of the panel: the challenge and the program."""
+        """Update the text in the panel: the challenge and the program."""
         judge = self.judge  # another thread may change the challenge
         with suppress(ViewerError):
             if judge is not None:

@@ -166,8 +166,8 @@ def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
         )
     except RuntimeError as error:
         raise SolverError(
-            f"The search for conflicting constraints among {len(G)} did not end: {error}. Check "
-            f"the scaling of the problem."
+            f"The search for conflicting constraints among {len(G)} rows did not end: {error}. "
+            f"Check the scaling of the problem."
         ) from None
     m /= np.sum(m) or 1.0
     infeasible_certificate = (

@@ -77,7 +77,7 @@ def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
         if not minimum - _LIMIT_TOLERANCE <= x <= maximum + _LIMIT_TOLERANCE:
             raise InputError(
                 f"The posture of {name} has joint {model.names[int(joint)]} at {x:.6g}. It must "
-                f"lie between its limits {minimum:.6g} and {maximum:.6g} (rad or m)."
+                f"lie between its limits {minimum:.6g} and {maximum:.6g} [rad or m]."
             )
     return q
 
@@ -154,6 +154,6 @@ def as_torque_limits(d: int, value: npt.ArrayLike) -> Array:
     ):  # NaN is not > 0 either
         got = short_repr(value) if limits is None else f"shape {limits.shape}: {short_repr(value)}"
         raise InputError(
-            f"torque_limits must be one number > 0, or {d} such numbers (N·m), not {got}."
+            f"torque_limits must be one number > 0, or {d} such numbers [N·m], not {got}."
         )
     return read_only(np.broadcast_to(limits, (d,)))

@@ -197,7 +197,7 @@ class Robot(Value):
 
     @cached_property
     def _fingerprint(self) -> bytes:
-        """Digest of what equations, simulation and viewer use, the same in every process."""
+        """Digest of the data for equations, simulation and viewer, the same in every process."""
         shapes = [foot.centre if foot.corners is None else foot.corners for foot in self.feet]
         feet = [
             (foot.frame, foot.radius, shape.shape, shape.tobytes())

@@ -23,7 +23,9 @@ from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-# of friction to the normal force: stiffer friction makes feet creep less under a steady load
+
+# impedance of friction relative to that of the normal force: stiffer friction makes feet creep less
+# under a steady load
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004

@@ -281,7 +281,7 @@ class LiveSimulation:
         return previous != status
 
     def _notify(self, changed: bool) -> None:
-        """Call the listener; never under the lock, because the listener may call methods."""
+        """Call the listener. The lock must not be held, because the listener may call methods."""
         if changed and self._listener is not None:
             self._listener(self._status)
 

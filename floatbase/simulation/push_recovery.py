@@ -32,7 +32,7 @@ from floatbase.simulation.row_store import require
 from floatbase.simulation.sweep import sweep
 
 _MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
-_FACETS = 16  # of the polyhedra inside the friction cones: they leave out 2 % of the cones
+_FACETS = 16  # facets of the polyhedra inside the friction cones: 2 % of a cone is lost
 # times the robot's weight: if a larger push is survived, it is not the ground that resists it
 _MAX_FORCE_IN_WEIGHTS = 100.0
 # least cosine between a direction and an edge's normal: below it, the edge is parallel to the

@@ -149,7 +149,7 @@ def sweep(
 
 
 class _Job(NamedTuple):
-    """What a worker needs for all points: the sweep's token, and the pickled function and setup."""
+    """Data of a worker for all points: the sweep's token, and the pickled function and setup."""
 
     token: str
     payload: bytes
@@ -345,7 +345,7 @@ def _completed_points(
                 except BrokenExecutor as error:
                     raise SimulationError(
                         "A worker process died. If it ran out of memory, use fewer workers; "
-                        "otherwise compiled code crashed."
+                        "otherwise, compiled code has crashed."
                     ) from error
                 except Exception as error:  # from the cluster: `_run_point` raises nothing
                     raise SimulationError(
@@ -375,7 +375,7 @@ def _run_point(job: _Job, point: Row) -> Row | Exception:
 
 
 def _evaluate(job: _Job, point: Row) -> Row:
-    """Return what the function returned at a point, as JSON values, and "error"."""
+    """Return the function's results at a point, as JSON values, and "error"."""
     if getattr(_this_thread, "token", None) != job.token:
         try:
             function, setup = pickle.loads(job.payload)

@@ -1,4 +1,4 @@
-"""Controls in the page: sliders, lists, check boxes, buttons, toggles, texts and a plot."""
+"""Controls in the page: sliders, lists, check boxes, buttons, toggles, text and a plot."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class Controls:
         Parameters
         ----------
         name : str
-            What it toggles, for its tooltip and for screen readers.
+            Purpose of the toggle, for its tooltip and for screen readers.
         changed : callable
             Called as `changed(value)` with whether it is on, in the window's thread.
         value : bool

@@ -206,7 +206,7 @@ def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
 
 
 def limit_kinds(rows: npt.ArrayLike) -> list[str]:
-    """Return what each constraint on the wrench of a level sole forbids.
+    """Return the motion that each constraint on the wrench of a level sole prevents.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str
     Returns
     -------
     str
-        What a rider on the table sees, as SVG.
+        The view of a rider on the table, as SVG.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])

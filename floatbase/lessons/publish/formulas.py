@@ -28,7 +28,7 @@ class Formula(NamedTuple):
     section : str
         Number of its section.
     title : str
-        A few words.
+        Title of a few words.
     latex : str
         The formula without its number.
     meaning : str

@@ -267,7 +267,7 @@ def _unit_vectors(angles: Array | float) -> Array:
 
 
 def _legend_text(kind: str) -> str:
-    """Return what the legend says about a kind of curve."""
+    """Return the legend entry of a kind of curve."""
     return next(text for key, _, text in LEGEND if key == kind)
 
 

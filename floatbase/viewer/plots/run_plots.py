@@ -329,7 +329,7 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
     found = numeric_copy(forces)  # NaN where no forces were planned
     if found is None or found.shape != rollout.measured.shape:
         raise InputError(
-            f"forces must have shape {rollout.measured.shape} (N), the shape of "
+            f"forces must have shape {rollout.measured.shape} [N], the shape of "
             f"rollout.measured, not {short_repr(forces)}."
         )
     f = np.reshape(found, (len(rollout.time), -1, 3))

@@ -32,7 +32,7 @@ class PictureKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PictureOptions:
-    """What a picture shows beside the robot, its contacts and their forces.
+    """Further contents of a picture, beside the robot, its contacts and their forces.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Item(NamedTuple):
     Parameters
     ----------
     shape : Shape
-        What the object looks like.
+        Shape of the object.
     matrix : ndarray, shape (4, 4)
         Pose and scale in the world frame.
     colour : tuple of float or None

@@ -30,7 +30,7 @@ MAX_UNANSWERED = (
 
 
 class Host(Protocol):
-    """What a connection needs from its server."""
+    """Interface that a connection needs from its server."""
 
     scene: Scene
     clients: list[Connection]

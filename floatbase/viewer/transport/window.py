@@ -108,7 +108,7 @@ class Window:
         except ImportError as error:
             raise ViewerError(
                 f"A viewer in a notebook needs the package {error.name}, which is not installed. "
-                'Install it with: pip install "floatbase[viewer]". The page at `url` does not need '
+                'Install it with pip install "floatbase[viewer]". The page at `url` does not need '
                 "it."
             ) from None
         if (before := self._newest_display()) is not None:
