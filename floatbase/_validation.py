@@ -190,7 +190,7 @@ def as_callable(name: str, value: Any, usage: str) -> Any:
 
 
 def signature_error(function: Any, *args: object, **kwargs: object) -> str:
-    """Return why a function cannot be called like this, or "" if it can be or has no signature."""
+    """Return why a function cannot take these arguments, or "" if it can or has no signature."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

@@ -63,8 +63,8 @@ class Hydraulics(Value):
     leakage : float
         Leakage past the piston per pressure difference [m³/(s Pa)].
     rated_flow : float
-        Flow through the fully open valve when the pressure drop across its two edges together is
-        the rated one [m³/s].
+        Flow through the fully open valve when the total pressure drop across its two edges is the
+        rated drop [m³/s].
     rated_pressure_drop : float
         Rated pressure drop [Pa].
     valve_bandwidth : float

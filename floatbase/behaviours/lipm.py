@@ -179,7 +179,7 @@ class LIPM(Value):
     def _evaluate(self, t: float) -> tuple[Array, Array, Array, Array]:
         """Return p, its slope, and the growing and the decaying part of c - p at time t.
 
-        Before the first segment, these are the values at its beginning.
+        Before the first segment, the values are those at the segment's beginning.
         """
         t = max(as_number("t", t, "s"), self.segments[0][0])
         begin, p0, slope, a, b = next(

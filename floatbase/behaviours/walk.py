@@ -49,11 +49,11 @@ class Walk:
     """A controller that walks with a given gait and velocity.
 
     A `Walk` can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
-    `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
-    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
-    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
-    the legs reach. One `WholeBodyController` for each stance does the rest. If no contact
-    forces can hold the feet, their contacts become soft.
+    `fb.push_recovery`. At each change of stance, the controller reads the positions of the feet,
+    and plans the next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`)
+    from its present position. In each control step it shifts the ends of the swings by
+    `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the
+    rest. If no contact forces can hold the feet, their contacts become soft.
 
     If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
@@ -457,7 +457,8 @@ class Walk:
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy or pickle, without controllers and memory: it starts anew."""
+        """Return the state of a copy or pickle, without controllers and memory, so that the copy
+        starts anew."""
         return {
             key: value
             for key, value in vars(self).items()

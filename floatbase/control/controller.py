@@ -356,7 +356,7 @@ class WholeBodyController:
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
     ) -> Solution:
-        """Return the QP of a compiled tick with its answer as the solution.
+        """Return the QP of a compiled tick, with the tick's answer as the solution.
 
         The arguments after t are what `CompiledTick.__call__` returned for q, v and t.
         """

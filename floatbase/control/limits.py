@@ -299,7 +299,7 @@ class Limits(Value):
         *known : iterable of str
             Known names.
         before : Limits, optional
-            Limits whose names are known, too.
+            Earlier limits, whose names count as known.
 
         Raises
         ------

@@ -291,7 +291,7 @@ def dry_run() -> Iterator[None]:
 
 @lru_cache(maxsize=64)
 def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
-    """Return (7) at the standing state of a robot."""
+    """Return the equations of motion (7) at the standing state of a robot."""
     return equations_of_motion(robot.standing(), contacts)
 
 

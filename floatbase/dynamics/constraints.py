@@ -40,7 +40,7 @@ class LinearConstraint(Value):
     each row in the unit of that row. The force has no point of application and no friction cone.
 
     Something physical must supply the force, such as a hinge or a rope, because a controller relies
-    on it. If the motors alone are to bring a motion about, use a task or a pair of
+    on it. If the motors alone should cause a motion, use a task or a pair of
     `floatbase.control.LinearInequality` instead.
 
     Combine a constraint with other contacts by `contacts + fb.Contacts([constraint])`.

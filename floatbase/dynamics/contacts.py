@@ -356,7 +356,7 @@ class Contacts(Value):
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
-        """Return the force of one contact, for a flat foot the resultant of its corner forces.
+        """Return the force of one contact; for a flat foot, the resultant of its corner forces.
 
         Parameters
         ----------

@@ -322,9 +322,9 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
 def internal_forces(eom: EquationsOfMotion) -> Array:
     """Compute the internal forces, which move nothing once joint torques balance them.
 
-    The internal forces are null(J_bᵀ), where J_b holds the base columns of J. The torques τ = -J_jᵀ
-    λ balance such a λ, where J_j holds the joint columns of J. With a fixed base, every λ is
-    internal.
+    The internal forces are the null space of J_bᵀ, where J_b holds the base columns of J. The
+    torques τ = -J_jᵀ λ balance such a λ, where J_j holds the joint columns of J. With a fixed base,
+    every λ is internal.
 
     Parameters
     ----------

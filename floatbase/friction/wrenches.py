@@ -105,7 +105,7 @@ class WrenchSet(Value):
     def max_lever_arm(self) -> float:
         """Largest distance of a point from x_c [m], or 1 if all are zero.
 
-        A torque divided by it is comparable to a force.
+        A torque divided by this length is comparable to a force.
         """
         return float(np.max(np.linalg.norm(self.points - self.reference_point, axis=1))) or 1.0
 
@@ -211,7 +211,7 @@ class WrenchSet(Value):
         """
         d = as_array("direction", direction, (6,))
         if not np.any(d):
-            raise InputError("direction is the zero wrench. It must be non-zero.")
+            raise InputError("direction is the zero wrench, but it must be non-zero.")
         w = as_array("start", np.zeros(6) if start is None else start, (6,))
         N, scale = self.rays.shape[1], float(np.linalg.norm(self._wrench_scaling @ d))
         result = linear_program(

@@ -260,15 +260,15 @@ class NumericJudge:
     praise : str
         Comment on a right answer.
     mistakes : mapping of str to callable, optional
-        For each known mistake, by the name of its hint: a function that computes the value it leads
-        to.
+        For each known mistake, by the name of its hint: a function that computes the value to which
+        the mistake leads.
     hints : mapping of str to str, optional
         For each known mistake: the comment on it.
     tolerance : float, optional
         Relative tolerance: two values are equal if they differ by at most this fraction of the
         largest entry of the right value [-].
     is_count : bool, optional
-        Whether the answer counts things, and so has neither a sign nor a unit.
+        Whether the answer is a count, which has neither a sign nor a unit.
     """
 
     right: Callable[[], Any]

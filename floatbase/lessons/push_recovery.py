@@ -93,7 +93,7 @@ def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
     lesson : str
         Name of the lesson, such as "05".
     scale : float, optional
-        Length of a push in the picture [m/N]. By default the widest map is half as wide again as
+        Length of a push in the picture [m/N]. By default, the widest map is 1.5 times as wide as
         the stance.
 
     Returns

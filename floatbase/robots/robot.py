@@ -248,7 +248,7 @@ class Robot(Value):
 
     @cached_property
     def d(self) -> int:
-        """Count of the actuated joints, which is the length of τ.
+        """Length of τ: the number of actuated joints.
 
         Notes
         -----

@@ -314,7 +314,7 @@ class Recorder:
         stance : Contacts
             The controller's contacts.
         planned : ndarray, shape (k,), or None
-            Forces that it planned at the contacts, in the world frame [N].
+            Forces that the controller planned at the contacts, in the world frame [N].
         """
         n = self._n
         self._tau_desired[n] = tau_desired

@@ -163,9 +163,9 @@ class Controls:
         name : str
             Purpose of the toggle, for its tooltip and for screen readers.
         changed : callable
-            Called as `changed(value)` with whether it is on, in the window's thread.
+            Called as `changed(value)` in the window's thread; `value` is True if the toggle is on.
         value : bool
-            Whether it is on initially.
+            Whether the toggle is on initially.
         symbol : str
             Symbol of the term; toggles of the same symbol are stacked.
         part : str

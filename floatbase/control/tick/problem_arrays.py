@@ -171,7 +171,7 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
     """Return contacts (C, 6), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
 
-    The first three are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
+    The first three arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
     limits = problem.limits
     found = [

@@ -144,5 +144,5 @@ class UserTerms:
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Replace infinite upper bounds of normal forces by `UNBOUNDED`."""
+    """Replace infinite upper bounds of normal forces with `UNBOUNDED`."""
     return bounds[0], np.minimum(bounds[1], UNBOUNDED)

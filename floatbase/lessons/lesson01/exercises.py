@@ -33,8 +33,8 @@ def _pressing_arm() -> tuple[fb.State, Array, Array]:
 def _bolts_moment() -> Array:
     """Compute the moment of the bolts from the constraint forces of (7).
 
-    The result is from the wrench of the welded base with the wall's force, minus the wrench without
-    this force.
+    The moment is from the wrench of the welded base with the wall's force, minus that without the
+    force.
     """
     state, _, force = _pressing_arm()
     J = state.frame_jacobian("tool0")[:3]

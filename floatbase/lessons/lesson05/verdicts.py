@@ -223,7 +223,7 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
 
 
 def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
-    """Return whether a minimum with twelve numbers has about the desired wrench as torques τ."""
+    """Return whether a minimum with twelve entries, read as torques, nearly gives the wrench."""
     points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
     return bool(
         np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight])

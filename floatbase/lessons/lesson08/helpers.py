@@ -127,7 +127,7 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
 def torque_jump(record: Rollout) -> float:
     """Return the typical jump of a torque when a foot lifts off [N·m].
 
-    For each lift-off it takes the largest jump of all joints from one control step to the next. The
+    For each lift-off, the largest jump of all joints from one control step to the next counts. The
     result is the median over all lift-offs.
     """
     counts = [len(record.contacts_at(i)) for i in range(len(record))]

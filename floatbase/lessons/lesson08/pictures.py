@@ -63,7 +63,7 @@ def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str)
 
 
 def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
-    """Plot how far the centre of mass falls away from the line between two feet, and the pendulum.
+    """Plot the distance of a falling centre of mass from the line between two feet, and a pendulum.
 
     Parameters
     ----------

@@ -194,7 +194,7 @@ def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> li
     """Return points on the central path of a QP, as interior-point methods follow it.
 
     Each point minimizes ψ - t Σ log(h - G x): every inequality constraint repels the marble with
-    softness t. Newton's method with damping finds it. Source: Boyd and Vandenberghe, Convex
+    softness t. A damped Newton method finds each point. Source: Boyd and Vandenberghe, Convex
     Optimization, ch. 11.2.
 
     Parameters

@@ -247,7 +247,7 @@ def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
 
 @dataclass(frozen=True)
 class Case:
-    """Case as it was drawn at random, which the investigation does not know.
+    """Randomly drawn case, whose fault the investigation does not know.
 
     Parameters
     ----------

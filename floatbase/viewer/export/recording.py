@@ -60,9 +60,10 @@ class Animation:
 class _ItemHistory:
     """One item in n pictures.
 
-    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show it.
-    `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not present,
-    matrices and colours are those of the last picture before that shows it, else of the first.
+    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show the
+    item. `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not
+    present, matrices and colours are those of the last picture before that shows it, else of the
+    first.
     """
 
     item: Item
@@ -281,7 +282,7 @@ def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
 
 
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
-    """Return every item in time; a path whose shape changes becomes several items."""
+    """Return every item over time; a path whose shape changes becomes several items."""
     appearances: dict[str, dict[int, Item]] = {}
     for i, picture in enumerate(pictures):
         for path, item in with_normal_paths(picture).items():

@@ -287,10 +287,10 @@ def no_animation() -> Update:
 def end_animation() -> list[Update]:
     """End the animation before the next picture is drawn.
 
-    A busy page may receive this, the next picture and the next animation in one frame. The command
-    therefore occurs twice. One has the key of the animation, which the next animation overwrites.
-    The other has its own key, so that the old animation ends before the picture is drawn and cannot
-    undo it.
+    A busy page may receive this command, the next picture and the next animation in one frame. The
+    command therefore occurs twice. One has the key of the animation, which the next animation
+    overwrites. The other has its own key, so that the old animation ends before the picture is
+    drawn and cannot undo it.
 
     Returns
     -------
