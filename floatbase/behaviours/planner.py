@@ -44,7 +44,7 @@ _BISECTIONS = 10  # until the place of the ZMP is known to 0.1 % of the way
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What a `Walk` planned when its stance changed, or when it kept standing and its plan ended.
+    """Plan that a `Walk` makes when its stance changes, or when its plan ends while it stands.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ class Planner:
     ) -> list[ZMPSegment]:
         """Return the ZMP of the next phases.
 
-        It is in the middle of the standing feet, and shifts while all feet stand.
+        The ZMP is in the middle of the standing feet, and shifts while all feet stand.
         """
         centres = self._stance_centres(ref, phases, foothold)
         zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
@@ -318,7 +318,7 @@ class Planner:
     def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
         """Return the best centre of pressure of a foot whose frame is at `position`, (2,) [m].
 
-        It is the middle of a sole, or the point below the centre of a ball.
+        The best point is the middle of a sole, or the point below the centre of a ball.
         """
         contact = self.contacts.friction_contact(foot)
         to_ground = (

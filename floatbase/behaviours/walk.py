@@ -1,7 +1,7 @@
 """`Walk`: a walking controller.
 
-It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan by
-the whole-body controller, eqs. (26), (27).
+`Walk` plans footholds and a linear inverted pendulum at each change of stance, and follows the plan
+with the whole-body controller, eqs. (26), (27).
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot,
 class Walk:
     """A controller that walks with a given gait and velocity.
 
-    It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
-    `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
-    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
-    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
-    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
-    forces can hold the feet, their contacts become soft.
+    A `Walk` can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
+    `fb.push_recovery`. At each change of stance, the controller reads the positions of the feet,
+    and plans the next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`)
+    from its present position. In each control step it shifts the ends of the swings by
+    `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the
+    rest. If no contact forces can hold the feet, their contacts become soft.
 
-    If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
+    If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
     value of `Walk.contacts`.
 
@@ -66,19 +66,18 @@ class Walk:
     robot : Robot
         The robot; its feet are point feet or flat feet.
     contacts : Contacts
-        All its contacts, such as `Contacts.feet(robot)`.
+        All contacts of the robot, such as `Contacts.feet(robot)`.
     gait : Gait
         The contact schedule; at least one foot must stand at any time. It can be set while walking:
-        feet no longer lift off by the former gait, and the new gait begins once all feet stand,
-        without its earlier lift-offs. It begins up to 0.8 s later if the weight must first shift
-        to the feet that stand at its first lift-off.
+        feet no longer lift off according to the former gait, and the new gait begins once all feet
+        stand, without its earlier lift-offs. It begins up to 0.8 s later if the weight must first
+        shift to the feet that stand at its first lift-off.
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
         and is approached at 1 m/s². If the legs are too short for its steps, a `SimulationWarning`
         says so, and the robot walks at the fraction `speed_fraction` of it. In its first period, a
-        slow gait may be slower. At (0, 0) the robot
-        marches on the spot; to make it stand, set `walk.gait = dataclasses.replace(walk.gait,
-        stop=walk.time)`.
+        slow gait may be slower. At (0, 0) the robot marches on the spot; to make it stand, set
+        `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
     yaw_rate : float, optional
         Desired yaw rate, to the left [rad/s]. It can be set while walking, and is approached at 1
         rad/s². It is limited together with the velocity.
@@ -106,8 +105,8 @@ class Walk:
 
     Notes
     -----
-    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion,
-    see [Englsberger2015]_.
+    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion
+    [Englsberger2015]_.
 
     Examples
     --------
@@ -394,7 +393,7 @@ class Walk:
     def _path_at(self, t: float) -> tuple[Array, float, Array]:
         """Return position, yaw and velocity of the path at t [s].
 
-        The path does not move before the first lift-off, and after the last touchdown.
+        The path does not move before the first lift-off or after the last touchdown.
         """
         ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
         walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)
@@ -505,7 +504,7 @@ class Walk:
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy or pickle, without controllers and memory: it starts anew."""
+        """Return the state without controllers and memory, so that a copy starts anew."""
         return {
             key: value
             for key, value in vars(self).items()

@@ -87,7 +87,7 @@ class MotionConstraint(Protocol):
 class FrictionContact(MotionConstraint, Protocol):
     """A constraint whose forces act at points, each with a friction cone.
 
-    λ holds the forces of the ground on the robot in world axes [N]. It has three numbers for each
+    λ holds the forces of the ground on the robot in world axes [N]. λ has three entries for each
     point, in the order of the points.
     """
 
@@ -384,7 +384,7 @@ class FlatFootContact(Value):
 def grasp_matrix(points: Array, reference_point: Array) -> Array:
     """Compute the matrix that maps forces at points to their wrench about a reference point.
 
-    It stacks G_f above G_τ, and is known as the grasp matrix in manipulation.
+    The matrix stacks G_f above G_τ, and is known as the grasp matrix in manipulation.
 
     Parameters
     ----------

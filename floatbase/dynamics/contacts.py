@@ -180,7 +180,7 @@ class Contacts(Value):
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """Make contacts of all feet, flat ones with their corners and the others as points.
+        """Make contacts of all feet: flat feet with their corners, other feet as points.
 
         Parameters
         ----------
@@ -367,7 +367,7 @@ class Contacts(Value):
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
-        """Return the force of one contact, for a flat foot the resultant of its corner forces.
+        """Return the force of one contact; for a flat foot, the resultant of its corner forces.
 
         Parameters
         ----------
@@ -508,7 +508,7 @@ def constraint_and_jacobian(
     Raises
     ------
     InputError
-        If an array has another shape.
+        If an array has the wrong shape.
     """
     A, b = map(
         read_only, contact.constraint(state, t)

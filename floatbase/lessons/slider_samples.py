@@ -175,7 +175,7 @@ def recorded_pushes(
     Parameters
     ----------
     titles : mapping of str to tuple
-        For each title of a picture: its viewer, simulation and controller.
+        For each picture title: the viewer, simulation and controller.
     forces : iterable of float
         Forces of the pushes [N].
     directions : sequence of str

@@ -82,7 +82,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
 
 def solvers() -> tuple[str, ...]:
-    """List the solvers that `solve` accepts here.
+    """List the solvers that `solve` accepts on this machine.
 
     Returns
     -------

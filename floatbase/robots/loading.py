@@ -84,7 +84,8 @@ def load(
         Standing configuration of the robot before joints are locked, or its joints alone. By
         default the one that comes with the robot, with its joints brought within their limits.
     locked : sequence of str, optional
-        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
+        Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
+        and τ.
 
     Returns
     -------

@@ -206,7 +206,7 @@ class Rollout(Value):
     def rolling_displacement(self) -> Array:
         """Compute how far the ball at each contact point has rolled.
 
-        It is the integral of ω × radius · normal.
+        The displacement is the integral of ω × radius · normal.
 
         Returns
         -------
@@ -314,7 +314,7 @@ class Recorder:
         stance : Contacts
             The controller's contacts.
         planned : ndarray, shape (k,), or None
-            Forces that it planned at the contacts, in the world frame [N].
+            Forces that the controller planned at the contacts, in the world frame [N].
         """
         n = self._n
         self._tau_desired[n] = tau_desired

@@ -143,7 +143,7 @@ class RowStore:
                     path, f"with {what} {_joined(found[key])}, not {_joined(header[key])}"
                 )
         if found["grid"] != header["grid"]:
-            raise _wrong_file_error(path, "with the same parameters, but other values of them")
+            raise _wrong_file_error(path, "with the same parameters but different values")
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
@@ -229,7 +229,7 @@ def _joined(value: Any) -> str:
 
 
 def _wrong_file_error(path: str | Path, what: str) -> InputError:
-    """Return the error about a file of something else."""
+    """Return the error for a file that does not belong to this sweep."""
     return InputError(
         f"{path} is a file {what}. It was not changed. Give another file, or remove this one."
     )

@@ -77,7 +77,7 @@ def sweep(
         Number of processes, by default one for each core. Each process uses one thread for linear
         algebra, so that the rows are bit-identical for any number of workers.
     cluster : distributed.Client or str, optional
-        A Dask client or the address of a scheduler, to run the sweep there. It needs `pip install
+        A Dask client or the address of a scheduler, to run the sweep there. Dask needs `pip install
         "floatbase[cluster]"`.
     progress : bool, optional
         Whether to show a progress bar.
@@ -148,7 +148,7 @@ def sweep(
 
 
 class _Job(NamedTuple):
-    """What a worker needs for all points: the sweep's token, and the pickled function and setup."""
+    """Data of a worker for all points: the sweep's token, and the pickled function and setup."""
 
     token: str
     payload: bytes
@@ -189,7 +189,7 @@ def _grid_points(grid: Any) -> list[Row]:
             f"The grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
         )
     if not points:
-        raise InputError("The grid has no points. Give at least one.")
+        raise InputError("The grid has no points. Give at least one point.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
@@ -213,7 +213,7 @@ def _function_name(function: Any, file: Any) -> str:
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
-    """Raise `InputError` if the function does not fit the parameters or setup is no function."""
+    """Raise `InputError` if the function does not fit the grid or `setup` is not a function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)
@@ -344,7 +344,7 @@ def _completed_points(
                 except BrokenExecutor as error:
                     raise SimulationError(
                         "A worker process died. If it ran out of memory, use fewer workers; "
-                        "otherwise compiled code crashed."
+                        "otherwise, compiled code has crashed."
                     ) from error
                 except Exception as error:  # from the cluster: `_run_point` raises nothing
                     raise SimulationError(
@@ -362,7 +362,8 @@ _this_thread = threading.local()  # of a worker: function and token of its prese
 def _run_point(job: _Job, point: Row) -> Row | Exception:
     """Return the results of a point, or the exception that ends the sweep.
 
-    It runs in a worker. It does not raise, because Dask would log the exception for each point.
+    This function runs in a worker. It does not raise, because Dask would log the exception for each
+    point.
     """
     try:
         return _evaluate(job, point)
@@ -373,7 +374,7 @@ def _run_point(job: _Job, point: Row) -> Row | Exception:
 
 
 def _evaluate(job: _Job, point: Row) -> Row:
-    """Return what the function returned at a point, as JSON values, and "error"."""
+    """Return the function's results at a point, as JSON values, and "error"."""
     if getattr(_this_thread, "token", None) != job.token:
         try:
             function, setup = pickle.loads(job.payload)

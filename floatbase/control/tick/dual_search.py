@@ -1,6 +1,6 @@
 """The optimum of the QP (27) by the dual active-set method of Goldfarb and Idnani.
 
-Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities. It brings one
+Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities, and brings one
 violated inequality after another to its bound. An inequality that is never violated is only
 evaluated. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
 the number of active inequalities, mu their multipliers.

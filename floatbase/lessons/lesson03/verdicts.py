@@ -44,7 +44,7 @@ def _turned(forces: Array, R: Array) -> Array:
 
 
 def squeeze_mistakes() -> dict[str, Any]:
-    """Return for each hint a function that computes the torques of this mistake."""
+    """Return, for each hint, a function that computes the torques of this mistake."""
 
     def torques(change: Any = lambda eom, f: f, after: Any = lambda eom, tau: tau) -> Any:
         def value() -> Array:

@@ -158,7 +158,7 @@ def change_of_psi() -> float:
 
 
 def change_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the change of this mistake."""
+    """Return, for each hint, a function that computes the change of this mistake."""
 
     def change(
         cos: float = np.pi / 8, part: str = "own", grows: float = STEP, sign: float = -1.0

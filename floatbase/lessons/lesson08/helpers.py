@@ -28,7 +28,7 @@ _ROW_STEP = 3  # the margin is computed in every third row: every 12 ms of a cra
 def make_controller() -> Stand:
     """Return the controller of the lesson's push-recovery map.
 
-    It makes go2 stand, and trot on the spot when it must.
+    The controller makes go2 stand, and trot on the spot when necessary.
     """
     robot = fb.load("go2")
     return Stand(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
@@ -129,7 +129,7 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
 def torque_jump(record: Rollout) -> float:
     """Return the typical jump of a torque when a foot lifts off [N·m].
 
-    For each lift-off it takes the largest jump of all joints from one control step to the next. The
+    For each lift-off, the largest jump of all joints from one control step to the next counts. The
     result is the median over all lift-offs.
     """
     counts = [len(record.contacts_at(i)) for i in range(len(record))]

@@ -175,7 +175,7 @@ class Bench:
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
     """Return one cylinder with its force loop, at zero torque.
 
-    Its size does not depend on the supply pressure.
+    The size of the cylinder does not depend on the supply pressure.
     """
     actuators = HydraulicActuators(standing_go2_eom().robot, hydraulics)
     size = KNEE_TORQUE / Hydraulics().weakest_torque

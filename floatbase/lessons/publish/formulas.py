@@ -1,4 +1,4 @@
-r"""The sections, equations and notes of the course text, each with a sentence of our own.
+r"""The sections, equations and notes of the course text, each with an explanatory sentence.
 
 The page of equations shows them beside the functions, so that readers without the text can follow.
 Formulas are LaTeX in the notation of the lessons: M, h, S, J, A, b, λ = contact forces,
@@ -28,7 +28,7 @@ class Formula(NamedTuple):
     section : str
         Number of its section.
     title : str
-        A few words.
+        Title of a few words.
     latex : str
         The formula without its number.
     meaning : str

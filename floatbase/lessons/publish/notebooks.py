@@ -22,7 +22,7 @@ def read_notebook(path: Path) -> Any:
 
 
 def with_solutions(notebook: Any) -> Any:
-    """Replace each exercise's stub by its solution, in place."""
+    """Replace each exercise's stub with its solution, in place."""
     known = all_exercises()
     for cell in notebook.cells:
         name = cell.metadata.get("exercise")

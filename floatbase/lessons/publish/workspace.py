@@ -33,9 +33,10 @@ _RUN_CELL_KEYS = {
 def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> list[str]:
     """Copy new lessons to the learner's folder, and update those that were not edited.
 
-    A lesson that the learner has not edited is replaced if the course has a newer text. An edited
-    lesson stays, and the newer text is saved beside it as NAME.new.ipynb, or NAME.new2.ipynb if the
-    learner has edited that file too, and so on. Outputs do not count as edits.
+    A lesson that the learner has not edited is replaced if the course has a newer version. An
+    edited lesson stays, and the newer version is saved beside it as NAME.new.ipynb, or
+    NAME.new2.ipynb if the learner has edited that file too, and so on. Outputs do not count as
+    edits.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ def _failure(name: str, error: OSError) -> str:
 def _update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
     """Save the course's text under the first name that is free or holds an unedited copy.
 
-    Returns a line that says what happened, or none if the learner already has this text.
+    Returns a line that says what happened, or none if the learner already has this version.
     """
     present, last = _digest(copy.name, text), record.get(copy.name)
     beside = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
@@ -155,7 +156,7 @@ def _without_outputs(notebook: Any) -> Any:
 
 
 def _digest(name: str, data: bytes) -> str:
-    """Compute a digest of a file; of a notebook without what running it adds."""
+    """Compute a digest of a file, without what running a notebook adds to it."""
     if name.endswith(".ipynb"):
         try:
             data = json.dumps(_authored_content(json.loads(data)), sort_keys=True).encode()

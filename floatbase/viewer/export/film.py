@@ -102,7 +102,7 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     target : Path
         File to write; its extension determines the format.
     size : tuple of int
-        Width and height [pixels], see `checked_size`.
+        Width and height [pixels]; see `checked_size`.
 
     Raises
     ------
@@ -151,8 +151,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
         except Error as error:
             raise ViewerError(
-                f"No browser could be started, so no image or film can be made. {_REQUIREMENTS} "
-                f"({str(error).splitlines()[0]})"
+                f"No browser could be started ({str(error).splitlines()[0]}), so no image or film "
+                f"can be made. {_REQUIREMENTS}"
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})

@@ -99,7 +99,7 @@ class Painter:
         Raises
         ------
         InputError
-            If the state belongs to another robot, or if the forces do not match the contacts.
+            If the state belongs to a different robot, or if the forces do not match the contacts.
         """
         for name in options.keys() - PictureOptions.__dataclass_fields__.keys():
             raise unknown_name("option of a picture", name, PictureOptions.__dataclass_fields__)
@@ -158,7 +158,7 @@ class Painter:
     def replace(self, **changes: Any) -> Painter:
         """Return a painter with other facets or another ground.
 
-        It shares what this one has computed for the robot.
+        The new painter shares what this one has computed for the robot.
 
         Parameters
         ----------
@@ -253,8 +253,8 @@ class Painter:
     def cone_height(self, contacts: Contacts) -> float:
         """Return the height of the friction cones.
 
-        It is that of 1.5 times the normal force at rest. It is reduced where the cones would hide
-        the robot, or where cones at the corners of one foot would meet.
+        The height corresponds to 1.5 times the normal force at rest. It is reduced where the cones
+        would hide the robot, or where cones at the corners of one foot would meet.
 
         Parameters
         ----------
@@ -415,8 +415,8 @@ class Painter:
     def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
         """Draw a bar on the ground that shows the length of about a quarter of the weight.
 
-        The bar is to the left of the feet. It starts behind a tall robot, because its picture shows
-        little ground in front.
+        The bar is to the left of the feet. For a tall robot it starts behind the robot, because the
+        picture shows little ground in front.
         """
         force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box

@@ -27,9 +27,9 @@ MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest report
 class Server:
     """The thread that serves one scene.
 
-    It has no reference to its `Window`, so a window without references can be garbage-collected and
-    stop it. `port` is the port that the server listens on; None until `listen`, since a notebook
-    needs none.
+    The thread has no reference to its `Window`, so a window without references can be
+    garbage-collected and stop it. `port` is the port that the server listens on; None until
+    `listen`, since a notebook needs none.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class Server:
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Handler that refuses foreign host names; it serves only 127.0.0.1 and localhost."""
+    """Handler that serves 127.0.0.1 and localhost, and refuses other host names."""
 
     def prepare(self) -> None:
         """Refuse requests to another host name."""

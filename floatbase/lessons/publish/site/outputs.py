@@ -170,7 +170,7 @@ def _prediction_question(cell: Any) -> str:
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
-    """Return an output as a list of what a page can show of it."""
+    """Return the parts of an output that a page can show, as a list."""
     if output.output_type == "stream":
         output.text = _TERMINAL_CODES.sub("", output.text)
         return [output] if output.name == "stdout" else []
