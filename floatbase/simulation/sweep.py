@@ -71,8 +71,9 @@ def sweep(
     file : str or Path, optional
         Path of a JSON Lines file to which each row is written as it finishes. Running the same
         sweep with the same file resumes it, even after it was killed; at most two points for each
-        worker are computed again. The file identifies the function by its name, so use another file
-        after changing what the function does. `read_sweep` reads a file.
+        worker are computed again. Points whose row has an error are also computed again. The file
+        identifies the function by its name, so use another file after changing what the function
+        does. `read_sweep` reads a file.
     workers : int, optional
         Number of processes, by default one for each core. Each process uses one thread for linear
         algebra, so that the rows are bit-identical for any number of workers.
@@ -128,11 +129,11 @@ def sweep(
     require("pandas", "sweep")  # missing libraries are reported before hours of work
     job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
     with closing(RowStore(file, name, json_points)) as store:
-        pending = [i for i in range(len(points)) if i not in store.rows]
-        failed = sum(row["error"] is not None for row in store.rows.values())
+        done = {i for i, row in store.rows.items() if row["error"] is None}
+        pending, failed = [i for i in range(len(points)) if i not in done], 0
         bar = require("tqdm.auto", "sweep").tqdm(
             total=len(points),
-            initial=len(store.rows),
+            initial=len(done),
             desc=name,
             unit="point",
             disable=not progress,
