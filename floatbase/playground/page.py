@@ -83,7 +83,7 @@ class Playground:
         self.outcome = ""
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
-        self._last_push: fb.Push | None = None
+        self.last_push: fb.Push | None = None
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self._pause_after_slice = False  # then the user must press run
         self._history: list[Settings] = []  # what `undo` restores, the last one first
@@ -152,8 +152,8 @@ class Playground:
         self.force, self.towards = size, angle
         angle = math.radians(self.towards)
         force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
-        self._last_push = fb.Push(force_now, frame=self.pushed_frame)
-        self.run.push(self._last_push.force, frame=self.pushed_frame)
+        self.last_push = fb.Push(force_now, frame=self.pushed_frame)
+        self.run.push(self.last_push.force, frame=self.pushed_frame)
         self._update_text()
 
     def set(self, **changes: Any) -> None:
@@ -246,7 +246,7 @@ class Playground:
 
         During a challenge, its initial settings are restored.
         """
-        self.force, self.towards, self._last_push = self._default_push, 0.0, None
+        self.force, self.towards, self.last_push = self._default_push, 0.0, None
         self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self.run.set_time_scale(1.0)
         self._panel.show_view_settings(1.0)
@@ -355,7 +355,7 @@ class Playground:
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
             self.view.add_text(
-                "code", self.session.code(self._last_push), "Python program", code=True
+                "code", self.session.code(self.last_push), "Python program", code=True
             )
 
     def _on_status(self, status: str) -> None:

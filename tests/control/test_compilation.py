@@ -30,7 +30,7 @@ from numba.core.runtime import rtsys
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control.tick import CompiledTick, announce_if_slow, compiled, jit, tick
+from floatbase.control.tick import CompiledTick, announce_if_slow, jit, tick
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
@@ -194,16 +194,16 @@ def test_a_long_compilation_is_announced_and_a_short_one_is_not(
 def test_a_slow_start_that_only_loads_is_not_announced_as_a_compilation(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compiled, "announce_if_slow", partial(announce_if_slow, after=0.0))
-    monkeypatch.setattr(compiled, "_RECHECK_INTERVAL", 0.01)
+    module = "floatbase.control.tick.compiled"
+    monkeypatch.setattr(f"{module}.announce_if_slow", partial(announce_if_slow, after=0.0))
+    monkeypatch.setattr(f"{module}._RECHECK_INTERVAL", 0.01)
     made = tick_of(judges.load("go2"))
-    misses, work = made._tick.stats.cache_misses, made._tick_standing
+    misses = tick.tick.stats.cache_misses
 
     def slowly(begins_compiling: bool) -> None:
         if begins_compiling:
             misses["a signature"] += 1
         time.sleep(0.2)
-        work()
 
     for begins, said in ((False, ""), (True, "floatbase is compiling its controller")):
         monkeypatch.setattr(made, "_tick_standing", partial(slowly, begins))

@@ -14,7 +14,13 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
-from floatbase.playground import CHALLENGES, Playground, mean_force_error, playground
+from floatbase.playground import (
+    CHALLENGES,
+    Playground,
+    Settings,
+    mean_force_error,
+    playground,
+)
 from floatbase.robots import Robot
 
 from .looks import picture
@@ -84,14 +90,14 @@ def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> 
     page.mouse.down()
     page.mouse.move(box["x"] + 0.1 * box["width"], y, steps=4)
     page.wait_for_timeout(300)
-    assert field._last_push is None
+    assert field.last_push is None
     page.mouse.up()
-    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
-    assert field._last_push.force[0] == field.force > 0.0
-    field._last_push = None
+    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
+    assert field.last_push.force[0] == field.force > 0.0
+    field.last_push = None
     page.evaluate("viewer.gui_controllers['push [N]'].setValue(0)")
     until(lambda: field.force == 0.0, lambda: page.wait_for_timeout(20))
-    assert field._last_push is None
+    assert field.last_push is None
 
 
 def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) -> None:
@@ -114,10 +120,10 @@ def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) 
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(ahead_x, ahead_y, steps=5)
-    assert field._last_push is None
+    assert field.last_push is None
     page.mouse.up()
     page.keyboard.up("Shift")
-    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
+    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
     assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
     assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)
 
@@ -309,7 +315,7 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
         page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
         until(
-            lambda: field.session.settings != field._initial_settings,
+            lambda: field.session.settings != Settings(),
             lambda: page.wait_for_timeout(20),
         )
         if keys:
@@ -317,7 +323,7 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
         else:
             page.locator("#panel button", has_text="undo").click()
         until(
-            lambda: field.session.settings == field._initial_settings,
+            lambda: field.session.settings == Settings(),
             lambda: page.wait_for_timeout(20),
         )
         page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
@@ -350,6 +356,7 @@ def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> 
 
 
 def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
+    force = field.force
     with raises(InputError, "robot", 5):
         playground(5)
     with raises(InputError, "settings", 5):
@@ -365,7 +372,7 @@ def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
     ):
         with pytest.raises(FloatbaseError):
             call()
-    assert field.force == field._default_push and field.challenge is None
+    assert field.force == force and field.challenge is None
 
 
 def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(

@@ -23,7 +23,7 @@ from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
-_RECHECK_INTERVAL = 1.0  # s
+_RECHECK_INTERVAL = 1.0  # s between two looks at whether numba compiles
 
 # joints whose axes are fixed in their own frame
 _JOINTS = (
