@@ -122,7 +122,8 @@ def check_unit_norms(
                 else f"The {numbers} {entries} of joint {model.names[i]!r}"
             )
             raise InputError(
-                f"{entries} has length {length:.8g}; the length must be 1. Divide by this length{hint}."
+                f"{entries} has length {length:.8g}; the length must be 1. Divide by this "
+                f"length{hint}."
             )
 
 
