@@ -457,8 +457,7 @@ class Walk:
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy or pickle without controllers and memory; the copy starts
-        anew."""
+        """Return the state of a copy or pickle, without controllers or memory of the walk."""
         return {
             key: value
             for key, value in vars(self).items()
