@@ -266,7 +266,7 @@ def numeric_copy(value: Any) -> Array | None:
 def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
     """Return `value` as a read-only array after checking its shape (None = any length) and entries.
 
-    All entries must be finite real numbers of at most `MAX_MAGNITUDE`.
+    All entries must be finite real numbers of magnitude at most `MAX_MAGNITUDE`.
     """
     array = value if _is_read_only(value) else numeric_copy(value)
     if array is None:

@@ -56,6 +56,8 @@ class Stand(Walk):
     The capture point is from [Pratt2006]_.
     """
 
+    _waits_for_weight = False  # it steps because it falls
+
     def __init__(
         self,
         robot: Robot,

@@ -86,11 +86,14 @@ class AnalyticController(Value):
     Raises
     ------
     InputError
-        If an argument has a wrong type, shape or value, or if `state` belongs to a different robot.
+        If an argument has a wrong type, shape or value, if `state` belongs to a different robot, or
+        if forces of the contacts do not act at points.
+    UnknownNameError
+        If a contact refers to a frame that the robot does not have.
 
     Notes
     -----
-    [FBR]_, eq. (22). The minimum is taken over β of eq. (17).
+    [FBR]_, eqs. (22), (23). The minimum is taken over β of eq. (17).
 
     The desired force is f̃_c = m (a - g) with a = -kp e - kd ė, where e is the position of the
     centre of mass relative to `com`. The desired moment τ̃_c follows in the same way from the

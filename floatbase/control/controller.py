@@ -97,6 +97,8 @@ class WholeBodyController:
         If an argument has a wrong type, shape or value.
     UnknownNameError
         If a name, solver or option does not exist.
+    MissingDependencyError
+        If `solver` is not installed.
 
     Notes
     -----

@@ -104,7 +104,9 @@ class Problem(Value):
         Raises
         ------
         InputError
-            If the state belongs to a different robot, or if names or shapes do not fit.
+            If the state belongs to a different robot, or if shapes do not fit.
+        UnknownNameError
+            If a frame does not exist.
         InfeasibleError
             If the motion constraints of the contacts are inconsistent.
         """
@@ -170,7 +172,7 @@ def build_qp(
     limits : Limits
         Inequality constraints.
     t : float, optional
-        Time at which tasks with time-varying targets are evaluated [s].
+        Time at which time-varying targets, bounds and inequalities are evaluated [s].
 
     Returns
     -------
@@ -180,7 +182,9 @@ def build_qp(
     Raises
     ------
     InputError
-        If an argument has a wrong type, or if names or shapes do not fit.
+        If an argument has a wrong type, or if shapes do not fit.
+    UnknownNameError
+        If a frame does not exist.
     InfeasibleError
         If the motion constraints of the contacts are inconsistent.
 
@@ -275,7 +279,7 @@ def assemble_qp(
 def dry_run() -> Iterator[None]:
     """Add a note to exceptions that user code raises while a controller is made.
 
-    The note says that nothing moves yet.
+    The note says that user functions are evaluated at t = 0 and in the standing posture.
     """
     try:
         yield

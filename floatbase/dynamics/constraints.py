@@ -193,7 +193,7 @@ class RollingWheel(SinglePointContact):
         return self.jacobian(state) @ state.v
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return -r u and its derivative; u is the normal projected into the wheel's plane."""
+        """Return -r u and its derivative; u is the unit vector along n - (n · axle) axle."""
         n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
         axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle

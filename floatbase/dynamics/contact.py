@@ -32,8 +32,8 @@ class MotionConstraint(Protocol):
     """An element of `Contacts`: rows A q̈ = b and the forces Jᵀ λ that enforce them.
 
     User-defined constraints implement this protocol. A class with J = A by definition may set the
-    class attribute `jacobian_is_constraint = True`, so that only `constraint` is called. Derived
-    classes do not inherit this attribute.
+    class attribute `jacobian_is_constraint = True`. The equations of motion then call `constraint`
+    only. Derived classes do not inherit this attribute.
     """
 
     @property

@@ -1,6 +1,6 @@
 """Feasible accelerations, torques and contact forces: the maps ζ and η, and the spaces of C and B.
 
-Section 2.2 of the course text.
+Section 2.2 of the course text, and eqs. (14), (16) and (17) of section 3.
 """
 
 from __future__ import annotations

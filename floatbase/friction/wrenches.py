@@ -2,7 +2,7 @@
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force [N] and its moment about the centre
 of mass [N·m], both in world axes, with τ_c = Σ (x_i - x_c) × f_i. Sources: [FBR]_, §3.1 and §4.2;
-[Caron2015]_.
+[Caron2015b]_.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class WrenchSet(Value):
 
     Notes
     -----
-    [FBR]_, eqs. (20), (21), (28). The contact wrench cone is described in [Caron2015]_.
+    [FBR]_, eqs. (20), (21), (28). The contact wrench cone of several contacts is described in
+    [Caron2015b]_, and that of one rectangular sole in [Caron2015]_.
     """
 
     points: Array = field(metadata=checked(as_array, (None, 3), "m"))
@@ -208,6 +209,8 @@ class WrenchSet(Value):
         ------
         InfeasibleError
             If the line misses the set.
+        InputError
+            If `direction` is zero, or if an argument has the wrong shape.
         """
         d = as_array("direction", direction, (6,))
         if not np.any(d):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from datetime import datetime
 from pathlib import Path
 
 import floatbase as fb
-from floatbase._validation import as_string
+from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
@@ -19,7 +20,8 @@ FILE_FORMAT = "answers to the floatbase course"
 def hand_in(name: str, folder: str | Path = ".") -> Path:
     """Write your answers and predictions to a file for your teacher.
 
-    A file that you have handed in before is replaced.
+    A file that you have handed in before is replaced. If another learner's file or any other file
+    has the same name, it is kept, and yours gets a number.
 
     Parameters
     ----------
@@ -37,12 +39,15 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     Raises
     ------
     InputError
-        If there is nothing to hand in yet, or if the file cannot be written.
+        If the name or the folder is invalid, if there is nothing to hand in yet, or if the file
+        cannot be written.
     """
     if not re.search(r"\w", as_string("name", name)) or not name.isprintable():
         raise InputError(
             'name must be the name by which your teacher knows you, as in hand_in("Ada Lovelace").'
         )
+    if not isinstance(folder, (str, Path)) or "\0" in str(folder):
+        raise InputError(f"folder must be the path of a folder, not {short_repr(folder)}.")
     tried, answers, predicted = progress.load(), progress.answers(), progress.predictions()
     if not tried and not predicted:
         raise InputError(
@@ -55,14 +60,13 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises,
         "predictions": predicted,
     }  # fmt: skip
-    file_name = "_".join(re.findall(r"\w+", name))
-    path = Path(folder) / f"answers-{file_name}.json"
     try:
+        path = _own_path(Path(folder), name.strip())
         path.write_text(json.dumps(written, indent=1), encoding="utf-8")
     except OSError as error:
         raise InputError(
-            f"{path} cannot be written: {error.strerror}. Choose another folder: "
-            f"hand_in(…, folder=…)."
+            f"{error.filename or folder} cannot be written: {error.strerror}. Choose another "
+            f"folder: hand_in(…, folder=…)."
         ) from None
     known = all_exercises()  # an older course may have had others
     solved = [key for key, entry in tried.items() if entry["right"] and key in known]
@@ -74,3 +78,25 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
             f"them once more, then hand in again."
         )
     return path
+
+
+def _own_path(folder: Path, name: str) -> Path:
+    """Return the path of a learner's file: the first one that is free or has this name inside."""
+    stem = "answers-" + "_".join(re.findall(r"\w+", name))
+    path, number = folder / f"{stem}.json", 1
+    while os.path.lexists(path) and _name_inside(path) != name:
+        number += 1
+        path = folder / f"{stem}-{number}.json"
+    return path
+
+
+def _name_inside(path: Path) -> str | None:
+    """Return the learner's name in a file of answers, or None if it is another kind of file."""
+    try:
+        if path.is_symlink() or not path.is_file():
+            return None
+        written = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    is_ours = isinstance(written, dict) and written.get("form") == FILE_FORMAT
+    return written.get("name") if is_ours else None

@@ -1,6 +1,6 @@
 """Centroidal dynamics: momentum, net force and moment, force bias and torques for given forces.
 
-Sections 3.1.1 and 3.1.2 of the course text.
+Section 3.1 of the course text, eqs. (20) to (25).
 """
 
 from __future__ import annotations

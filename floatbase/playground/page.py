@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any
@@ -11,13 +12,15 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.errors import ViewerError
+from floatbase._validation import as_bool, as_instance, as_number
+from floatbase.errors import FloatbaseError, ViewerError, unknown_name
+from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
 from floatbase.playground.panel import Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
 from floatbase.playground.session import PERIOD, Session
-from floatbase.playground.settings import Settings
+from floatbase.playground.settings import SETTING_NAMES, Settings
 from floatbase.playground.term_arrows import term_arrows
 from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, LiveSimulation
@@ -26,6 +29,9 @@ from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
 _SITE_NOTE = "The playground runs only in a live notebook. Here the robot stands still."
+_AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
+_SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
+_MAX_HISTORY = 100  # changes that `undo` remembers
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
 
@@ -47,6 +53,11 @@ class Playground:
         Height of the picture in a notebook [pixels].
     port : int, optional
         Port of the page; 0 selects a free one when `url` is first read.
+
+    Raises
+    ------
+    FloatbaseError
+        If an argument has the wrong type, or if the settings do not fit the robot.
     """
 
     def __init__(
@@ -58,7 +69,7 @@ class Playground:
         height: int = 640,
         port: int = 0,
     ):
-        self.robot = robot
+        self.robot = as_instance("robot", robot, Robot)
         facets = 4 if robot.feet else None
         self.view = fb.Viewer(
             robot, background=background, port=port, facets=facets, follow=True, height=height
@@ -75,6 +86,8 @@ class Playground:
         self._last_push: fb.Push | None = None
         self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self._pause_after_slice = False  # then the user must press run
+        self._history: list[Settings] = []  # what `undo` restores, the last one first
+        self._last_change: tuple[frozenset[str], float] = (frozenset(), -math.inf)  # fields, time
         self._requested: dict[str, Any] = {}
         self._applying: dict[str, Any] = {}  # what is being applied now
         self._lock = threading.Lock()  # protects the requests
@@ -128,9 +141,15 @@ class Playground:
         towards : float, optional
             Direction of the push [degrees]: 0 is forward, 90 to the left. By default, the direction
             that was set last.
+
+        Raises
+        ------
+        InputError
+            If an argument is not a number.
         """
-        self.force = self.force if force is None else force
-        self.towards = self.towards if towards is None else towards
+        size = as_number("force", self.force if force is None else force, "N")
+        angle = as_number("towards", self.towards if towards is None else towards, "degrees")
+        self.force, self.towards = size, angle
         angle = math.radians(self.towards)
         force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
         self._last_push = fb.Push(force_now, frame=self.pushed_frame)
@@ -147,12 +166,42 @@ class Playground:
 
         Raises
         ------
-        TypeError
-            If a name is not a setting.
+        UnknownNameError
+            If a name is not a setting, or a value is not a known name.
         InputError
             If a value is not allowed.
         """
+        for name in changes:
+            if name not in SETTING_NAMES:
+                raise unknown_name("setting", name, SETTING_NAMES)
         replace(self.session.settings, **changes)
+        self._remember_before(frozenset(changes))
+        self._request(changes)
+
+    def undo(self) -> None:
+        """Undo the last change of the settings since the last reset of everything.
+
+        Changes of the same fields in quick succession, as while a slider moves, are one change.
+        """
+        present = self.pending_settings
+        while self._history:
+            former = self._history.pop()
+            self._last_change = (frozenset(), -math.inf)
+            if former != present:
+                self._request(asdict(former))
+                self._panel.show_settings(former)
+                return
+
+    def _remember_before(self, fields: frozenset[str]) -> None:
+        """Store the settings before a change of these fields, unless the change continues one."""
+        now = time.monotonic()
+        last_fields, last_time = self._last_change
+        if fields != last_fields or now - last_time > _SAME_CHANGE_TIME:
+            self._history = [*self._history, self.pending_settings][-_MAX_HISTORY:]
+        self._last_change = (fields, now)
+
+    def _request(self, changes: dict[str, Any]) -> None:
+        """Have changes applied by the run before its next slice, or now if it does not run."""
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
@@ -180,7 +229,14 @@ class Playground:
         ----------
         challenge : Challenge or None
             Challenge to start; None for free play.
+
+        Raises
+        ------
+        InputError
+            If the challenge is of another type.
         """
+        if challenge is not None:
+            as_instance("challenge", challenge, Challenge, "CHALLENGES[0]")
         self.challenge, self.judge = challenge, None if challenge is None else challenge.judge()
         self._restart_with(self._initial_settings if challenge is None else challenge.start)
         self._update_text()
@@ -202,6 +258,7 @@ class Playground:
         """Put the robot back on its feet with these settings."""
         with self._lock:
             self._requested = {}
+        self._history, self._last_change = [], (frozenset(), -math.inf)
         self.run.call_soon(lambda: self._start_with(settings))
         self.run.reset()
 
@@ -227,9 +284,18 @@ class Playground:
             self.run.reset()
 
     def _change(self) -> bool:
-        """Change the session, and return whether the robot was put back on its feet."""
+        """Change the session, and return whether the robot was put back on its feet.
+
+        Settings that the picture cannot draw are refused, like those that do not fit the robot.
+        """
+        session = self.session
         try:
-            return self.session.change(**self._applying)
+            wanted = replace(session.settings, **self._applying)
+            self.view.set_ground(build.ground(wanted))  # before anything else changes
+            return session.change(**self._applying)
+        except FloatbaseError as error:
+            session.refusal = str(error)
+            return False
         finally:
             with self._lock:
                 self._applying = {}
@@ -268,8 +334,15 @@ class Playground:
             Name of a term of `EQUATION`.
         shown : bool
             Whether to draw it.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such term.
         """
-        self.shown_terms[term] = shown
+        if term not in list(self.shown_terms):
+            raise unknown_name("term", term, self.shown_terms)
+        self.shown_terms[term] = as_bool("shown", shown)
         if self.run.status != "running":
             self._redraw()
 
@@ -287,12 +360,25 @@ class Playground:
 
     def _on_status(self, status: str) -> None:
         """Show the reason why the run stopped, over the last picture."""
-        self.outcome = "" if status == "running" else status_message(status, self.run.reason)
+        shown = "left the ground" if status == "fell" and self._is_airborne else status
+        self.outcome = "" if status == "running" else status_message(shown, self.run.reason)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:
             judge.run_ended(": ".join(filter(None, [status, self.run.reason])), self.session)
             self._update_text()
         self._redraw()
+
+    @property
+    def _is_airborne(self) -> bool:
+        """Whether the robot is above its standing height and nothing touches the ground."""
+        last = self.session.last
+        if last is None or not len(last) or last.measured[-1].any():
+            return False
+        ground = self.view.painter.drawn_ground
+        height, standing = (
+            state.com[2] - ground.height(state.com) for state in (last.final, self.session.home)
+        )
+        return bool(height > _AIRBORNE_HEIGHT * standing)
 
     def _redraw(self) -> None:
         """Draw the last record again."""
@@ -383,6 +469,11 @@ def playground(robot: Robot | str = "go2", settings: Settings | None = None) -> 
     -------
     Playground
         The playground, which displays itself.
+
+    Raises
+    ------
+    FloatbaseError
+        If an argument has the wrong type, or if there is no such robot.
     """
     return Playground(fb.load(robot) if isinstance(robot, str) else robot, settings)
 

@@ -96,10 +96,13 @@ class Panel:
         view.add_button("pause", play.run.pause)
         view.add_button("reset", play.run.reset)
         view.add_button("push", play.push)
+        if play.robot.is_floating:
+            view.add_button("undo", play.undo)
         view.add_button("reset everything", play.reset_all)
+        view.add_text("invitation", self._invitation)
         view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
         most = _MAX_PUSH * play.robot.weight
-        view.add_slider("push [N]", partial(setattr, play, "force"), play.force, 0.0, most, 1.0)
+        view.add_slider("push [N]", self._push, play.force, 0.0, most, 1.0, on_release=True)
         towards = partial(setattr, play, "towards")
         view.add_slider("towards [°]", towards, play.towards, -180.0, 180.0, 5.0)
         if not play.robot.is_floating:
@@ -161,6 +164,26 @@ class Panel:
                 changed = partial(self._set_term, field, term.name)
                 on = term.name not in getattr(self._playground.session.settings, field)
                 view.add_toggle(switch, changed, on, term.symbol, _SWITCH_WORDS[field])
+
+    @property
+    def _invitation(self) -> str:
+        """First sentences of the panel: what to do."""
+        first = (
+            "Push the robot: move and release the slider “push”, or drag the robot with the Shift "
+            "key held."
+        )
+        if not self._playground.robot.is_floating:
+            return first
+        return (
+            f"{first} Then switch off a term of the equation above the picture, in the "
+            f"controller's model or in reality. A dark switch is off."
+        )
+
+    def _push(self, force: float) -> None:
+        """Push the robot with this force [N]; a force of zero is only stored."""
+        self._playground.force = force
+        if force:
+            self._playground.push(force)
 
     @property
     def _gait_names(self) -> list[str]:

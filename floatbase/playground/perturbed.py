@@ -214,7 +214,7 @@ class PerturbedSimulation(Simulation):
                 )
 
     def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Return contact forces as `Simulation.contact_forces_of` does, without adhesion.
+        """Return contact forces as `Simulation.contact_forces_of` does, minus the adhesion force.
 
         Parameters
         ----------

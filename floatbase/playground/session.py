@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +12,10 @@ import pinocchio as pin
 
 import floatbase as fb
 from floatbase._geometry import rotation_z
+from floatbase._validation import as_instance
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
+from floatbase.errors import SimulationWarning
 from floatbase.playground import build
 from floatbase.playground.perturbed import BaseMotors, PerturbedSimulation
 from floatbase.playground.program import program
@@ -46,8 +49,10 @@ class Session:
     """
 
     def __init__(self, robot: Robot, settings: Settings | None = None):
-        self.robot = robot
-        self.settings = Settings() if settings is None else settings
+        self.robot = as_instance("robot", robot, Robot)
+        self.settings = (
+            Settings() if settings is None else as_instance("settings", settings, Settings)
+        )
         self.last: fb.Rollout | None = None
         self.refusal = ""
         self.sim = self._make_simulation(self.settings)
@@ -160,11 +165,13 @@ class Session:
                 gait = replace(gait, stop=self.sim.time)
             elif settings.gait != before.gait:
                 gait = build.gait(settings, self.robot)
-            walk.gait, walk.velocity, walk.yaw_rate = (
-                gait,
-                settings.velocity[:2],
-                settings.velocity[2],
-            )
+            with warnings.catch_warnings():  # the speed may be limited; each slider would warn
+                warnings.simplefilter("ignore", SimulationWarning)
+                walk.gait, walk.velocity, walk.yaw_rate = (
+                    gait,
+                    settings.velocity[:2],
+                    settings.velocity[2],
+                )
         else:
             self.controller = build.controller(
                 settings, self.robot, self.sim, self._standing_state_here()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from floatbase._validation import (
     Value,
@@ -160,6 +160,9 @@ class Settings(Value):
     def kp(self) -> float:
         """Gain of the motion tasks [1/s²]; a lag of ω rad/s makes gains above 4 ω² unstable."""
         return float(f"{min(IDEAL_KP, (2.0 * math.pi * self.bandwidth[0]) ** 2):.4g}")
+
+
+SETTING_NAMES = tuple(field.name for field in fields(Settings))
 
 
 def six_digits(x: float) -> float:

@@ -65,11 +65,12 @@ def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
 
     The quaternions of a valid configuration have length 1, and its joints are within their limits.
     """
-    layout = (
-        f"7 numbers for the base, then {model.nq - 7} for the joints"
-        if has_floating_base(model)
-        else "the joint positions"
-    )
+    layout = "the joint positions"
+    if has_floating_base(model):
+        layout = f"{model.nq - 7} joint positions, or 7 numbers for the base and then the joints"
+        joints_alone = numeric_copy(posture)
+        if joints_alone is not None and joints_alone.shape == (model.nq - 7,):
+            posture = np.concatenate([pin.neutral(model)[:7], joints_alone])
     q = as_array("posture", posture, (model.nq,), layout)
     check_unit_norms(model, "posture", q)
     joints, index, lower, upper = joint_limits(model)

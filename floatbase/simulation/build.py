@@ -159,8 +159,9 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         )
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
-    for foot, feet in zip(robot.feet, Contacts.feet(robot).friction_contacts, strict=True):
-        _add_foot_balls(spec, foot, feet.point_names)
+    feet = Contacts.feet(robot) if robot.feet else Contacts.none()
+    for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
+        _add_foot_balls(spec, foot, contact_of_foot.point_names)
     _add_link_hulls(spec, robot)
     try:
         model = spec.compile()

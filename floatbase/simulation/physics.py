@@ -88,7 +88,7 @@ class Simulation:
         self._robot = as_instance("robot", robot, Robot)
         self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
-        self._feet = Contacts.feet(robot)
+        self._feet = Contacts.feet(robot) if robot.feet else Contacts.none()
         self._model = build_model(robot, self.ground, self.timestep)
         self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)

@@ -21,14 +21,13 @@ from floatbase._validation import (
     signature_error,
 )
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError, SimulationError
+from floatbase.errors import InfeasibleError, InputError, SimulationError, require
 from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
-from floatbase.simulation.row_store import require
 from floatbase.simulation.sweep import sweep
 
 _MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
@@ -260,10 +259,11 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         if fault := signature_error(controller):
             raise InputError(f"push_recovery needs {needs}; {fault}.")
         return partial(_simulation_and_controller, controller)
+    cloudpickle = require("cloudpickle", "sweep")
     try:
         return partial(
             _simulation_and_controller,
-            partial(pickle.loads, require("cloudpickle").dumps(controller)),
+            partial(pickle.loads, cloudpickle.dumps(controller)),
         )
     except Exception as error:
         raise InputError(

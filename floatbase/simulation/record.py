@@ -357,7 +357,8 @@ class Recorder:
         InputError
             If a contact was a point in one stance and a flat foot in another.
         """
-        contacts = self._initial_stance
+        # the stance before the first row is a walk's last one of the run before: it must not count
+        contacts = self._stances[0] if self._stances else self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
             if contact.name not in contacts.names:
                 contacts += Contacts([contact])

@@ -7,31 +7,19 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from floatbase._validation import short_repr
-from floatbase.errors import InputError
+from floatbase.errors import InputError, require
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 RESERVED_NAMES = ("point", "error")  # columns that the store itself writes
 Row = dict[str, Any]
-
-
-def require(library: str) -> Any:
-    """Import an optional library of sweeps; raise `InputError` if it is not installed."""
-    try:
-        return import_module(library)
-    except ImportError:
-        raise InputError(
-            f"A sweep needs {library}, which is not installed. Install it with "
-            'pip install "floatbase[sweep]".'
-        ) from None
 
 
 def read_sweep(path: str | Path) -> DataFrame:
@@ -63,7 +51,7 @@ def read_sweep(path: str | Path) -> DataFrame:
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:
     """Return rows, as point number -> row, as a `pandas.DataFrame` that ends in "error"."""
-    pandas, points = require("pandas"), sorted(rows)
+    pandas, points = require("pandas", "sweep"), sorted(rows)
     names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
     return pandas.DataFrame(
         [rows[i] for i in points],

@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from floatbase._validation import signature_error
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InputError, SimulationError, require
 from floatbase.simulation.row_store import (
     RESERVED_NAMES,
     Row,
     RowStore,
     as_frame,
     as_json_value,
-    require,
 )
 
 if TYPE_CHECKING:
@@ -126,12 +125,12 @@ def sweep(
             "workers is the number of processes on this computer, so it cannot be combined with "
             "cluster. Give one of the two."
         )
-    require("pandas")  # missing libraries are reported before hours of work
+    require("pandas", "sweep")  # missing libraries are reported before hours of work
     job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
     with closing(RowStore(file, name, json_points)) as store:
         pending = [i for i in range(len(points)) if i not in store.rows]
         failed = sum(row["error"] is not None for row in store.rows.values())
-        bar = require("tqdm.auto").tqdm(
+        bar = require("tqdm.auto", "sweep").tqdm(
             total=len(points),
             initial=len(store.rows),
             desc=name,
@@ -229,7 +228,7 @@ def _check_function(function: Callable[..., Any], setup: Any, points: list[Row])
 def _worker_count(workers: Any) -> int:
     """Return the number of processes, checked."""
     if workers is None:
-        return int(require("loky").cpu_count())
+        return int(require("loky", "sweep").cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
         raise InputError(
             f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
@@ -241,7 +240,7 @@ def _worker_count(workers: Any) -> int:
 def _make_job(function: Any, setup: Any) -> _Job:
     """Pickle the function and setup."""
     try:
-        return _Job(uuid.uuid4().hex, require("cloudpickle").dumps((function, setup)))
+        return _Job(uuid.uuid4().hex, require("cloudpickle", "sweep").dumps((function, setup)))
     except InputError:
         raise
     except Exception as error:
@@ -258,7 +257,7 @@ def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
     On an exception, unfinished points are dropped.
     """
     if cluster is None:
-        executor = require("loky").get_reusable_executor(
+        executor = require("loky", "sweep").get_reusable_executor(
             workers,
             timeout=_WORKER_IDLE_TIMEOUT,
             initializer=_watch_parent,

@@ -43,6 +43,7 @@ class Controls:
         section: str = "",
         column: str = "",
         at_most: str = "",
+        on_release: bool = False,
     ) -> None:
         """Add a slider to the panel in the page.
 
@@ -65,7 +66,9 @@ class Controls:
         column : {"", "model", "reality"}, optional
             Column of the slider in a row of two; the name must end in this word.
         at_most : str, optional
-            Word shown instead of the highest value, such as "perfect".
+            Word shown instead of the highest value, such as "ideal".
+        on_release : bool, optional
+            Whether to call `changed` only when the slider is released.
 
         Raises
         ------
@@ -74,9 +77,11 @@ class Controls:
         """
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
         value, step = as_number("value", value, "", low, high), as_positive("step", step)
-        place = _placement(name, section, column) | (
+        place: dict[str, Any] = _placement(name, section, column) | (
             {"at_most": word} if (word := as_string("at_most", at_most)) else {}
         )
+        if as_bool("on_release", on_release):
+            place["on_release"] = True
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(name, changed, value=value, min=low, max=high, step=step, **place)
 

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -29,7 +30,7 @@ from numba.core.runtime import rtsys
 
 import floatbase as fb
 from floatbase.__main__ import main
-from floatbase.control.tick import CompiledTick, announce_if_slow, jit, tick
+from floatbase.control.tick import CompiledTick, announce_if_slow, compiled, jit, tick
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
@@ -38,9 +39,9 @@ TICK = Path(tick.__file__).parent
 
 def tick_of(robot: Robot) -> CompiledTick:
     """Return the compiled tick of a standing controller."""
-    compiled = judges.controller_of(robot.name).compiled
-    assert compiled is not None
-    return compiled
+    made = judges.controller_of(robot.name).compiled
+    assert made is not None
+    return made
 
 
 # when it runs -------------------------------------------------------------------------------------
@@ -188,6 +189,27 @@ def test_a_long_compilation_is_announced_and_a_short_one_is_not(
     with announce_if_slow("this takes long", after=60.0):
         pass
     assert capsys.readouterr().err == ""
+
+
+def test_a_slow_start_that_only_loads_is_not_announced_as_a_compilation(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiled, "announce_if_slow", partial(announce_if_slow, after=0.0))
+    monkeypatch.setattr(compiled, "_RECHECK_INTERVAL", 0.01)
+    made = tick_of(judges.load("go2"))
+    misses, work = made._tick.stats.cache_misses, made._tick_standing
+
+    def slowly(begins_compiling: bool) -> None:
+        if begins_compiling:
+            misses["a signature"] += 1
+        time.sleep(0.2)
+        work()
+
+    for begins, said in ((False, ""), (True, "floatbase is compiling its controller")):
+        monkeypatch.setattr(made, "_tick_standing", partial(slowly, begins))
+        assert made.warm_up() == "" and capsys.readouterr().err.startswith(said)
+        assert bool(said) == begins
+    misses.pop("a signature")
 
 
 # what is kept on disk -----------------------------------------------------------------------------

@@ -206,6 +206,27 @@ def test_a_pipe_or_a_device_among_the_files_is_reported(
     }
 
 
+def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None:
+    check("00.1", LIFTED)
+    (learner / "answers-A_B.json").write_text("notes")
+    names = ["A.B", "A B", "A_B"]
+    paths = [hand_in(name) for name in names]
+    assert [path.name for path in paths] == [f"answers-A_B-{n}.json" for n in (2, 3, 4)]
+    assert [hand_in(name) for name in reversed(names)] == paths[::-1]
+    assert [json.loads(path.read_text())["name"] for path in paths] == names
+    assert (learner / "answers-A_B.json").read_text() == "notes"
+    os.mkfifo(learner / "answers-Eve.json")
+    os.symlink(learner / "nowhere", learner / "answers-Eve-2.json")
+    assert hand_in("Eve").name == "answers-Eve-3.json"
+
+
+@pytest.mark.parametrize("folder", [5, None, "a\0b", ["."]])
+def test_a_folder_that_is_no_path_is_refused(learner: Path, folder: Any) -> None:
+    check("00.1", LIFTED)
+    with pytest.raises(InputError, match="folder"):
+        hand_in("Ada", folder)
+
+
 def test_of_two_files_of_a_learner_the_last_one_in_time_counts(learner: Path) -> None:
     check("00.1", LIFTED)
     files = []

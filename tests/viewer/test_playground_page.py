@@ -6,12 +6,14 @@ It is also tested as a notebook shows it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from messages import raises
 from waiting import until
 
 import floatbase as fb
+from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 from floatbase.playground import CHALLENGES, Playground, mean_force_error, playground
 from floatbase.robots import Robot
 
@@ -72,6 +74,73 @@ def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> Non
     )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
     page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
+
+
+def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> None:
+    opened(page, field)
+    box = page.locator("input[aria-label='push [N]']").bounding_box()
+    y = box["y"] + 0.5 * box["height"]
+    page.mouse.move(box["x"] + 0.3 * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.1 * box["width"], y, steps=4)
+    page.wait_for_timeout(300)
+    assert field._last_push is None
+    page.mouse.up()
+    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
+    assert field._last_push.force[0] == field.force > 0.0
+    field._last_push = None
+    page.evaluate("viewer.gui_controllers['push [N]'].setValue(0)")
+    until(lambda: field.force == 0.0, lambda: page.wait_for_timeout(20))
+    assert field._last_push is None
+
+
+def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) -> None:
+    opened(page, field)
+    page.wait_for_timeout(500)
+    # the middle of the base on the page, and the same point moved in the direction of +y
+    pixels = """(ahead) => {
+      const {Vector3} = MeshCat.THREE, {camera, renderer, scene_tree} = viewer;
+      const robot = scene_tree.find(['meshcat', 'robot']).object;
+      const at = new MeshCat.THREE.Box3().setFromObject(robot).getCenter(new Vector3());
+      at.y += 0.05;
+      at.z -= ahead;
+      const {x, y} = at.project(camera);
+      const {left, top, width, height} = renderer.domElement.getBoundingClientRect();
+      return [left + width * (1 + x) / 2, top + height * (1 - y) / 2];
+    }"""
+    (x, y), (ahead_x, ahead_y) = page.evaluate(pixels, 0.0), page.evaluate(pixels, 0.2)
+    view = page.evaluate("viewer.camera.position.toArray()")
+    page.keyboard.down("Shift")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(ahead_x, ahead_y, steps=5)
+    assert field._last_push is None
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    until(lambda: field._last_push is not None, lambda: page.wait_for_timeout(20))
+    assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
+    assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)
+
+
+@pytest.mark.parametrize("size", [(1200, 700), (390, 780)])
+def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
+    page, field: Playground, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    opened(page, field)
+    assert "Push the robot" in page.evaluate(
+        "document.querySelector('#panel p:not(.plot)').textContent"
+    )
+    page.evaluate("document.querySelectorAll('#panel summary').forEach((one) => one.click())")
+    for way in (0, 300, 600):
+        page.evaluate("(way) => { document.getElementById('panel').scrollTop = way; }", way)
+        hidden = """[...document.querySelectorAll('#panel .head button, #fold')].filter((one) => {
+          const {left, top, width, height} = one.getBoundingClientRect();
+          return document.elementFromPoint(left + width / 2, top + height / 2) !== one;
+        }).map((one) => one.textContent)"""
+        assert page.evaluate(hidden) == []
+    page.locator("#panel .head button", has_text="pause").click()
+    until(lambda: field.run.status == "paused", lambda: page.wait_for_timeout(20))
 
 
 def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
@@ -204,11 +273,132 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(
 def test_an_unknown_setting_is_refused_and_the_run_continues(
     field: Playground,
 ) -> None:
-    with raises(TypeError, "frction"):
+    with raises(UnknownNameError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
     field.set(facets=6)  # while its last slice may still run
     assert field.session.settings.facets == 6 and field.run.status == "paused"
+
+
+def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
+    """Steps of one drag are one change, and a refused change is none."""
+    paused = Playground(go2)
+    try:
+        first = paused.session.settings
+        for value in (0.6, 0.5, 0.4):
+            paused.set(friction=(value, 0.7))
+        paused.set(mass=(1.0, 1.5), facets=6)
+        paused.set(lifted_feet=("paw",))
+        paused.undo()
+        assert paused.session.settings == replace(first, friction=(0.4, 0.7))
+        paused.undo()
+        assert paused.session.settings == first and paused.session.refusal == ""
+        paused.undo()
+        assert paused.session.settings == first
+        paused.set(slope=(0.0, 5.0))
+        paused.reset_all()
+        paused.undo()  # a reset of everything forgets the changes before it
+        until(lambda: paused.session.settings == first)
+    finally:
+        paused.close()
+
+
+def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
+    opened(page, field)
+    for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
+        before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
+        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
+        until(
+            lambda: field.session.settings != field._initial_settings,
+            lambda: page.wait_for_timeout(20),
+        )
+        if keys:
+            page.keyboard.press(keys)
+        else:
+            page.locator("#panel button", has_text="undo").click()
+        until(
+            lambda: field.session.settings == field._initial_settings,
+            lambda: page.wait_for_timeout(20),
+        )
+        page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
+
+
+def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> None:
+    opened(page, field)
+    assert page.evaluate("location.hash") == ""
+    page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
+    page.evaluate("viewer.gui_controllers['stand on FL_foot'].setValue(false)")
+    page.evaluate("viewer.gui_controllers['speed'].setValue(0.5)")
+    page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
+    page.evaluate("viewer.gui_controllers['undo'].fire()")
+    page.wait_for_function("location.hash == '#facets=7'")
+
+    page.goto("about:blank")
+    page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
+    until(
+        lambda: (
+            field.session.settings.gait == "trot" and field.session.settings.friction == (0.7, 0.3)
+        ),
+        lambda: page.wait_for_timeout(20),
+    )
+    page.evaluate("location.hash = '#facets=5'")
+    until(
+        lambda: field.session.settings.facets == 5 and field.session.settings.gait is None,
+        lambda: page.wait_for_timeout(20),
+    )
+    assert field.session.settings.friction == (0.7, 0.7)
+
+
+def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
+    with raises(InputError, "robot", 5):
+        playground(5)
+    with raises(InputError, "settings", 5):
+        playground("go2", 5)
+    for call in (
+        lambda: field.push("x"),
+        lambda: field.push(10.0, "x"),
+        lambda: field.push(float("nan")),
+        lambda: field.start_challenge(5),
+        lambda: field.show_term([1], True),
+        lambda: field.show_term("nothing", True),
+        lambda: field.show_term("forces", "no"),
+    ):
+        with pytest.raises(FloatbaseError):
+            call()
+    assert field.force == field._default_push and field.challenge is None
+
+
+def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(
+    go2: Robot,
+) -> None:
+    """The physics accepts a slope of 89°, but the picture does not."""
+    paused = Playground(go2)
+    try:
+        before, ground = paused.session.settings, paused.view.painter.ground
+        paused.set(slope=(0.0, 89.0), facets=6)
+        assert "ground" in paused.session.refusal and paused.session.settings == before
+        assert paused.view.painter.ground == ground
+        paused.set(torque_fraction=0.9)
+        assert paused.session.refusal == "" and paused.session.settings.torque_fraction == 0.9
+        paused.start()
+        paused.set(slope=(0.0, 89.0))
+        until(lambda: "ground" in paused.session.refusal and paused.session.sim.time > 0.2)
+        paused.set(friction=(0.7, 0.6))
+        until(lambda: paused.session.settings.friction == (0.7, 0.6))
+        assert paused.run.status == "running" and paused.session.settings.slope == (0.0, 0.0)
+    finally:
+        paused.close()
+
+
+def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: Playground) -> None:
+    field.set(gait="trot", actual_off=("gravity",))
+    until(lambda: field.run.status == "fell")
+    until(lambda: field.outcome.startswith("left the ground"))
+    field.set(actual_off=())
+    field.run.reset()
+    until(lambda: field.run.status == "running" and field.outcome == "")
+    field.push(240.0, 90.0)
+    until(lambda: field.outcome.startswith("fell"))
 
 
 def test_reset_everything_works_for_an_arm() -> None:

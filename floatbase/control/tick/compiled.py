@@ -6,12 +6,12 @@ numba is slow to load, so the modules that need it are imported when the first p
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from math import prod
-from threading import Timer
+from threading import Event, Thread
 from typing import Any, cast
 
 import numpy as np
@@ -22,6 +22,8 @@ from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem, tas
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
+
+_RECHECK_INTERVAL = 1.0  # s
 
 # joints whose axes are fixed in their own frame
 _JOINTS = (
@@ -35,23 +37,37 @@ _JOINTS = (
 
 
 @contextmanager
-def announce_if_slow(text: str, after: float = 6.0) -> Iterator[None]:
+def announce_if_slow(
+    text: str, is_true: Callable[[], bool] = lambda: True, after: float = 6.0
+) -> Iterator[None]:
     """Print a message to stderr if the enclosed code takes more than `after` seconds.
 
     Parameters
     ----------
     text : str
         The text.
+    is_true : callable, optional
+        Called as is_true() after that time, and every second from then on. The text is printed when
+        it first returns True.
     after : float, optional
         Delay [s].
     """
-    timer = Timer(after, lambda: print(text, file=sys.stderr, flush=True))
-    timer.daemon = True
-    timer.start()
+    ended = Event()
+
+    def announce() -> None:
+        """Wait for the moment to print the text."""
+        delay = after
+        while not ended.wait(delay):
+            if is_true():
+                print(text, file=sys.stderr, flush=True)
+                return
+            delay = _RECHECK_INTERVAL
+
+    Thread(target=announce, name="floatbase-announcement", daemon=True).start()
     try:
         yield
     finally:
-        timer.cancel()
+        ended.set()
 
 
 def cache_warning() -> str:
@@ -220,7 +236,11 @@ class CompiledTick:
         from floatbase.control.tick import jit, tick
 
         duration = cache_warning() or ". This happens once and takes about a minute"
-        with announce_if_slow(f"floatbase is compiling its controller{duration}."):
+        n_compiled = self._compilation_count()
+        with announce_if_slow(
+            f"floatbase is compiling its controller{duration}.",
+            lambda: self._compilation_count() > n_compiled,
+        ):
             try:
                 self._tick_standing()
             except Exception as cache_failure:  # damaged files may raise anything
@@ -233,6 +253,10 @@ class CompiledTick:
                     return f"numba could not compile the tick ({type(error).__name__}: {error})"
                 jit.cache_error = f"{type(cache_failure).__name__}: {cache_failure}"
         return ""
+
+    def _compilation_count(self) -> int:
+        """Return how often the tick was compiled, or begun to be, rather than loaded from disk."""
+        return sum(self._tick.stats.cache_misses.values())
 
     def _tick_standing(self) -> None:
         """Run one tick at the robot's standing state."""

@@ -62,10 +62,10 @@ def forces_of(space: Parametrisation, beta, forces):
 
 @jit_forceinline
 def worst_facet(limits: Inequalities, first, f):
-    """Return the facet of a point that the force f violates most and by how much, or -1; eq. (28).
+    """Return the row of the facet that a point's force f violates most, or -1, and by how much.
 
-    first: row of the point's first facet. Forces inside the circle that the facets touch violate
-    none.
+    The facets are those of eq. (28). first: row of the point's first facet. Forces inside the
+    circle that the facets touch violate none.
     """
     normal = times(-1.0, row_part(limits.cones, first + limits.facets, 0))
     mu, normal_force = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)

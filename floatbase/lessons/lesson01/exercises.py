@@ -248,7 +248,7 @@ EXERCISES = (
                     "base_last": "The base comes first in q, as in (2). Here its rows come last.",
                     "zeros": "All entries are zero, so no motor drives anything. Where does "
                     "each torque act?",
-                    "sign": "Does a positive torque push a joint backwards? One sign is wrong.",
+                    "sign": "The sign is wrong. Should a positive torque push its joint backwards?",
                 },
             ),
         ),

@@ -254,8 +254,8 @@ def judge_all_pairs(answer: Any) -> Verdict:
 
 
 def unloading_examples() -> list[Example]:
-    # forces whose sum and moment are zero
     """Return examples for exercise 03.3."""
+    # forces whose sum and moment are zero
     wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
     forces, squeezes = standing_forces(), internal_forces(standing_go2_eom())
     less = 20.0 - forces[2]

@@ -155,7 +155,7 @@ def _judge_design(answer: Any) -> Verdict:
         most = f"the friction force at one foot is {friction:.1f} N"
         return Verdict(
             False,
-            f"The robot moves as desired, but {most}. The effort does not depend on friction. Use "
+            f"The robot moves as desired, but {most}. The effort does not penalize friction. Use "
             f"a cost on λ, pulled back to τ.",
             "friction",
         )

@@ -169,8 +169,7 @@ def _friction(case: Case, box: BlackBox) -> _Evidence:
             "that is the angle of the cone. Give its tangent.",
         ),
     }
-    otherwise = "use feet that slide under load, and forces along and perpendicular to the "
-    "ground."
+    otherwise = "use feet that slide under load, and forces along the ground and normal to it."
     return _Evidence(mu, _EVIDENCE_TOLERANCES["friction"], known, otherwise)
 
 

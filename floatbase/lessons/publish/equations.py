@@ -165,7 +165,7 @@ def _tests_by_name() -> dict[str, set[str]]:
                 helpers = set().union(
                     *(functions[name] for name in names if name in functions), names
                 )
-                for name in helpers:
+                for name in sorted(helpers):
                     found.setdefault(name, set()).add(
                         f"{path.relative_to(_TESTS).as_posix()}::{test}"
                     )

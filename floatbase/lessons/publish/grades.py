@@ -168,7 +168,7 @@ def grade_files(
     latest : bool
         Whether to keep only the last file of each name.
     before : datetime, optional
-        Whether to leave out files that were written later, or that do not say when.
+        Leave out files that were written later, or that do not say when.
 
     Returns
     -------

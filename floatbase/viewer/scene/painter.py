@@ -15,7 +15,7 @@ from floatbase._validation import (
     cached_property,
 )
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.errors import InputError
+from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.viewer.scene import geometry, markers, shapes, threejs
 from floatbase.viewer.scene.colours import GHOST, RGB
@@ -101,6 +101,8 @@ class Painter:
         InputError
             If the state belongs to a different robot, or if the forces do not match the contacts.
         """
+        for name in options.keys() - PictureOptions.__dataclass_fields__.keys():
+            raise unknown_name("option of a picture", name, PictureOptions.__dataclass_fields__)
         chosen = PictureOptions(**options)
         self._check_state(state)
         if contacts is not None:
@@ -171,7 +173,8 @@ class Painter:
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
         computed |= {"_ghost_shapes", "_scale_bars"}
-        other.__dict__.update({name: self.__dict__[name] for name in computed & set(self.__dict__)})
+        kept = {name: value for name, value in self.__dict__.items() if name in computed}
+        other.__dict__.update(kept)
         return other
 
     def ground_only(self) -> Picture:

@@ -137,7 +137,7 @@ class Server:
             client.channel.close_page("the window was closed")
         if self._http is not None:
             await self._http.close_all_connections()
-        rest = asyncio.all_tasks() - {asyncio.current_task()}
+        rest = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in rest:
             task.cancel()
         await asyncio.gather(*rest, return_exceptions=True)

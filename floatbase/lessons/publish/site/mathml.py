@@ -62,9 +62,8 @@ def write_font(pages: Iterable[str], target: Path) -> None:
         letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))
     }
     cutter = subset.Subsetter(subset.Options(layout_features=["ssty"], notdef_outline=True))
-    cutter.populate(
-        unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}]
-    )
+    letters |= {_slanted(letter) for letter in letters}
+    cutter.populate(unicodes=[ord(letter) for letter in sorted(letters)])
     with subset.load_font(_font_file(), subset.Options()) as font:
         cutter.subset(font)
         font.flavor = "woff"

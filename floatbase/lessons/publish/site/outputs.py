@@ -59,8 +59,9 @@ def run_lessons(lessons: Iterable[Path], cache: Path) -> dict[Path, Any]:
         for path in pool.map(_run_lesson, new, new.values()):
             print(f"run: {path.name}", flush=True)
     for path, file in files.items():
-        for former in set(cache.glob(f"{path.stem}-*.ipynb")) - {file}:
-            former.unlink()
+        for former in cache.glob(f"{path.stem}-*.ipynb"):
+            if former != file:
+                former.unlink()
     return {path: read_notebook(file) for path, file in files.items()}
 
 

@@ -9,6 +9,7 @@ const SLOWEST = 1000; // ms, longest time between pictures that counts: at low r
 const WIDE = 1.2; // width / height of a picture that fits a robot; a narrower picture is zoomed out
 const MIN_ZOOM = 0.2; // in the smallest window
 const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
+const LOW_JUMP = 0.2; // m: the camera stays down if the robot rises by less, however low it stands
 const REST = 1e-3; // m: closer than this, it has arrived
 const COMPANIONS = [
   ["meshcat", "scale"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"],
@@ -19,6 +20,13 @@ export function groundHeight(planes, {x, z}) {
   return Math.max(
     ...planes.map(({normal, offset}) => (offset - normal[0] * x - normal[2] * z) / normal[1]),
   );
+}
+
+// m: how far the camera rises with an object that was at `before` above the ground and is at `now`.
+// It ignores steps and jumps up to twice the first height, and then catches up.
+export function liftOf(before, now) {
+  const rise = now - before, ignored = Math.max(before, LOW_JUMP);
+  return Math.max(0, Math.min(rise, 2 * (rise - ignored)));
 }
 
 // The fraction of the remaining distance that the camera moves in `elapsed` ms.
@@ -51,7 +59,8 @@ export function createCamera(viewer, panel) {
     return (element("player").offsetHeight + panel.height() - board) / 2;
   };
 
-  // Follow at a constant height above the ground. Returns whether the camera is still moving.
+  // Follow at a constant height above the ground, and rise with an object that flies away. Returns
+  // whether the camera is still moving.
   function follow() {
     const now = performance.now();
     const fraction = isSmooth && !isFirst ? followFraction(now - clock) : 1;
@@ -60,7 +69,8 @@ export function createCamera(viewer, panel) {
     const found = findNode(viewer, path);
     if (!found) return false;
     const at = found.object.getWorldPosition(new Vector3());
-    const rise = groundHeight(planes, at) - groundHeight(planes, from);
+    const [ground, first] = [at, from].map((place) => groundHeight(planes, place));
+    const rise = ground - first + liftOf(from.y - first, at.y - ground);
     const way = at.clone().sub(from).setY(rise).sub(gone);
     const step = way.clone().multiplyScalar(way.length() < REST ? 1 : fraction);
     gone.add(step);

@@ -15,6 +15,10 @@ export function rowOf({name, column, section = ""}) {
   return {label, key: `${section}/${label}`};
 }
 
+// Whether a key undoes the last change: Ctrl+Z, or ⌘Z on a Mac.
+export const isUndo = ({key, ctrlKey, metaKey, shiftKey, altKey}) =>
+  key.toLowerCase() === "z" && (ctrlKey || metaKey) && !shiftKey && !altKey;
+
 // Number of decimals of a value that changes in such steps.
 export function digits(step) {
   return Math.max(0, Math.min(6, Math.ceil(-Math.log10(step || 1))));

@@ -1,7 +1,7 @@
 // The panel beside the picture: controls in sections, a table of pairs, the terms of an equation,
 // texts, and a plot. Every control reports to the window by its name.
 
-import {createReports, kindOf, rowOf, sliderText} from "./controls.js";
+import {createReports, isUndo, kindOf, rowOf, sliderText} from "./controls.js";
 import {element, make} from "./dom.js";
 import {createPlot} from "./plot.js";
 
@@ -18,6 +18,15 @@ export function createPanel({report: send, redraw}) {
     foldButton.setAttribute("aria-expanded", !closed);
     redraw();
   };
+
+  const head = make("div", {className: "head"}); // stays visible when the panel is scrolled
+  root.append(head);
+
+  addEventListener("keydown", (event) => {
+    if (!controls.undo || !isUndo(event)) return;
+    event.preventDefault();
+    controls.undo.fire();
+  });
 
   const isBelow = () => root.offsetWidth >= innerWidth;
   function section(name = "") {
@@ -49,7 +58,7 @@ export function createPanel({report: send, redraw}) {
   }
 
   function slider(command) {
-    const {name, at_most} = command;
+    const {name, at_most, on_release: waits} = command;
     const input = make("input", {type: "range"}), shown = make("output");
     const show = (now) => {
       input.value = now;
@@ -67,10 +76,13 @@ export function createPanel({report: send, redraw}) {
     };
     input.setAttribute("aria-label", name);
     remake(command);
-    input.oninput = () => setValue(input.value);
+    input.oninput = () => waits ? show(input.value) : setValue(input.value);
+    if (waits) input.onchange = () => setValue(input.value);
     input.ondblclick = () => setValue(input.dataset.home);
     row(command).append(input, shown);
-    return {getValue: () => Number(input.value), show, setValue, remake};
+    return {
+      getValue: () => Number(input.value), getMax: () => Number(input.max), show, setValue, remake,
+    };
   }
   function checkbox(command) {
     const {name, value} = command;
@@ -98,10 +110,11 @@ export function createPanel({report: send, redraw}) {
     const made = make("button", {type: "button", textContent: name});
     const press = () => report(name, null);
     made.onclick = press;
-    const last = section(where).lastElementChild;
+    if (name === "undo") made.title = "key: Ctrl+Z";
+    const place = where ? section(where) : (section(), head), last = place.lastElementChild;
     const line = last?.classList.contains("buttons") ? last : make("div", {className: "buttons"});
     line.append(made);
-    section(where).append(line);
+    place.append(line);
     return {getValue: () => press, show() {}, fire: () => made.click()};
   }
 
@@ -162,7 +175,10 @@ export function createPanel({report: send, redraw}) {
       }
       if (line.textContent !== text) line.textContent = text;
     },
-    addPoint: createPlot((...elements) => section().prepend(...elements)),
+    addPoint: createPlot((...elements) => {
+      section();
+      head.prepend(...elements);
+    }),
   };
 }
 

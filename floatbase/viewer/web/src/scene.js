@@ -1,7 +1,9 @@
 // The scene of a page: meshcat's viewer with our commands. It draws frames from any source.
 
+import {createAddress} from "./address.js";
 import {createCamera} from "./camera.js";
 import {element} from "./dom.js";
+import {createDrag} from "./drag.js";
 import {createInteraction} from "./interaction.js";
 import {createLegend} from "./legend.js";
 import {splitFrame} from "./loader.js";
@@ -10,19 +12,26 @@ import {createPanel} from "./panel.js";
 import {createPlayer} from "./player.js";
 import {createTheme} from "./theme.js";
 
-// config: {backgrounds, shades}, see theme.js. Throws an error if the browser has no WebGL.
+// config: {mode, backgrounds, shades}, see page.js and theme.js. Throws an error if the browser has
+// no WebGL.
 export function createScene(config) {
   const viewer = createViewer(element("meshcat-pane"));
   let send = () => {};
   const player = createPlayer(viewer);
   const panel = createPanel({
-    report: (message) => send(message), redraw: () => viewer.set_dirty(),
+    report(message) {
+      send(message);
+      address?.changed();
+    },
+    redraw: () => viewer.set_dirty(),
   });
+  const address = config.mode === "live" ? createAddress(panel.controls) : null;
   const camera = createCamera(viewer, panel);
   const theme = createTheme(viewer, config);
   const legend = createLegend(camera, theme.colour);
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
+  createDrag(viewer, panel.controls);
   new ResizeObserver(([{target}]) => {
     element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
   }).observe(element("title"));
@@ -42,8 +51,14 @@ export function createScene(config) {
       meshcat(command);
       player.load(command);
     },
-    set_control: panel.addControl,
-    set_control_value: panel.setValue,
+    set_control(command) {
+      panel.addControl(command);
+      address?.added(command);
+    },
+    set_control_value(command) {
+      panel.setValue(command);
+      address?.changed();
+    },
     set_text: panel.setText,
     add_plot_point: panel.addPoint,
   };

@@ -1,11 +1,19 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {followFraction, groundHeight, labelScale, zoomFor} from "../src/camera.js";
+import {followFraction, groundHeight, labelScale, liftOf, zoomFor} from "../src/camera.js";
 
 test("the ground is the highest of its planes", () => {
   const planes = [{normal: [0, 1, 0], offset: 0}, {normal: [-0.6, 0.8, 0], offset: 0}];
   assert.equal(groundHeight(planes, {x: -1, z: 3}), 0);
   assert.ok(Math.abs(groundHeight(planes, {x: 2, z: 0}) - 1.5) < 1e-12);
+});
+
+test("the camera rises with a robot that flies away, but not with a step or a jump", () => {
+  assert.deepEqual([0.1, 0.3, 0.45, 0.6].map((now) => liftOf(0.3, now)), [0, 0, 0, 0]);
+  assert.ok(Math.abs(liftOf(0.3, 0.8) - 0.4) < 1e-12);
+  assert.equal(liftOf(0.3, 4), 3.7);
+  assert.equal(liftOf(0, 0.2), 0);
+  assert.equal(liftOf(-0.1, 0.05), 0);
 });
 
 test("the camera follows alike at any rate of pictures", () => {

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {createReports, digits, kindOf, rowOf, sliderText} from "../src/controls.js";
+import {createReports, digits, isUndo, kindOf, rowOf, sliderText} from "../src/controls.js";
 
 test("a command's fields say which control it is", () => {
   assert.equal(kindOf({value: 0.5, min: 0, max: 1, step: 0.1}), "slider");
@@ -17,6 +17,11 @@ test("two columns of a name are one row, and rows of two sections are two", () =
   assert.deepEqual(model, {label: "friction", key: "ground/friction"});
   assert.deepEqual(reality, model);
   assert.deepEqual(rowOf({name: "__proto__"}), {label: "__proto__", key: "/__proto__"});
+});
+
+test("Ctrl+Z and ⌘Z undo, Z alone and Ctrl+Shift+Z do not", () => {
+  assert.ok(isUndo({key: "z", ctrlKey: true}) && isUndo({key: "Z", metaKey: true}));
+  assert.ok(!isUndo({key: "z"}) && !isUndo({key: "Z", ctrlKey: true, shiftKey: true}));
 });
 
 test("a slider shows the digits of its step, and a word for its largest value", () => {

@@ -1,0 +1,64 @@
+// Settings in the page's address, as in #facets=7&gait=trot: the controls that were moved from
+// their first values. Such an address can be kept and shared. Controls at the top of the panel are
+// left out: they push the robot or start a challenge.
+
+import {kindOf} from "./controls.js";
+
+const DELAY = 300; // ms: browsers refuse an address that changes too often
+const SWITCHES = new Map([["on", true], ["off", false]]);
+
+export const isKept = (command) =>
+  Boolean(command.term || command.section) && kindOf(command) !== "button";
+
+// The value of a control as a text, and back; undefined for a text that is no value.
+export function textOf({choices}, value) {
+  if (choices) return choices[value];
+  return typeof value === "boolean" ? (value ? "on" : "off") : String(value);
+}
+export function valueOf(command, text) {
+  const kind = kindOf(command);
+  if (kind === "choice") {
+    const number = command.choices.indexOf(text);
+    return number < 0 ? undefined : number;
+  }
+  if (kind !== "slider") return SWITCHES.get(text);
+  return text.trim() && Number.isFinite(Number(text)) ? Number(text) : undefined;
+}
+
+export const readHash = (hash) => new Map(new URLSearchParams(hash.replace(/^#/, "")));
+export function writeHash(entries) {
+  const text = String(new URLSearchParams(entries));
+  return text && `#${text}`;
+}
+
+// controls: {name: {getValue, setValue}}, those of the panel.
+export function createAddress(controls) {
+  const kept = new Map(); // name -> {command, first: text of the first value}
+  let timer = null;
+  const present = ([name, {command}]) => textOf(command, controls[name].getValue());
+  function set(name, text) {
+    const {command} = kept.get(name), value = valueOf(command, text);
+    if (value !== undefined && text !== present([name, {command}])) controls[name].setValue(value);
+  }
+  function write() {
+    timer = null;
+    const moved = [...kept].filter((entry) => present(entry) !== entry[1].first)
+      .map((entry) => [entry[0], present(entry)]);
+    history.replaceState(null, "", location.pathname + location.search + writeHash(moved));
+  }
+  addEventListener("hashchange", () => {
+    const wanted = readHash(location.hash);
+    for (const [name, {first}] of kept) set(name, wanted.get(name) ?? first);
+  });
+  return {
+    // A control is new, or was added again.
+    added(command) {
+      const {name} = command;
+      if (!isKept(command) || kept.has(name)) return;
+      kept.set(name, {command, first: present([name, {command}])});
+      const text = readHash(location.hash).get(name);
+      if (text !== undefined) set(name, text);
+    },
+    changed() { timer ??= setTimeout(write, DELAY); },
+  };
+}
