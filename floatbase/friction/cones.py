@@ -176,7 +176,7 @@ class FrictionCone(Value):
         return self.mu * parts.alpha_perp - parts.alpha_par
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Return whether friction can produce a force, that is margin ≥ -tolerance.
+        """Return whether friction can produce a force, that is, whether margin ≥ -tolerance.
 
         Parameters
         ----------
@@ -339,7 +339,7 @@ class FrictionPolyhedron(Value):
         return float(np.min(-self.face_matrix @ as_array("force", force, (3,), "N")))
 
     def contains(self, force: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Return whether a force lies in the polyhedron, that is margin ≥ -tolerance.
+        """Return whether a force lies in the polyhedron, that is, whether margin ≥ -tolerance.
 
         Parameters
         ----------

@@ -101,7 +101,7 @@ def compare(name: str, value: Any) -> None:
 
 
 def review(lesson: str = "") -> None:
-    """Print a table of your predictions: name, prediction, result and how far off it was.
+    """Print a table of your predictions: name, prediction, result and how far off you were.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def measured_push_recovery(lesson: str) -> PushRecovery:
     kept = _stored_pushes()
     if as_string("lesson", lesson) not in kept:
         raise InputError(
-            f"Lesson {lesson!r} has no push-recovery map. There are maps of {', '.join(kept)}."
+            f"Lesson {lesson!r} has no push-recovery map. The maps are {', '.join(kept)}."
         )
     controller = controller_factory(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS

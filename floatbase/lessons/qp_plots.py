@@ -38,7 +38,7 @@ def plot(
     qp : QP
         QP of two variables without equality constraints.
     box : tuple of float, optional
-        Visible range: from and to along the first variable, then along the second.
+        Visible range: minimum and maximum of the first variable, then of the second.
     working_set : sequence of str, optional
         Names of the inequality constraints that hold with equality; they are drawn thick.
     point : array_like, shape (2,), optional
@@ -92,7 +92,7 @@ def feasible_polygon(qp: QP, box: Box) -> Array:
     qp : QP
         QP of two variables without equality constraints.
     box : tuple of float
-        Range: from and to along the first variable, then along the second.
+        Range: minimum and maximum of the first variable, then of the second.
 
     Returns
     -------
@@ -111,8 +111,8 @@ def feasible_polygon(qp: QP, box: Box) -> Array:
     x0, x1, y0, y1 = as_array("box", box, (4,))
     if not (x0 < x1 and y0 < y1):
         raise InputError(
-            f"box is {tuple(box)}; it must contain from and to along each variable, in ascending "
-            f"order."
+            f"box is {tuple(box)}; it must contain the minimum and maximum of each variable, in "
+            f"ascending order."
         )
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     for normal, bound in zip(qp.G, qp.h, strict=True):

@@ -65,8 +65,9 @@ def centroidal_momentum(state: State) -> Array:
 def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
     """Compute the time derivative of the centroidal momentum for an acceleration q̈.
 
-    By the laws of Newton and Euler it equals (f_c + m g, τ_c). Here (f_c, τ_c) is the wrench of the
-    contact forces about the centre of mass. Joint torques are internal and have no effect.
+    By the laws of Newton and Euler, this rate equals (f_c + m g, τ_c). Here (f_c, τ_c) is the
+    wrench of the contact forces about the centre of mass. Joint torques are internal and have no
+    effect.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def centroidal_momentum_rate(state: State, qdd: npt.ArrayLike) -> Array:
 def net_force_matrix(contacts: Contacts) -> Array:
     """Compute the matrix G_f of the net contact force f_c = G_f λ.
 
-    It has one identity block for each contact point, four for four point feet.
+    G_f has one identity block for each contact point, four for four point feet.
 
     Parameters
     ----------
@@ -195,8 +196,8 @@ def wrench_objective(
     contacts : Contacts
         Contacts whose forces are λ.
     force : array_like, shape (3,)
-        Desired force f̃_c of the ground on the robot, in the world frame [N]. To stand still, it is
-        the robot's weight, upwards.
+        Desired force f̃_c of the ground on the robot, in the world frame [N]. For standing still,
+        the force is the robot's weight, upwards.
     moment : array_like, shape (3,)
         Desired moment τ̃_c about the centre of mass, in the world frame [N·m].
     force_weight : float, optional
@@ -293,8 +294,8 @@ def tangential_bias(contacts: Contacts) -> Quadratic:
 
     Notes
     -----
-    [FBR]_, eq. (23). This is its first part. The course text prints the norm without the square,
-    but only its square is quadratic.
+    [FBR]_, eq. (23). This cost is the first part of that equation. The course text prints the norm
+    without the square, but only its square is quadratic.
     """
     N = _normal_matrix(contacts)
     return Quadratic.from_residual(np.eye(len(N)) - N @ N.T, np.zeros(len(N)))
@@ -317,7 +318,7 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 
     Notes
     -----
-    [FBR]_, eq. (23). This is its second part, without the factor α.
+    [FBR]_, eq. (23). This cost is the second part of that equation, without the factor α.
     """
     N = _normal_matrix(contacts)
     numeric = numeric_copy(a)

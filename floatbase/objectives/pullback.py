@@ -134,7 +134,7 @@ def argmin_coordinates(cost: Quadratic, space: FeasibleSpace, block: Block) -> A
 def partial_minimum(cost: Quadratic, space: FeasibleSpace, block: Block) -> Quadratic:
     """Express a cost on β as the least cost for each value of one block (a Schur complement).
 
-    The result answers the question "What does this motion cost at least?" It is at most
+    The result answers the question "What does this motion cost at least?" The cost is at most
     `minimum_norm_pullback`, and equal to it where V of the block has full column rank.
 
     Parameters

@@ -41,7 +41,7 @@ class _BlockTask(TargetTask):
 class ForceTask(_BlockTask):
     """A task that keeps contact forces near a target, with residual λ - target.
 
-    With a small weight, it chooses among forces with the same wrench.
+    With a small weight, the task chooses among forces with the same wrench.
 
     Parameters
     ----------

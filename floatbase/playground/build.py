@@ -126,9 +126,9 @@ def actuators(settings: Settings, robot: Robot, state: State) -> FirstOrderLag |
     settings : Settings
         Settings of the playground.
     robot : Robot
-        Robot that they drive.
+        Robot that the actuators drive.
     state : State
-        State in which their initial torques hold the robot up.
+        State in which the actuators' initial torques hold the robot up.
 
     Returns
     -------

@@ -137,10 +137,10 @@ class Playground:
         Parameters
         ----------
         force : float, optional
-            Horizontal force [N]. By default, the last one set.
+            Horizontal force [N]. By default, the force that was set last.
         towards : float, optional
-            Direction of the push [degrees]: 0 is forward, 90 to the left. By default, the last one
-            set.
+            Direction of the push [degrees]: 0 is forward, 90 to the left. By default, the direction
+            that was set last.
 
         Raises
         ------

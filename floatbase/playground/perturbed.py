@@ -108,7 +108,7 @@ class PerturbedSimulation(Simulation):
 
     @property
     def perturbation(self) -> Perturbation:
-        """Current perturbation. Assign another one to change it."""
+        """Current perturbation. Assign a new one to change the physics."""
         return self._perturbation
 
     @perturbation.setter

@@ -133,7 +133,7 @@ def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end
 def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
     """Return marks on the ground: a patch for a foot, a label for any other name.
 
-    If there are two feet, they are connected by a line.
+    A line connects two feet.
 
     Parameters
     ----------

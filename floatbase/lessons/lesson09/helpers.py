@@ -127,7 +127,8 @@ def corner_forces(
 ) -> Array:
     """Return the forces at the corners of a sole whose wrench is closest to a given one.
 
-    The forces are inside their pyramids. If many forces have that wrench, they are the smallest.
+    The forces are inside their pyramids. If many forces have that wrench, the smallest ones are
+    returned.
 
     Parameters
     ----------

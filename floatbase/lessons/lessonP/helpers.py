@@ -65,7 +65,7 @@ def unknown_mass_record() -> Rollout:
 def time_on_two_feet(shift: npt.ArrayLike) -> float:
     """Return how long go2 stays up on FL and RR.
 
-    Before that, it shifts its centre of mass on four feet for a second.
+    Before that, go2 shifts its centre of mass on four feet for a second.
 
     Parameters
     ----------

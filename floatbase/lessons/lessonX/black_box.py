@@ -14,7 +14,7 @@ from floatbase.robots import Robot
 
 @dataclass(frozen=True, eq=False)
 class BlackBox(Value):
-    """Record of a robot that was to twist on four feet, with one row for each of n control steps.
+    """Record of a robot that should have twisted on four feet, one row for each of n control steps.
 
     The arrays are read-only. The joint torques were not measured.
 

@@ -34,7 +34,7 @@ FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors
 
 @dataclass(frozen=True)
 class Twist:
-    """Motion that a robot was to perform, and the slope it was on.
+    """Motion that a robot was supposed to perform, and the slope on which it stood.
 
     Parameters
     ----------

@@ -222,7 +222,7 @@ def _reports() -> list[Example]:
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
     def but(fault: str, line: str) -> list[str]:
-        """Return the report with another line about the box with a fault."""
+        """Return the report with a different line about the faulty box."""
         name = cases[fault].name
         return [f"{name}: {line}" if said.startswith(name) else said for said in report]
 

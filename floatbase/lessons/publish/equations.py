@@ -3,7 +3,7 @@
 A public docstring that cites the course text, as in "[FBR]_, eq. (9)." or "[FBR]_, App. A.",
 implements that equation. Public names are those that a package exports. A test counts if it names
 the function, a lesson if the metadata of one of its cells says that it teaches the equation.
-`formulas` has the equations themselves.
+`formulas` contains the equations themselves.
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ def path_part(name: str) -> str:
     Returns
     -------
     str
-        Name with underscores instead.
+        Name with underscores instead of slashes.
     """
     return name.replace("/", "_")
 

@@ -1,9 +1,9 @@
 """The picture in a notebook: a widget whose frames use the kernel's own connection, like sliders.
 
 The widget works wherever sliders work, without its own port: JupyterLab, Notebook, VS Code, Colab,
-JupyterHub, Voilà. The base class, `anywidget`'s, contains what each of these needs; our part is
-widget.js, which shows the page in a frame. The page's code is sent once to each page of the
-notebook that requests it.
+JupyterHub, Voilà. The base class from `anywidget` contains the code that each of these needs. This
+package adds widget.js, which shows the page in a frame. The page's code is sent once to each page
+of the notebook that requests it.
 """
 
 from __future__ import annotations
