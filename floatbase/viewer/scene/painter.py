@@ -101,7 +101,7 @@ class Painter:
         InputError
             If the state belongs to a different robot, or if the forces do not match the contacts.
         """
-        for name in options.keys() - PictureOptions.__dataclass_fields__.keys():
+        for name in sorted(options.keys() - PictureOptions.__dataclass_fields__.keys()):
             raise unknown_name("option of a picture", name, PictureOptions.__dataclass_fields__)
         chosen = PictureOptions(**options)
         self._check_state(state)
