@@ -118,5 +118,5 @@ web:
 	cd floatbase/viewer/web && npm ci --no-audit --no-fund && npm run lint && npm test && npm run build
 
 clean:
-	rm -rf $(VENV) build dist floatbase/viewer/web/node_modules .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist floatbase/viewer/web/node_modules .ci/proxy/node_modules .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -5,7 +5,7 @@ Each student needs an account of the machine, and all accounts need a Python tha
 
     make setup
     .venv/bin/python -m pip install -c environment.txt "jupyterhub>=5.2"
-    npm install -g configurable-http-proxy
+    npm install -g configurable-http-proxy@5.3.0
 
 Start the hub with:
 
@@ -18,6 +18,7 @@ students might attack each other, also give each server its own host name with
 with the other's rights.
 """
 
+import shlex
 import sys
 
 c = get_config()  # noqa: F821  JupyterHub defines it
@@ -29,12 +30,14 @@ c.Authenticator.blocked_users = {"root"}
 
 # What a student's server does first, as that student: make its files private, create a private
 # folder for the sockets between its processes, and update the lessons in ~/floatbase without
-# overwriting the student's work.
+# overwriting the student's work. A second process removes the folder when the server has ended.
+PYTHON = shlex.quote(sys.executable)
 START = f"""umask 077
 JUPYTER_RUNTIME_DIR=$(mktemp -d -t jupyter-XXXXXXXX) || exit 1
 export JUPYTER_RUNTIME_DIR
-{sys.executable} -m floatbase.lessons.publish workspace --to "$HOME/floatbase"
-exec {sys.executable} -m jupyterhub.singleuser "$@\""""
+(while kill -0 $$; do sleep 2; done; rm -rf "$JUPYTER_RUNTIME_DIR") </dev/null >/dev/null 2>&1 &
+{PYTHON} -m floatbase.lessons.publish workspace --to "$HOME/floatbase"
+exec {PYTHON} -m jupyterhub.singleuser "$@\""""
 c.Spawner.cmd = ["sh", "-c", START, "floatbase"]
 c.Spawner.default_url = "/lab/tree/floatbase/00_start_here.ipynb"
 c.Spawner.start_timeout = 120  # s: many servers start in the first minute of a class

@@ -79,7 +79,7 @@ EXTRAS = {
 }
 # declared, and not imported by name
 TOOLS = {
-    "clarabel", "editables", "example-robot-data-loaders", "hatchling", "jupyterhub", "jupyterlab",
+    "build", "editables", "example-robot-data-loaders", "hatchling", "jupyterhub", "jupyterlab",
     "mypy", "myst-nb", "nbval", "pycollada", "pytest-timeout", "pytest-xdist", "ruff",
     "sphinx-book-theme", "sphinx-design", "voila",
 }  # fmt: skip
@@ -150,6 +150,15 @@ def _imports(path: Path) -> set[tuple[int, str, bool]]:
     return found
 
 
+def private_names() -> Faults:
+    """A numba with a private option that the code uses is not newer than the one that is tested."""
+    (numba,) = (one for one in map(Requirement, PROJECT["dependencies"]) if one.name == "numba")
+    (locked,) = re.findall(r"^numba==(\d+)\.(\d+)", text("environment.txt"), flags=re.M)
+    upper_bound = f"<{locked[0]}.{int(locked[1]) + 1}"
+    if "_nrt" in text("floatbase/control/tick/jit.py") and upper_bound not in str(numba):
+        yield f"{numba} needs the upper bound {upper_bound}, because jit.py uses a private option"
+
+
 def version() -> Faults:
     """The version is the same everywhere."""
     number = PROJECT["version"]
@@ -203,7 +212,7 @@ def pythons() -> Faults:
 
 def scripts() -> Faults:
     """Scripts are executable and have no syntax error."""
-    for path in (".binder/postBuild", ".binder/start", ".ci/run"):
+    for path in (".binder/postBuild", ".binder/start", ".ci/bounds", ".ci/run"):
         if (
             not os.access(ROOT / path, os.X_OK)
             or subprocess.run(["bash", "-n", ROOT / path]).returncode
@@ -236,6 +245,10 @@ def workflows() -> Faults:
             yield f"a workflow runs {script}, which does not exist"
     if "secrets." in publish:
         yield "publish.yml has a password"
+    if (tests + publish).count("persist-credentials: false") < (tests + publish).count("checkout@"):
+        yield "a checkout keeps its credentials"
+    if "python -m build --no-isolation" not in publish:
+        yield "publish.yml builds with versions that are not in environment.txt"
 
 
 def commands() -> Faults:
@@ -312,7 +325,10 @@ def _numbers(ranges: str) -> set[str]:
 
 
 CHECKS: tuple[Callable[[], Faults], ...]
-CHECKS = (lock, imports, version, container, pythons, scripts, hub, workflows, commands, pages)
+CHECKS = (
+    lock, imports, private_names, version, container, pythons, scripts, hub, workflows, commands,
+    pages,
+)  # fmt: skip
 
 
 def main() -> int:

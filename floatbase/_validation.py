@@ -27,7 +27,7 @@ _MAX_REPR = 60  # characters of a value that a message shows
 class cached_property(functools.cached_property[T]):
     """A property computed on first use and then kept; threads that compete get the first result.
 
-    It takes no lock, unlike the one of functools in Python 3.11. A value computes the same result
+    No lock is taken, unlike in functools of Python 3.11. A value computes the same result
     every time, and a lock that another thread holds during a fork is never released in the child.
     """
 
@@ -104,7 +104,7 @@ def refuse_new_attributes(self: object, name: str, value: object) -> None:
     """Set an attribute, as `__setattr__` of a class whose public attributes are properties.
 
     Any other public name raises `AttributeError`: a misspelled one would be set and never read.
-    Classes derived from such a class may set attributes of their own.
+    Classes derived from such a class may set further attributes.
     """
     cls = type(self)
     if not name.startswith("_") and not hasattr(cls, name) and "__setattr__" in vars(cls):
@@ -190,7 +190,7 @@ def as_callable(name: str, value: Any, usage: str) -> Any:
 
 
 def signature_error(function: Any, *args: object, **kwargs: object) -> str:
-    """Return why a function cannot be called like this, or "" if it can be or has no signature."""
+    """Return why a function cannot take these arguments, or "" if it can or has no signature."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):
@@ -266,7 +266,7 @@ def numeric_copy(value: Any) -> Array | None:
 def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "") -> Array:
     """Return `value` as a read-only array after checking its shape (None = any length) and entries.
 
-    All entries must be finite real numbers of at most `MAX_MAGNITUDE`.
+    All entries must be finite real numbers of magnitude at most `MAX_MAGNITUDE`.
     """
     array = value if _is_read_only(value) else numeric_copy(value)
     if array is None:

@@ -390,7 +390,7 @@ class Quadratic(Value):
         Parameters
         ----------
         f : Affine
-            Map whose output the cost takes.
+            Map whose output is the argument of the cost.
 
         Returns
         -------

@@ -7,7 +7,8 @@ Symbols
     k           length of λ: three for each contact point, one for each row of a `LinearConstraint`
     m           number of constraint rows of the contacts
     q           configuration: base position (world frame, m), base quaternion x y z w, then joints
-                (rad or m); a joint without limits has its cosine and sine
+                (rad or m); a joint without limits is given by its cosine and
+                sine
     v           velocity: base linear (m/s) and angular (rad/s) velocity, both in the base frame,
                 then joints
     q̈, qdd      acceleration: the time derivative of v
@@ -55,8 +56,8 @@ their units are 1/(m/s²)², 1/N² and 1/(N·m)².
 Immutable objects
 -----------------
 Objects such as `State`, `Contacts`, `QP` and `Solution` are immutable and hold read-only float64
-arrays. To change one, make a copy with `replace(…)`, which is a method or the function of
-`dataclasses`. Arrays that a call computes may be modified. Exceptions of the package derive from
+arrays. To change one, make a copy with its method `replace(…)` or with `dataclasses.replace(…)`.
+Arrays that a call computes may be modified. Exceptions of the package derive from
 `fb.FloatbaseError`. Their messages say what is wrong, what is expected, and what to do.
 
 Importing

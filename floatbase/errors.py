@@ -31,7 +31,7 @@ class RobotWarning(UserWarning):
 
 
 class SimulationWarning(UserWarning):
-    """A part of the input of a rollout has no effect; the message says which part and why."""
+    """A part of the input of a rollout or of a walk has no effect; the message says why."""
 
 
 class InfeasibleError(FloatbaseError):
@@ -42,9 +42,9 @@ class InfeasibleError(FloatbaseError):
     message : str
         Message of the exception.
     constraints : iterable of str, optional
-        Names of a minimal set of constraints in conflict, kept as the attribute `constraints`: if
-        any one of them is removed, the others can be satisfied. Other constraints may be in
-        conflict, too.
+        Names of constraints in conflict, kept as the attribute `constraints`. Solvers of QPs name a
+        minimal set: if any one of them is removed, the others can be satisfied. Other constraints
+        may be in conflict, too.
     """
 
     def __init__(self, message: str, constraints: Iterable[str] = ()):
@@ -72,7 +72,7 @@ class ViewerError(FloatbaseError):
 
 
 def require(module: str, extra: str) -> ModuleType:
-    """Import an optional dependency, as in `cp = require("cvxpy", extra="course")`.
+    """Import an optional dependency, as in `cp = require("cvxpy", extra="cvxpy")`.
 
     Parameters
     ----------

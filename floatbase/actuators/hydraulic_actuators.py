@@ -57,14 +57,14 @@ class HydraulicActuators:
     Use them as `actuators` in `rollout`.
 
     Each loop commands Ḟ = ω (e + ω_i ∫e dt), where e = F_desired - F, ω is 2π times the bandwidth
-    of the loop, and ω_i is a twentieth of ω. It sets the valve to the opening that gives this Ḟ
-    (`Cylinders.opening_for`). The integral pauses while the valve is fully open. The torque follows
-    up to the bandwidth of the loop, as long as that is below the bandwidth of the valve.
+    of the loop, and ω_i is a twentieth of ω. The loop sets the valve to the opening that gives this
+    Ḟ (`Cylinders.opening_for`). The integral pauses while the valve is fully open. The torque
+    follows up to the bandwidth of the loop, as long as that is below the bandwidth of the valve.
 
     Each cylinder is a scaled version of HyQ's. At the best angle of the lever and in the weaker
     direction, with the rod retracting, the supply pressure gives the torque limit of the joint.
     Friction of the pistons is neglected. A load that pulls the rod out quickly starves chamber A.
-    Its oil boils, and torque is missing until the chamber is full again.
+    The oil in the chamber boils, and torque is missing until the chamber is full again.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ class HydraulicActuators:
     def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
         """Return the piston forces for joint torques, shape (d,) [N].
 
-        They are limited to what supply and tank allow.
+        The forces are limited to what supply and tank allow.
         """
         min_lever = _MIN_LEVER_FRACTION * self.cylinders.crank
         lever = np.where(np.abs(geometry.lever) < min_lever, min_lever, geometry.lever)

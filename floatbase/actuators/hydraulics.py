@@ -63,8 +63,8 @@ class Hydraulics(Value):
     leakage : float
         Leakage past the piston per pressure difference [m³/(s Pa)].
     rated_flow : float
-        Flow through the fully open valve when the pressure drop across its two edges together is
-        the rated one [m³/s].
+        Flow through the fully open valve when the total pressure drop across its two edges is the
+        rated drop [m³/s].
     rated_pressure_drop : float
         Rated pressure drop [Pa].
     valve_bandwidth : float
@@ -133,7 +133,7 @@ class Hydraulics(Value):
     def valve_gain(self) -> float:
         """Flow per square root of the pressure drop, C_d w x_max √(2/ρ) [m³/(s √Pa)].
 
-        It holds for one fully open edge, which takes half of the rated pressure drop.
+        The value is for one fully open edge, which takes half of the rated pressure drop.
         """
         return self.rated_flow / float(np.sqrt(0.5 * self.rated_pressure_drop))
 
@@ -426,7 +426,7 @@ class Cylinders(Value):
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
         """Return the decay rate -∂ṗ/∂p of each chamber's own pressure.
 
-        It shows how stiff the equations of the oil are.
+        The rate shows how stiff the equations of the oil are.
 
         Parameters
         ----------

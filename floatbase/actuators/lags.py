@@ -1,6 +1,6 @@
 """Two simple models of slow actuators, a pure delay and a first-order lag.
 
-They serve as a comparison for the hydraulic actuators. [FBR]_, App. B.
+The models serve as a comparison for the hydraulic actuators. [FBR]_, App. B.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Delay:
     def reset(
         self, tau: npt.ArrayLike | None = None, q_joints: npt.ArrayLike | None = None
     ) -> None:
-        """Set the torques that are on their way.
+        """Set the torques that have been requested but have not arrived yet.
 
         Parameters
         ----------

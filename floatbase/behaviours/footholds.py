@@ -81,11 +81,11 @@ def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> 
 
 
 def _horizontal_part(name: str, vector: npt.ArrayLike, unit: str) -> Array:
-    """Return x and y of a vector of two or three."""
+    """Return x and y of a vector with two or three entries."""
     array = as_array(name, vector, (None,), unit)
     if len(array) not in (2, 3):
         raise InputError(
-            f"{name} has shape {array.shape}; it must have shape (2,) or (3,) ({unit})."
+            f"{name} has shape {array.shape}; it must have shape (2,) or (3,) [{unit}]."
         )
     return array[:2]
 
@@ -123,7 +123,7 @@ def support_margin(point: npt.ArrayLike, feet: npt.ArrayLike) -> float:
     """
     point, feet = _horizontal_part("point", point, "m"), as_array("feet", feet, (None, None), "m")
     if feet.shape[1] not in (2, 3):
-        raise InputError(f"feet has shape {feet.shape}; it must have shape (n, 2) or (n, 3) (m).")
+        raise InputError(f"feet has shape {feet.shape}; it must have shape (n, 2) or (n, 3) [m].")
     feet = feet[:, :2]
     if not len(feet):
         raise InputError(

@@ -160,7 +160,7 @@ class LIPM(Value):
 
         In a segment, c = p + a e^{ω s} + b e^{-ω s} with s = t - begin. The coefficient a is
         computed backwards from the end, by the DCM, and b forwards from the beginning, by the CoM.
-        A last segment continues without an end: the ZMP does not move, and the CoM approaches it.
+        The last segment continues indefinitely: the ZMP does not move, and the CoM approaches it.
         """
         omega, xi, divergent = self.omega, self.segments[-1][3], []
         for begin, end, p0, p1 in reversed(self.segments):
@@ -179,7 +179,7 @@ class LIPM(Value):
     def _evaluate(self, t: float) -> tuple[Array, Array, Array, Array]:
         """Return p, its slope, and the growing and the decaying part of c - p at time t.
 
-        Before the first segment, these are the values at its beginning.
+        Before the first segment, the values are those at the segment's beginning.
         """
         t = max(as_number("t", t, "s"), self.segments[0][0])
         begin, p0, slope, a, b = next(

@@ -56,7 +56,7 @@ class Gains(Value):
         Returns
         -------
         Gains
-            Gains for flat feet if any contact is one, otherwise for point feet.
+            Gains for flat feet if any contact is a flat foot, otherwise for point feet.
         """
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return (

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_callable
+from floatbase._validation import Array, as_array, as_callable
 
 # s, of the finite differences: their error is below 1e-5 of a base's motion in a second
 _DIFFERENCE_STEP = 1e-4
 
 
 def pitch_and_yaw(
-    angles: Callable[[float], Array],
+    angles: Callable[[float], npt.ArrayLike],
 ) -> Callable[[float], tuple[Array, Array, Array]]:
     """Convert pitch and yaw angles over time to the target of an `OrientationTask`.
 
@@ -36,7 +37,10 @@ def pitch_and_yaw(
     as_callable("angles", angles, "angles(t)")
 
     def path(t: float) -> tuple[Array, Array, Array]:
-        before, now, after = angles(t - _DIFFERENCE_STEP), angles(t), angles(t + _DIFFERENCE_STEP)
+        before, now, after = (
+            as_array("the result of angles(t)", angles(t + shift), (2,), "rad")
+            for shift in (-_DIFFERENCE_STEP, 0.0, _DIFFERENCE_STEP)
+        )
         (p1, y1), (p2, y2) = (
             (after - before) / (2.0 * _DIFFERENCE_STEP),
             (after - 2.0 * now + before) / _DIFFERENCE_STEP**2,

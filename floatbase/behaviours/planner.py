@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_array
-from floatbase.behaviours.footholds import capture_point, step_adjustment
+from floatbase.behaviours.footholds import capture_point, step_adjustment, support_margin
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.lipm import LIPM, ZMPSegment
 from floatbase.behaviours.options import flat_foot_names
 from floatbase.behaviours.reference import Reference, SwingState, rotated_by_yaw, yaw_of
+from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY
 from floatbase.behaviours.swing import Swing
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
@@ -37,11 +38,13 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # fraction of its nominal distance from the middle that a foot keeps on its side: legs must not
 # cross
 _MIN_SIDE_FRACTION = 0.25
+_MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
+_BISECTIONS = 10  # until the place of the ZMP is known to 0.1 % of the way
 
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What a `Walk` planned when its stance changed, or when it kept standing and its plan ended.
+    """Plan that a `Walk` makes when its stance changes, or when its plan ends while it stands.
 
     Parameters
     ----------
@@ -181,6 +184,35 @@ class Planner:
         swings = {foot: each.path for foot, each in ref.swinging.items()}
         return StepPlan(ref.time, stance, dict(ref.feet), dict(ref.footholds), ref.plan, swings)
 
+    def weight_shift(self, gait: Gait, state: State, t: float) -> float:
+        """Return how much later a gait must begin, so that the weight can shift before [s].
+
+        That is 0 if the capture point is above the feet that stand at the first lift-off, or if
+        only two points stand then: such a gait is kept in balance by its steps.
+
+        Parameters
+        ----------
+        gait : Gait
+            Gait without lift-offs before t.
+        state : State
+            The measured state, with all feet on the ground.
+        t : float
+            The time [s].
+        """
+        swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
+        first = min((times[0] for times in swings.values() if times), default=inf)
+        delay = t + _ZMP_SHIFT_TIME - first
+        if delay <= TIME_TOLERANCE:
+            return 0.0
+        swinging = [
+            foot for foot, times in swings.items() if times and times[0] <= first + TIME_TOLERANCE
+        ]
+        points = self.contacts.without(*swinging).positions(state)
+        if len(points) <= 2:
+            return 0.0
+        dcm = capture_point(state.com, state.com_velocity, self.omega)
+        return delay if support_margin(dcm, points[:, :2]) < -_DCM_DEAD_ZONE else 0.0
+
     def adjust_footholds(self, ref: Reference, state: State) -> None:
         """Shift the ends of the swings by the error of the DCM, as far as the legs reach."""
         if not ref.swinging:
@@ -188,9 +220,8 @@ class Planner:
         assert ref.plan is not None
         error = capture_point(state.com, state.com_velocity, self.omega) - ref.plan.dcm(ref.time)
         dead_zone = _DCM_DEAD_ZONE if len(ref.stance) > 2 or self.flat_feet else 0.0
-        for touchdown in {
-            each.path.touchdown for each in ref.swinging.values()
-        }:  # two feet of a trot land together
+        # two feet of a trot land together
+        for touchdown in dict.fromkeys(each.path.touchdown for each in ref.swinging.values()):
             shift = step_adjustment(error, touchdown - ref.time, self.omega, dead_zone)
             com_at_touchdown = state.com[:2] + state.com_velocity[:2] * (touchdown - ref.time)
             for foot, each in ref.swinging.items():
@@ -225,7 +256,7 @@ class Planner:
     ) -> list[ZMPSegment]:
         """Return the ZMP of the next phases.
 
-        It is in the middle of the standing feet, and shifts while all feet stand.
+        The ZMP is in the middle of the standing feet, and shifts while all feet stand.
         """
         centres = self._stance_centres(ref, phases, foothold)
         zmp = ref.plan.zmp(ref.time) if ref.plan else centres[0]
@@ -256,15 +287,19 @@ class Planner:
         phases: Sequence[Phase],
         foothold: Callable[[str, float], npt.ArrayLike],
     ) -> list[Array]:
-        """Return the middle of the standing feet in each phase, (2,) [m], and set new footholds."""
+        """Return the planned ZMP of each phase, (2,) [m], and set new footholds.
+
+        It is in the middle of the standing feet. With more than four feet, it is as near to the
+        middle of all feet as the support polygon allows, because the middle of the standing feet
+        would sway the body: a tripod has two feet on one side and one on the other.
+        """
         feet, centres = dict(ref.feet), []
         for begin, end, names in phases:
             stance = [
                 name for name in self.contacts.names if name in names or name not in ref.gait.feet
             ]
-            centres.append(
-                np.mean([self._foot_centre(name, feet[name], ref.yaw) for name in stance], axis=0)
-            )
+            points = [self._foot_centre(name, feet[name], ref.yaw) for name in stance]
+            centre, before = np.mean(points, axis=0), dict(feet)
             for foot in ref.gait.feet:
                 times = ref.gait.swing_at(foot, begin)
                 if times is not None:
@@ -274,12 +309,16 @@ class Planner:
                     ref.footholds.setdefault(foot, ref.on_ground(foot, position))
                     if abs(times[1] - end) < 2.0 * TIME_TOLERANCE:
                         feet[foot] = ref.on_ground(foot, position)
+            if len(feet) > MAX_FEET_WITH_SWAY and len(points) > 2:
+                middle = np.mean([before[foot] + feet[foot] for foot in feet], axis=0)[:2] / 2.0
+                centre = _nearest_inside(middle, centre, np.array(points))
+            centres.append(centre)
         return centres
 
     def _foot_centre(self, foot: str, position: Array, yaw: float) -> Array:
         """Return the best centre of pressure of a foot whose frame is at `position`, (2,) [m].
 
-        It is the middle of a sole, or the point below the centre of a ball.
+        The best point is the middle of a sole, or the point below the centre of a ball.
         """
         contact = self.contacts.friction_contact(foot)
         to_ground = (
@@ -305,3 +344,20 @@ class Planner:
         """Return the rotation of a foot in the standing posture."""
         rotation: Array = self.standing_state.frame_pose(foot).rotation
         return rotation
+
+
+def _nearest_inside(wanted: Array, centre: Array, feet: Array) -> Array:
+    """Return the point nearest to `wanted`, on the line to `centre`, with `_MIN_STATIC_MARGIN`.
+
+    It is `centre` if that is no farther from the edge of the feet's support polygon.
+    """
+    inside, outside = 1.0, 0.0  # fractions of the way from `wanted` to `centre`
+    if support_margin(wanted, feet) >= _MIN_STATIC_MARGIN:
+        return wanted
+    for _ in range(_BISECTIONS):
+        fraction = (inside + outside) / 2.0
+        if support_margin(wanted + fraction * (centre - wanted), feet) >= _MIN_STATIC_MARGIN:
+            inside = fraction
+        else:
+            outside = fraction
+    return wanted + inside * (centre - wanted)

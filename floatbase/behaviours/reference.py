@@ -30,11 +30,11 @@ class SwingState:
     Parameters
     ----------
     path : Swing
-        Its present path.
+        Present path of the foot.
     planned_end : ndarray, shape (3,)
-        Where it was first planned to land, in the world frame [m].
+        Place where the foot was first planned to land, in the world frame [m].
     yaws : (float, float)
-        Its yaw at lift-off and at touchdown [rad].
+        Yaw of the foot at lift-off and at touchdown [rad].
     """
 
     path: Swing
@@ -51,20 +51,20 @@ class Reference:
     nominal_state : State
         State whose posture the robot keeps.
     nominal_feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame in that posture, relative to the middle of the feet on the
-        ground [m].
+        Position of each foot's frame in the standing posture, relative to the middle of the feet on
+        the ground [m].
     requested_gait : Gait or None
         The requested gait; None while feet come down before the gait changes.
     gait : Gait
-        The gait in use: the requested one without the lift-offs that were over.
+        The gait in use: the requested gait without the lift-offs that had passed.
     start_time : float
         Time of the first control step [s].
     time : float
         Time of the last control step [s].
     position : ndarray, shape (2,)
-        Desired position of the body at that time, in the world frame [m].
+        Desired position of the body at the last control step, in the world frame [m].
     yaw : float
-        Desired yaw of the body at that time [rad].
+        Desired yaw of the body at the last control step [rad].
     feet : dict of str to ndarray, shape (3,)
         Position of each foot's frame, where it stands or last stood, in the world frame [m].
     velocity : ndarray, shape (3,)
@@ -119,7 +119,7 @@ class Reference:
         desired : ndarray, shape (3,)
             Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
         begin : float
-            Time from which on it is desired [s].
+            Time from which the velocity is desired [s].
         t : float
             Time of the prediction [s].
 
@@ -144,7 +144,7 @@ class Reference:
         )
 
     def fit_ground(self) -> None:
-        """Fit a plane to the feet as the ground.
+        """Fit the plane of the ground to the feet.
 
         If the feet show no slope in some direction, for example because they are on a line, the
         plane is level in that direction.
@@ -205,8 +205,9 @@ class Reference:
     def normal_force_bound(self, foot: str, t: float, ramp: float, full_load: float) -> float:
         """Return the upper bound of a normal force while all feet stand [N].
 
-        It falls from `full_load` to 0 within `ramp` [s] before the foot lifts off, and rises
-        likewise after touchdown. If the stance is too short for both, each takes half of it.
+        The bound falls from `full_load` to 0 within `ramp` [s] before the foot lifts off, and rises
+        likewise after touchdown. If the stance is too short for both, each takes half of the
+        stance.
         """
         begin, end = self.stance_interval
         ramp = min(ramp, (end - begin) / 2.0)

@@ -36,7 +36,7 @@ class Stand(Walk):
     robot : Robot
         The robot.
     contacts : Contacts
-        All its contacts, as for `Walk`.
+        All contacts of the robot, as for `Walk`.
     stepping_gait : Gait, optional
         The gait for stepping, such as `Gait.trot(robot)`; its start and stop are ignored. Without
         it, the robot never steps.
@@ -55,6 +55,8 @@ class Stand(Walk):
     -----
     The capture point is from [Pratt2006]_.
     """
+
+    _waits_for_weight = False  # it steps because it falls
 
     def __init__(
         self,
@@ -133,7 +135,7 @@ class Stand(Walk):
             self.gait = self._standing_gait
 
     def _best_start(self, stepping_gait: Gait, state: State, dcm: Array) -> Gait:
-        """Return the gait, begun where its stance feet are clearly nearer to the capture point."""
+        """Return the gait, started where its stance feet are clearly nearer the capture point."""
         from_zero = replace(stepping_gait, start=0.0, stop=None)
         first, *others = (
             from_zero.starting_at(offset * stepping_gait.period)

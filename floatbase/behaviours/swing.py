@@ -19,6 +19,8 @@ from floatbase._validation import (
 )
 from floatbase.errors import InputError
 
+_MIN_DURATION = 1e-3  # s: a shorter swing must be in another unit
+
 
 @dataclass(frozen=True, eq=False)
 class Swing(Value):
@@ -35,7 +37,7 @@ class Swing(Value):
     lift_off : float
         Time of lift-off [s].
     touchdown : float
-        Time of touchdown, later than `lift_off` [s].
+        Time of touchdown, at least 1 ms later than `lift_off` [s].
     height : float, optional
         Height of the bump, half-way [m].
 
@@ -56,10 +58,11 @@ class Swing(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.touchdown > self.lift_off:
+        duration = self.touchdown - self.lift_off
+        if duration < _MIN_DURATION * (1.0 - 1e-9):  # the difference of two times is rounded
             raise InputError(
-                f"touchdown is {self.touchdown:g} s; it must be later than lift_off, "
-                f"{self.lift_off:g} s."
+                f"touchdown is {self.touchdown:g} s, {duration:g} s after lift_off at "
+                f"{self.lift_off:g} s. It must be at least {_MIN_DURATION:g} s later."
             )
 
     def with_end(self, end: npt.ArrayLike) -> Swing:

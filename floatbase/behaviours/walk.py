@@ -1,11 +1,12 @@
 """`Walk`: a walking controller.
 
-It plans footholds and a linear inverted pendulum at each change of stance, and follows the plan by
-the whole-body controller, eqs. (26), (27).
+`Walk` plans footholds and a linear inverted pendulum at each change of stance, and follows the plan
+with the whole-body controller, eqs. (26), (27).
 """
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -30,10 +31,11 @@ from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains, check_gait_feet, check_options, flat_foot_names
 from floatbase.behaviours.planner import Planner, StepPlan
 from floatbase.behaviours.reference import Motion, Reference, rotated_by_yaw
+from floatbase.behaviours.speed import speed_fractions
 from floatbase.behaviours.swing import Swing
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError
+from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
 from floatbase.robots import Robot, State
 
@@ -48,14 +50,14 @@ _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot,
 class Walk:
     """A controller that walks with a given gait and velocity.
 
-    It can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
-    `fb.push_recovery`. At each change of stance it reads the positions of the feet, and plans the
-    next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`) from its present
-    position. In each control step it shifts the ends of the swings by `step_adjustment`, as far as
-    the legs reach. The rest is done by one `WholeBodyController` for each stance. If no contact
-    forces can hold the feet, their contacts become soft.
+    A `Walk` can be used like any other controller in `fb.rollout`, `LiveSimulation`, `fb.sweep` and
+    `fb.push_recovery`. At each change of stance, the controller reads the positions of the feet,
+    and plans the next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`)
+    from its present position. In each control step it shifts the ends of the swings by
+    `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the
+    rest. If no contact forces can hold the feet, their contacts become soft.
 
-    If the time goes back, or forward by more than 0.2 s at once, the controller starts again from
+    If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
     value of `Walk.contacts`.
 
@@ -64,18 +66,21 @@ class Walk:
     robot : Robot
         The robot; its feet are point feet or flat feet.
     contacts : Contacts
-        All its contacts, such as `Contacts.feet(robot)`.
+        All contacts of the robot, such as `Contacts.feet(robot)`.
     gait : Gait
         The contact schedule; at least one foot must stand at any time. It can be set while walking:
-        feet no longer lift off by the former gait, and the new gait begins once all feet stand,
-        without its earlier lift-offs.
+        feet no longer lift off according to the former gait, and the new gait begins once all feet
+        stand, without its earlier lift-offs. It begins up to 0.8 s later if the weight must first
+        shift to the feet that stand at its first lift-off.
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
-        and is approached at 1 m/s². At (0, 0) the robot marches on the spot; to make it stand, set
+        and is approached at 1 m/s². If the legs are too short for its steps, a `SimulationWarning`
+        says so, and the robot walks at the fraction `speed_fraction` of it. In its first period, a
+        slow gait may be slower. At (0, 0) the robot marches on the spot; to make it stand, set
         `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
     yaw_rate : float, optional
         Desired yaw rate, to the left [rad/s]. It can be set while walking, and is approached at 1
-        rad/s².
+        rad/s². It is limited together with the velocity.
     clearance : float, optional
         Height of the swings [m].
     reach : float, optional
@@ -100,8 +105,8 @@ class Walk:
 
     Notes
     -----
-    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion,
-    see [Englsberger2015]_.
+    Footholds follow [Raibert1986]_; the adjustment of steps uses the divergent component of motion
+    [Englsberger2015]_.
 
     Examples
     --------
@@ -114,6 +119,7 @@ class Walk:
     """
 
     __setattr__ = refuse_new_attributes
+    _waits_for_weight = True  # whether a new gait begins later if the weight must first shift
 
     def __init__(
         self,
@@ -155,6 +161,7 @@ class Walk:
         self._single_contacts = {contact.name: Contacts([contact]) for contact in contacts}
         self._planner = Planner(contacts, self._standing_state, self._clearance, self._reach)
         self._clear()
+        self._limit_speed(stacklevel=3)
 
     @property
     def robot(self) -> Robot:
@@ -207,6 +214,7 @@ class Walk:
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
         self._gait = gait
+        self._limit_speed(stacklevel=3)
 
     @property
     def velocity(self) -> Array:
@@ -218,6 +226,7 @@ class Walk:
         velocity = as_array("velocity", velocity, (2,), "m/s")
         as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
         self._velocity = velocity
+        self._limit_speed(stacklevel=3)
 
     @property
     def yaw_rate(self) -> float:
@@ -227,6 +236,12 @@ class Walk:
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
         self._yaw_rate = as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
+        self._limit_speed(stacklevel=3)
+
+    @property
+    def speed_fraction(self) -> float:
+        """Fraction of the desired velocity and yaw rate at which the robot walks, at most 1."""
+        return self._speed_fraction
 
     @property
     def time(self) -> float | None:
@@ -318,7 +333,7 @@ class Walk:
         if not self._continues(t):
             self._initialize(state, t)
         ref = self._ref
-        self._update_gait(t)
+        self._update_gait(state, t)
         (ref.position, ref.yaw, ref.velocity), ref.time = self._path_at(t), t
         stance = self._stance_at(t)
         if stance != ref.stance or t >= ref.replan_time:
@@ -352,18 +367,47 @@ class Walk:
         self._reference = None
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
+    def _limit_speed(self, stacklevel: int) -> None:
+        """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
+        if "_planner" not in vars(self):  # the constructor is still checking its arguments
+            return
+        self._first_fraction, self._speed_fraction = speed_fractions(
+            self._gait,
+            self._standing_state,
+            self._planner.nominal_feet,
+            self._planner.flat_feet,
+            self._reach,
+            np.array([*self._velocity, self._yaw_rate]),
+        )
+        if self._speed_fraction < 1.0:
+            x, y = self._speed_fraction * self._velocity
+            warnings.warn(
+                f"{self.robot.name} cannot make steps that are long enough for {self!r}. It walks "
+                f"at {x:.3g} and {y:.3g} m/s, and turns at "
+                f"{self._speed_fraction * self._yaw_rate:.3g} rad/s. Use a gait with a shorter "
+                f"period than {self._gait.period:g} s.",
+                SimulationWarning,
+                stacklevel=stacklevel,
+            )
+
     def _path_at(self, t: float) -> tuple[Array, float, Array]:
         """Return position, yaw and velocity of the path at t [s].
 
-        The path does not move before the first lift-off, and after the last touchdown.
+        The path does not move before the first lift-off or after the last touchdown.
         """
         ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
         walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)
+        first = t < ref.gait.start + ref.gait.period
         return ref.predict(
-            np.array([*self.velocity, self.yaw_rate]) if walking else np.zeros(3), begin, t
+            (self._first_fraction if first else self._speed_fraction)
+            * np.array([*self.velocity, self.yaw_rate])
+            if walking
+            else np.zeros(3),
+            begin,
+            t,
         )
 
-    def _update_gait(self, t: float) -> None:
+    def _update_gait(self, state: State, t: float) -> None:
         """Change to a newly requested gait once all feet stand.
 
         Feet that are in the air come down as planned.
@@ -372,7 +416,10 @@ class Walk:
         if ref.requested_gait is not None and vars(self._gait) == vars(ref.requested_gait):
             return
         if not ref.swinging:
-            ref.requested_gait, ref.gait, ref.replan_time = self._gait, self._gait.starting_at(t), t
+            gait = self._gait.starting_at(t)
+            if self._waits_for_weight and (delay := self._planner.weight_shift(gait, state, t)):
+                gait = replace(gait, start=gait.start + delay)
+            ref.requested_gait, ref.gait, ref.replan_time = self._gait, gait, t
         elif ref.gait.stop is None or ref.gait.stop > t:
             ref.requested_gait, ref.gait = None, replace(ref.gait, stop=t)
 
@@ -457,7 +504,7 @@ class Walk:
         return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy or pickle, without controllers and memory: it starts anew."""
+        """Return the state without controllers and memory, so that a copy starts anew."""
         return {
             key: value
             for key, value in vars(self).items()

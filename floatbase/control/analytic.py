@@ -60,7 +60,7 @@ class AnalyticController(Value):
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     state : State
         Desired posture, with the desired orientation of the base.
     com : array_like, shape (3,), optional
@@ -86,11 +86,14 @@ class AnalyticController(Value):
     Raises
     ------
     InputError
-        If an argument has a wrong type, shape or value, or if `state` belongs to another robot.
+        If an argument has a wrong type, shape or value, if `state` belongs to a different robot, or
+        if forces of the contacts do not act at points.
+    UnknownNameError
+        If a contact refers to a frame that the robot does not have.
 
     Notes
     -----
-    [FBR]_, eq. (22). The minimum is taken over β of eq. (17).
+    [FBR]_, eqs. (22), (23). The minimum is taken over β of eq. (17).
 
     The desired force is f̃_c = m (a - g) with a = -kp e - kd ė, where e is the position of the
     centre of mass relative to `com`. The desired moment τ̃_c follows in the same way from the
@@ -130,7 +133,7 @@ class AnalyticController(Value):
         if state.robot != robot:
             raise InputError(
                 f"state belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{robot.name}."
+                f"{robot.name}. Give a state of that robot."
             )
         equations_of_motion(state, contacts)  # unknown frames raise here, not in the loop
         weight_share = robot.weight / max(contacts.n_points, 1)
@@ -163,13 +166,13 @@ class AnalyticController(Value):
         Raises
         ------
         InputError
-            If the equations belong to another robot.
+            If the equations belong to a different robot.
         """
         state = as_instance("eom", eom, EquationsOfMotion).state
         if state.robot != self.robot:
             raise InputError(
                 f"eom belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{self.robot.name}."
+                f"{self.robot.name}. Give the equations of that robot."
             )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R = state.frame_pose("base").rotation

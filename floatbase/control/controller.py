@@ -48,21 +48,21 @@ class WholeBodyController:
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     tasks : sequence of Task
         Tasks such as `fb.CoMTask`, or user-defined objects of the form of
         `floatbase.objectives.Task`. If no task acts on forces, or none on torques, a `ForceTask()`
         or a `TorqueTask()` of small weight is added, so that the optimum is unique.
     facets : int, optional
-        Number of facets of the friction polyhedra, see `floatbase.friction.FrictionPolyhedron`.
+        Number of facets of the friction polyhedra; see `floatbase.friction.FrictionPolyhedron`.
     inner_approximation : bool, optional
         Whether the polyhedra lie inside the friction cones.
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
     min_normal_force, max_normal_force : float or mapping, optional
-        Bounds of the normal force at every contact point, so at each corner of a flat foot [N].
-        Each is one number, or a mapping from names of contacts to numbers or functions of t [s],
-        for example to unload a foot. A bound may name a foot that is not in contact: it has no
+        Bounds of the normal force at every contact point, and thus at each corner of a flat foot
+        [N]. Each is one number, or a mapping from names of contacts to numbers or functions of t
+        [s], for example to unload a foot. A bound may name a foot that is not in contact: it has no
         effect until `replace(contacts=...)` adds the foot. Any other unknown name is an error. The
         defaults are 0 and no maximum.
     torque_limits : float or array_like, shape (d,), optional
@@ -97,6 +97,8 @@ class WholeBodyController:
         If an argument has a wrong type, shape or value.
     UnknownNameError
         If a name, solver or option does not exist.
+    MissingDependencyError
+        If `solver` is not installed.
 
     Notes
     -----
@@ -112,8 +114,8 @@ class WholeBodyController:
     reference backend takes over, and `Command.backend` is "reference".
 
     Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
-    and in the standing posture. They must therefore be defined at t = 0, also if a trajectory
-    starts later.
+    and in the standing posture. Functions and objects must therefore be defined at t = 0, even if a
+    trajectory starts later.
 
     Examples
     --------
@@ -194,7 +196,7 @@ class WholeBodyController:
             reason = compiled.warm_up()
         if reason and backend == "compiled":
             raise InputError(
-                f'backend="compiled" is not possible: {reason}. backend="auto" takes the fastest '
+                f'backend="compiled" is not possible: {reason}. backend="auto" uses the fastest '
                 f"backend that supports the problem."
             )
         self._compiled = None if reason else compiled
@@ -356,7 +358,7 @@ class WholeBodyController:
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
     ) -> Solution:
-        """Return the QP of a compiled tick with its answer as the solution.
+        """Return the QP of a compiled tick, with the tick's answer as the solution.
 
         The arguments after t are what `CompiledTick.__call__` returned for q, v and t.
         """
@@ -374,8 +376,8 @@ class WholeBodyController:
     ) -> WholeBodyController:
         """Return a controller with other contacts, tasks or limits and otherwise equal settings.
 
-        It is fast enough to be called in the control loop. To change limits, pass for example
-        `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+        This method is fast enough to be called in the control loop. To change limits, pass for
+        example `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
 
         Parameters
         ----------

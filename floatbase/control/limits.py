@@ -60,7 +60,7 @@ class LinearInequality(Value):
         the size of the block, which for "forces" depends on the contacts. The unit of h is that of
         G x, for example N for forces, m/s² or rad/s² for accelerations.
     row_names : sequence of str, optional
-        One text for each row instead of its number, such as the names of joints.
+        One label for each row instead of its number, such as the names of joints.
 
     Raises
     ------
@@ -151,7 +151,7 @@ class LinearInequality(Value):
         Raises
         ------
         InputError
-            If `row_names` has another length.
+            If `row_names` has the wrong length.
         """
         if self.row_names and len(self.row_names) != m:
             raise InputError(
@@ -238,11 +238,11 @@ class Limits(Value):
     inner_approximation : bool, optional
         Whether the polyhedron lies inside the friction cone (safe) or outside it (optimistic).
     min_normal_force : float or mapping, optional
-        Minimum of normal · f at every contact point, so at each corner of a flat foot [N]. It is
-        one number for all points, or a mapping from names of contacts to numbers or functions of
+        Minimum of normal · f at every contact point, and thus at each corner of a flat foot [N]. It
+        is one number for all points, or a mapping from names of contacts to numbers or functions of
         the time t [s]. Contacts that are not in the mapping have a minimum of 0. A name that is not
-        among the contacts has no effect until it is: a foot that has been lifted will be in contact
-        again.
+        among the contacts has no effect until its contact is added, since a lifted foot will be in
+        contact again.
     max_normal_force : float or mapping, optional
         Maximum of normal · f, in the same form [N]. Contacts that are not in the mapping have no
         maximum.
@@ -299,7 +299,7 @@ class Limits(Value):
         *known : iterable of str
             Known names.
         before : Limits, optional
-            Limits whose names are known, too.
+            Earlier limits, whose names count as known.
 
         Raises
         ------

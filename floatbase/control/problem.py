@@ -51,7 +51,7 @@ class Problem(Value):
     robot : Robot
         The robot to control.
     contacts : Contacts
-        Its contacts with the ground.
+        Contacts of the robot with the ground.
     tasks : sequence of Task
         Tasks. A `ForceTask()` or a `TorqueTask()` of small weight is added if no task acts on
         forces, or none on torques.
@@ -104,14 +104,16 @@ class Problem(Value):
         Raises
         ------
         InputError
-            If the state belongs to another robot, or if names or shapes do not fit.
+            If the state belongs to a different robot, or if shapes do not fit.
+        UnknownNameError
+            If a frame does not exist.
         InfeasibleError
             If the motion constraints of the contacts are inconsistent.
         """
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(
-                f"state belongs to another robot, {state.robot!r}. The robot of the problem is "
-                f"{self.robot!r}."
+                f"state belongs to a different robot, {state.robot!r}. The robot of the problem is "
+                f"{self.robot!r}. Give a state of that robot."
             )
         eom = equations_of_motion(state, self.contacts, t)
         qp = build_qp(eom, self.tasks, self.limits, t)
@@ -170,7 +172,7 @@ def build_qp(
     limits : Limits
         Inequality constraints.
     t : float, optional
-        Time at which tasks with time-varying targets are evaluated [s].
+        Time at which time-varying targets, bounds and inequalities are evaluated [s].
 
     Returns
     -------
@@ -180,7 +182,9 @@ def build_qp(
     Raises
     ------
     InputError
-        If an argument has a wrong type, or if names or shapes do not fit.
+        If an argument has a wrong type, or if shapes do not fit.
+    UnknownNameError
+        If a frame does not exist.
     InfeasibleError
         If the motion constraints of the contacts are inconsistent.
 
@@ -275,7 +279,7 @@ def assemble_qp(
 def dry_run() -> Iterator[None]:
     """Add a note to exceptions that user code raises while a controller is made.
 
-    The note says that nothing moves yet.
+    The note says that user functions are evaluated at t = 0 and in the standing posture.
     """
     try:
         yield
@@ -291,7 +295,7 @@ def dry_run() -> Iterator[None]:
 
 @lru_cache(maxsize=64)
 def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
-    """Return (7) at the standing state of a robot."""
+    """Return the equations of motion (7) at the standing state of a robot."""
     return equations_of_motion(robot.standing(), contacts)
 
 

@@ -20,7 +20,7 @@ from floatbase.dynamics import (
 from floatbase.objectives import Task
 from floatbase.robots import State
 
-SOFT_CONTACT_WEIGHT = 1e4  # of the motion of soft contacts; the weight of tasks is 10
+SOFT_CONTACT_WEIGHT = 1e4  # weight of the motion of soft contacts; tasks have a weight of 10
 
 
 @dataclass(frozen=True, eq=False)

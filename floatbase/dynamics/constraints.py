@@ -37,10 +37,10 @@ class LinearConstraint(Value):
 
     A holonomic constraint φ(q, t) = 0 has A = ∂φ/∂q and b = -Ȧ q̇ - ∂²φ/∂t². A nonholonomic
     constraint g(q, q̇) = 0 leads to eq. (6). The constraint force is Aᵀ λ, with one multiplier λ for
-    each row in the unit of that row. It has no point of application and no friction cone.
+    each row in the unit of that row. The force has no point of application and no friction cone.
 
     Something physical must supply the force, such as a hinge or a rope, because a controller relies
-    on it. If the motors alone are to bring a motion about, use a task or a pair of
+    on it. If the motors alone should cause a motion, use a task or a pair of
     `floatbase.control.LinearInequality` instead.
 
     Combine a constraint with other contacts by `contacts + fb.Contacts([constraint])`.
@@ -193,7 +193,7 @@ class RollingWheel(SinglePointContact):
         return self.jacobian(state) @ state.v
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return -r u and its derivative; u is the normal projected into the wheel's plane."""
+        """Return -r u and its derivative; u is the unit vector along n - (n · axle) axle."""
         n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
         axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
         w = n - (n @ axle) * axle
@@ -221,7 +221,8 @@ def fixed_frame(frame: str) -> LinearConstraint:
     Returns
     -------
     LinearConstraint
-        The constraint "bolts of …", whose λ is force [N] and moment [N·m] in world axes.
+        The constraint "bolts of …", whose λ consists of a force [N] and a moment [N·m] in world
+        axes.
     """
     return LinearConstraint(
         f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame)

@@ -32,8 +32,8 @@ class MotionConstraint(Protocol):
     """An element of `Contacts`: rows A q̈ = b and the forces Jᵀ λ that enforce them.
 
     User-defined constraints implement this protocol. A class with J = A by definition may set the
-    class attribute `jacobian_is_constraint = True`, so that only `constraint` is called. Derived
-    classes do not inherit this attribute.
+    class attribute `jacobian_is_constraint = True`. The equations of motion then call `constraint`
+    only. Derived classes do not inherit this attribute.
     """
 
     @property
@@ -87,7 +87,7 @@ class MotionConstraint(Protocol):
 class FrictionContact(MotionConstraint, Protocol):
     """A constraint whose forces act at points, each with a friction cone.
 
-    λ holds the forces of the ground on the robot in world axes [N]. It has three numbers for each
+    λ holds the forces of the ground on the robot in world axes [N]. λ has three entries for each
     point, in the order of the points.
     """
 
@@ -384,7 +384,7 @@ class FlatFootContact(Value):
 def grasp_matrix(points: Array, reference_point: Array) -> Array:
     """Compute the matrix that maps forces at points to their wrench about a reference point.
 
-    It stacks G_f above G_τ, and is known as the grasp matrix in manipulation.
+    The matrix stacks G_f above G_τ, and is known as the grasp matrix in manipulation.
 
     Parameters
     ----------

@@ -180,12 +180,12 @@ class Contacts(Value):
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """Make contacts of all feet, flat ones with their corners and the others as points.
+        """Make contacts of all feet: flat feet with their corners, other feet as points.
 
         Parameters
         ----------
         robot : Robot
-            Robot, such as `fb.load("talos")`. A robot without feet gets no contacts.
+            Robot, such as `fb.load("talos")`. Without feet, a fixed-base robot gets no contacts.
         mu : float, array_like of shape (n,), or mapping of str to float, optional
             Coefficient of friction, dimensionless, as for `points`.
         normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
@@ -195,11 +195,22 @@ class Contacts(Value):
         -------
         Contacts
             One contact for each foot.
+
+        Raises
+        ------
+        InputError
+            If a floating-base robot has no feet.
         """
+        if not as_instance("robot", robot, Robot).feet:
+            if not robot.is_floating:
+                return Contacts.none()
+            raise InputError(
+                f"{robot.name} has no feet. Name them when you load the robot, "
+                f'fb.load_urdf(path, feet=["…"]), or name the frames in contact, '
+                f'fb.Contacts.points(robot, frames=["…"]). fb.Contacts.none() is no contact.'
+            )
         return Contacts(
             [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]
-            if as_instance("robot", robot, Robot).feet
-            else []
         )
 
     @cached_property
@@ -356,7 +367,7 @@ class Contacts(Value):
         return slice(start, start + contact.k)
 
     def force_of(self, forces: npt.ArrayLike, name: str) -> Array:
-        """Return the force of one contact, for a flat foot the resultant of its corner forces.
+        """Return the force of one contact; for a flat foot, the resultant of its corner forces.
 
         Parameters
         ----------
@@ -497,7 +508,7 @@ def constraint_and_jacobian(
     Raises
     ------
     InputError
-        If an array has another shape.
+        If an array has the wrong shape.
     """
     A, b = map(
         read_only, contact.constraint(state, t)
@@ -553,7 +564,7 @@ def _per_name(
 ) -> list[Any]:
     """Return one value for each name: the same for all, in order, or by name with a default."""
     if isinstance(value, Mapping):
-        for name in set(value) - set(names):
+        for name in (name for name in value if name not in names):
             raise unknown_name(f"contact frame in {argument}", name, names)
         return [value.get(name, default) for name in names]
     if isinstance(value, Sequence) and value and all(isinstance(entry, str) for entry in value):

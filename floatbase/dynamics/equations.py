@@ -63,8 +63,8 @@ def _constraint_right_hand_side(eom: EquationsOfMotion) -> Array:
 class EquationsOfMotion(Value):
     """The equations of motion M q̈ + h = S τ + Jᵀ λ with the constraint A q̈ = b, at one state.
 
-    For point contacts A = J and b = -J̇ q̇, as in the course text. Without contacts the constraint
-    is empty and so is λ. With a fixed base and no contacts the equations reduce to M q̈ + h = τ.
+    For point contacts A = J and b = -J̇ q̇, as in the course text. Without contacts, the constraint
+    and λ are empty. With a fixed base and no contacts the equations reduce to M q̈ + h = τ.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from floatbase.robots import State
 VectorOrFunction: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike]
 # rad per step of the integrated rotation: the error is 1e-10 rad after a full turn
 _MAX_ROTATION_STEP = 0.01
-_MAX_STEPS = 100_000  # between two times: 160 turns, which take some seconds to compute
+_MAX_STEPS = 100_000  # steps between two times: 160 turns, which take some seconds to compute
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +202,8 @@ def view_from_rotating_frame(
     velocity : array_like, shape (3,), optional
         Velocity of the particle, in the world frame [m/s].
     omega_rate : array_like, shape (3,), or callable, optional
-        Time derivative of `omega`, in world axes [rad/s²]. It is zero for a constant `omega`, and
-        required if `omega` is a function.
+        Time derivative of `omega`, in world axes [rad/s²]. The default is zero for a constant
+        `omega`; the derivative is required if `omega` is a function.
 
     Returns
     -------
@@ -214,7 +214,7 @@ def view_from_rotating_frame(
     ------
     InputError
         If the times do not increase, or if the frame turns more than about 160 times between two of
-        them. Also if `omega` is a function and `omega_rate` is missing.
+        them, or if `omega` is a function and `omega_rate` is missing.
 
     Notes
     -----
@@ -265,8 +265,8 @@ def _as_function(name: str, value: VectorOrFunction) -> Callable[[float], Array]
 def _rotations(time: Array, omega: Callable[[float], Array]) -> Array:
     """Integrate Ṙ = [ω] R from R = 1 at time[0] with a Magnus method of fourth order.
 
-    It evaluates ω at two Gauss points per step. Source: Iserles et al., Lie-group methods, Acta
-    Numerica, 2000.
+    The method evaluates ω at two Gauss points per step. Source: Iserles et al., Lie-group methods,
+    Acta Numerica, 2000.
     """
     R = np.empty((time.size, 3, 3))
     R[0] = np.eye(3)

@@ -1,6 +1,6 @@
 """Feasible accelerations, torques and contact forces: the maps ζ and η, and the spaces of C and B.
 
-Section 2.2 of the course text.
+Section 2.2 of the course text, and eqs. (14), (16) and (17) of section 3.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def delassus_matrix(eom: EquationsOfMotion) -> Array:
 def forces_from_torques(eom: EquationsOfMotion) -> Affine:
     """Compute the affine map ζ from joint torques τ to contact forces λ.
 
-    It solves A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ). λ is unique if J has full row rank k. Otherwise
+    The map solves A M⁻¹ Jᵀ λ = b + A M⁻¹ (h - S τ). λ is unique if J has full row rank k. Otherwise
     (solo8 on four feet, or the corners of a flat foot) the map gives the λ of smallest norm, as the
     pseudo-inverse does. Directions of motion that the contacts resolve worse than
     `CONSTRAINT_RANK_TOLERANCE` count as unconstrained; see `contact_space`.
@@ -322,8 +322,9 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
 def internal_forces(eom: EquationsOfMotion) -> Array:
     """Compute the internal forces, which move nothing once joint torques balance them.
 
-    They are null(J_bᵀ), where J_b holds the base columns of J. The torques τ = -J_jᵀ λ balance such
-    a λ, where J_j holds the joint columns of J. With a fixed base, every λ is internal.
+    The internal forces are the null space of J_bᵀ, where J_b holds the base columns of J. The
+    torques τ = -J_jᵀ λ balance such a λ, where J_j holds the joint columns of J. With a fixed base,
+    every λ is internal.
 
     Parameters
     ----------
@@ -338,10 +339,10 @@ def internal_forces(eom: EquationsOfMotion) -> Array:
 
     Notes
     -----
-    If J has full row rank, torques can produce all internal forces without moving anything:
-    the change -J_jᵀ λ of the torques changes ζ(τ) by λ. If J loses rank (solo8 on four feet), the
-    k - rank J directions of null(Jᵀ) are among the internal forces. No torques can produce those,
-    which leaves rank J - rank J_b directions to the torques.
+    If J has full row rank, torques can produce all internal forces without moving anything: the
+    change -J_jᵀ λ of the torques changes ζ(τ) by λ. If J loses rank (solo8 on four feet), the k -
+    rank J directions of null(Jᵀ) are among the internal forces. No torques can produce these
+    forces, which leaves rank J - rank J_b directions to the torques.
     """
     as_instance("eom", eom, EquationsOfMotion)
     return null_space(eom.J[:, : eom.nv - eom.d].T)

@@ -20,7 +20,7 @@ from floatbase.qp._linear_programs import linear_program
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-# of a friction polyhedron: they miss the cone by 5e-6 of μ, which is never known as accurately
+# facets of a friction polyhedron, which then misses the cone by 5e-6 of μ: no μ is known as well
 MAX_FACETS = 1000
 # fraction of the size below which a set is flat or a point lies on a facet: above a linear
 # program's rounding
@@ -150,7 +150,7 @@ def _affine_hull(
 ) -> tuple[Array, Array]:
     """Return an orthonormal basis, (n, r), of the directions in which the set extends, and points.
 
-    The points are those found in these directions.
+    The points are those that were found in these directions.
     """
     basis, flat, points = np.zeros((n, 0)), np.zeros((n, 0)), []
     while basis.shape[1] + flat.shape[1] < n:

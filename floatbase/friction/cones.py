@@ -168,8 +168,8 @@ class FrictionCone(Value):
         Returns
         -------
         float
-            Tangential force that may be added in any direction before the foot slips [N]. It is
-            negative outside the cone. Divided by √(1 + μ²), it is the distance to the surface of
+            Tangential force that may be added in any direction before the foot slips [N]. The slack
+            is negative outside the cone. Divided by √(1 + μ²), it is the distance to the surface of
             the cone.
         """
         parts = decompose(force, self.normal)
@@ -296,7 +296,8 @@ class FrictionPolyhedron(Value):
     def area_ratio(self) -> float:
         """Ratio of the cross-section's area to that of the cone [-].
 
-        It is sin(2π/n) / (2π/n) for an inner approximation, tan(π/n) / (π/n) for an outer one.
+        The ratio is sin(2π/n) / (2π/n) for an inner approximation, tan(π/n) / (π/n) for an outer
+        one.
         """
         half = np.pi / self.facets
         return float(

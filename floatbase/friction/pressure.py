@@ -76,9 +76,9 @@ def centre_of_pressure(state: State, contacts: Contacts, forces: npt.ArrayLike) 
     -----
     About this point, the forces of a sole have no tangential moment. If the wrench about a point x
     of a level sole is (f, τ), the centre of pressure is x + (-τ_y, τ_x, 0) / f_z. For all contacts
-    on level ground it is the zero-moment point (ZMP) [Vukobratovic2004]_. It lies in the convex
-    hull of the points as long as none of them pulls. See also Sardain and Bessonnet, Forces acting
-    on a biped robot: center of pressure - zero moment point, 2004.
+    on level ground it is the zero-moment point (ZMP) [Vukobratovic2004]_. The centre of pressure
+    lies in the convex hull of the points as long as none of them pulls. See also Sardain and
+    Bessonnet, Forces acting on a biped robot: center of pressure - zero moment point, 2004.
     """
     points, flat = _points_and_forces(state, contacts, forces)
     normal = np.sum(contacts.normals * flat.reshape(-1, 3), axis=1)

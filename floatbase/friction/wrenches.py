@@ -2,7 +2,7 @@
 
 A wrench is w = (f_c, τ_c), shape (6,): the total contact force [N] and its moment about the centre
 of mass [N·m], both in world axes, with τ_c = Σ (x_i - x_c) × f_i. Sources: [FBR]_, §3.1 and §4.2;
-[Caron2015]_.
+[Caron2015b]_.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class WrenchSet(Value):
 
     Notes
     -----
-    [FBR]_, eqs. (20), (21), (28). The contact wrench cone is described in [Caron2015]_.
+    [FBR]_, eqs. (20), (21), (28). The contact wrench cone of several contacts is described in
+    [Caron2015b]_, and that of one rectangular sole in [Caron2015]_.
     """
 
     points: Array = field(metadata=checked(as_array, (None, 3), "m"))
@@ -96,8 +97,8 @@ class WrenchSet(Value):
         limits = numeric_copy(self.max_normal_force)  # +inf is allowed
         if limits is None or limits.shape != (len(points),) or not np.all(limits > 0):
             raise InputError(
-                f"max_normal_force must be one number > 0, or {len(points)} of them, one for each "
-                f"contact point [N]."
+                f"max_normal_force must be one number > 0, or {len(points)} numbers > 0, one for "
+                f"each contact point [N]."
             )
         object.__setattr__(self, "max_normal_force", read_only(limits))
 
@@ -105,7 +106,7 @@ class WrenchSet(Value):
     def max_lever_arm(self) -> float:
         """Largest distance of a point from x_c [m], or 1 if all are zero.
 
-        A torque divided by it is comparable to a force.
+        A torque divided by this length is comparable to a force.
         """
         return float(np.max(np.linalg.norm(self.points - self.reference_point, axis=1))) or 1.0
 
@@ -122,8 +123,9 @@ class WrenchSet(Value):
     def face_matrix(self) -> Array:
         """Facets of the set, shape (m, 6): face_matrix @ w ≤ 0, together with equalities @ w = 0.
 
-        It is empty if every wrench can be produced. A row (a, b) has ‖a‖² + ‖max_lever_arm b‖² = 1,
-        so face_matrix @ w is in N. A set with limits on the normal force raises `InputError`.
+        The matrix is empty if every wrench can be produced. A row (a, b) has ‖a‖² + ‖max_lever_arm
+        b‖² = 1, so face_matrix @ w is in N. A set with limits on the normal force raises
+        `InputError`.
         """
         return self._halfspaces[0]
 
@@ -137,7 +139,7 @@ class WrenchSet(Value):
         return self._halfspaces[1]
 
     def margin(self, wrench: npt.ArrayLike) -> float:
-        """Return how far inside their facets all contact forces can be when they make a wrench.
+        """Return the largest margin that all contact forces can have when they produce a wrench.
 
         Parameters
         ----------
@@ -148,7 +150,7 @@ class WrenchSet(Value):
         -------
         float
             The largest t for which forces f_i exist with margin ≥ t each, and at least t below the
-            limit of the normal force [N]. It is -inf if no forces make the wrench (see
+            limit of the normal force [N]. It is -inf if no forces produce the wrench (see
             `equalities`), and +inf if contacts that face each other can be squeezed without limit.
         """
         w = as_array("wrench", wrench, (6,))
@@ -169,7 +171,7 @@ class WrenchSet(Value):
         return np.inf if result.status == UNBOUNDED else -scale * float(result.fun)
 
     def contains(self, wrench: npt.ArrayLike, tolerance: float = TOLERANCE) -> bool:
-        """Return whether contact forces can make a wrench.
+        """Return whether contact forces can produce a wrench.
 
         Parameters
         ----------
@@ -207,10 +209,12 @@ class WrenchSet(Value):
         ------
         InfeasibleError
             If the line misses the set.
+        InputError
+            If `direction` is zero, or if an argument has the wrong shape.
         """
         d = as_array("direction", direction, (6,))
         if not np.any(d):
-            raise InputError("direction is the zero wrench. It must be non-zero.")
+            raise InputError("direction is the zero wrench, but it must be non-zero.")
         w = as_array("start", np.zeros(6) if start is None else start, (6,))
         N, scale = self.rays.shape[1], float(np.linalg.norm(self._wrench_scaling @ d))
         result = linear_program(
@@ -244,7 +248,8 @@ class WrenchSet(Value):
         forces : ndarray, shape (n,)
             `max_scaling` of each direction from (0, 0, weight, 0, 0, 0) [N], +inf if there is no
             limit. Divided by `weight`, they are the largest accelerations of the centre of mass as
-            fractions of g. They are limited by the facets and by the height of the centre of mass.
+            fractions of g. The facets and the height of the centre of mass limit these
+            accelerations.
 
         Raises
         ------
@@ -309,9 +314,9 @@ class WrenchSet(Value):
         Notes
         -----
         The region contains every c for which forces in the polyhedra carry the weight without a
-        moment about c. It does not depend on the height of the CoM or on `reference_point`. On
-        level ground it is the support polygon, the convex hull of the feet. The method is that of
-        [BretlLall2008]_.
+        moment about c. The region does not depend on the height of the CoM or on `reference_point`.
+        On level ground it is the support polygon, the convex hull of the feet. The method is that
+        of [BretlLall2008]_.
         """
         origin = self.points.mean(axis=0)
         rays = np.vstack(
@@ -375,7 +380,8 @@ class WrenchSet(Value):
     ) -> tuple[Array, Array] | None:
         """Return the limits of the normal force as inequalities on the weights of the rays.
 
-        They are in N divided by `scale`, and `extra_columns` columns of zeros follow the weights.
+        The limits are in N divided by `scale`, and `extra_columns` columns of zeros follow the
+        weights.
         """
         limited = np.isfinite(self.max_normal_force)
         if not np.any(limited):
@@ -420,7 +426,7 @@ def wrench_set(
         Number of facets of the friction polyhedron of every point. The defaults of this argument
         and the next two are those of the controller.
     inner_approximation : bool, optional
-        Whether the polyhedra lie inside the friction cones, see `FrictionPolyhedron`.
+        Whether the polyhedra lie inside the friction cones; see `FrictionPolyhedron`.
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
     max_normal_force : float or array_like, shape (P,), optional
@@ -453,7 +459,7 @@ def wrench_set(
     without_cone = [c.name for c in contacts if not isinstance(c, FrictionContact)]
     if without_cone:
         raise InputError(
-            f"Contacts without a friction cone: {', '.join(without_cone)}. Leave them out with "
+            f"These contacts have no friction cone: {', '.join(without_cone)}. Leave them out with "
             f"contacts.without(…)."
         )
     point_data = zip(contacts.normals, contacts.mus, strict=True)

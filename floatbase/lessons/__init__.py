@@ -75,14 +75,15 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}.")
     try:
         module = import_module(f"floatbase.lessons.{_LAZY[name]}")
     except ModuleNotFoundError as error:
         if str(error.name).startswith("floatbase"):
             raise
         raise FloatbaseError(
-            f'The course needs {error.name}: pip install "floatbase[course]".'
+            f"The course needs {error.name}, which is not installed. Install it with "
+            'pip install "floatbase[course]".'
         ) from None
     return module if name == _LAZY[name] else getattr(module, name)
 

@@ -103,7 +103,7 @@ def joint_servo(
     stiffness: float = 100.0,
     damping: float = 10.0,
 ) -> Callable[[Array, Array, float], TorqueCommand]:
-    """Return a controller that servoes each joint on its own.
+    """Return a controller that servoes each joint separately.
 
     The torques are τ = tau - stiffness · (position error) - damping · (velocity error), per joint.
 

@@ -33,7 +33,7 @@ class Exercise:
     name : str
         Name of the lesson and number of the exercise, such as "01.2" or "C.2".
     statement : str
-        What the learner has to find, with shape, unit and frame.
+        Statement of what the learner has to find, with shape, unit and frame.
     stub : str
         Code that the learner starts from; it runs.
     solution : str

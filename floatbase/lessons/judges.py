@@ -52,7 +52,7 @@ NO_ANSWER = Verdict(
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
-    """Return the minimiser of a learner's cost, or a verdict that says what is wrong with the cost.
+    """Return the minimizer of a learner's cost, or a verdict that says what is wrong with the cost.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
     block : str
         Name of these variables, for the message.
     hint : str, optional
-        Advice for a cost with another number of variables.
+        Advice for a cost with a different number of variables.
 
     Returns
     -------
     ndarray, shape (n,), or Verdict
-        The minimiser, or what is wrong.
+        The minimizer, or what is wrong.
     """
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
@@ -77,7 +77,7 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
         return Verdict(
             False,
             f"The answer must be the cost, an fb.Quadratic on {block}, not {given}. Its "
-            f"minimiser is not asked for.",
+            f"minimizer is not asked for.",
             "no_cost",
         )
     if answer.n != n:
@@ -142,7 +142,7 @@ def array_judge(
     Returns
     -------
     callable
-        The decorator. It turns a function of an array into a function of any answer.
+        Decorator that turns a function of an array into a function of any answer.
     """
 
     def decorate(judge: Callable[[Array], Verdict]) -> Callable[[Any], Verdict]:
@@ -157,7 +157,7 @@ def array_judge(
 
 
 def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
-    """Return an answer that is a function, or a verdict that says that it is not.
+    """Return an answer that is a function, or a verdict that the answer is not a function.
 
     Parameters
     ----------
@@ -188,8 +188,8 @@ def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | V
     Parameters
     ----------
     run : callable
-        Function without arguments that returns the `Rollout`. It raises `InputError` if the answer
-        cannot be simulated.
+        Function without arguments that returns the `Rollout`. The function raises `InputError` if
+        the answer cannot be simulated.
     why : str, optional
         Sentence that is added if the run ends early.
 
@@ -260,15 +260,15 @@ class NumericJudge:
     praise : str
         Comment on a right answer.
     mistakes : mapping of str to callable, optional
-        For each known mistake, by the name of its hint: a function that computes the value it leads
-        to.
+        For each known mistake, by the name of its hint: a function that computes the value to which
+        the mistake leads.
     hints : mapping of str to str, optional
         For each known mistake: the comment on it.
     tolerance : float, optional
         Relative tolerance: two values are equal if they differ by at most this fraction of the
         largest entry of the right value [-].
     is_count : bool, optional
-        Whether the answer counts things, and so has neither a sign nor a unit.
+        Whether the answer is a count, which has neither a sign nor a unit.
     """
 
     right: Callable[[], Any]

@@ -130,8 +130,9 @@ def slider_panel(
         Viewer to draw on; None if the note contains the picture, such as a drawing in the plane.
     draw : callable
         Function called as draw(name=value, …), once at the start and then at every move of a
-        slider, in the thread of the kernel. It receives the values as the sliders show them, draws
-        on `view`, and should take a few milliseconds. It may return a note, as HTML or plain text.
+        slider, in the thread of the kernel. The function receives the values as the sliders show
+        them, draws on `view`, and should take a few milliseconds. It may return a note, as HTML or
+        plain text.
     on_release : bool, optional
         Whether to call `draw` only when a slider is released, for a function that takes longer.
     beside : bool, optional
@@ -173,7 +174,7 @@ def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlid
 def _slider(
     text: str, low: float, first: float, high: float, step: float, on_release: bool
 ) -> widgets.FloatSlider:
-    """Return a slider that shows as many decimals as its step has.
+    """Return a slider that shows as many decimals as its step.
 
     With `on_release` its value changes only when it is released.
     """
@@ -192,10 +193,10 @@ def _slider(
 
 
 def _round_step(*bounds: float) -> float:
-    """Return a round step for a slider with at least 50 steps from the lowest to the highest bound.
+    """Return a round slider step that divides the range into at least 50 steps.
 
-    It is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If none does,
-    because a bound is not round, the step is too small for that to be visible.
+    The step is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If there is
+    none, because a bound is not round, the step is so small that the difference is not visible.
     """
     most = (max(bounds) - min(bounds)) / 50
     power = math.floor(math.log10(most)) if most > 0 else 0
@@ -342,7 +343,7 @@ class _PushPanel(widgets.VBox):
 class _StatusLine(widgets.Label):
     """Line with the status of a simulation, or the last action while it runs.
 
-    It is updated from the thread of the kernel and from that of the simulation.
+    Both the kernel's thread and the simulation's thread update the line.
     """
 
     def __init__(self, run: LiveSimulation):

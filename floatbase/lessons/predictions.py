@@ -40,7 +40,7 @@ def predict(
     unit : str, optional
         Unit of the number.
     choices : sequence of str, optional
-        Texts to choose from. Without choices the answer is a number.
+        Strings to choose from. Without choices the answer is a number.
     count : int, optional
         How many numbers to predict.
     """
@@ -82,7 +82,7 @@ def compare(name: str, value: Any) -> None:
     Raises
     ------
     InputError
-        If `value` is not a number, an array of numbers or a text.
+        If `value` is not a number, an array of numbers or a string.
     """
     as_string("name of a prediction", name)
     result: Any = value if isinstance(value, str) else _stored_result(value)
@@ -170,7 +170,7 @@ def _describe_error(said: Any, result: Any, unit: str) -> str:
 def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
     """Save what is new about a prediction; return what went wrong, or "".
 
-    What cannot be saved is remembered as long as this process runs.
+    A prediction that cannot be saved is remembered as long as this process runs.
     """
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
@@ -185,7 +185,7 @@ def _match_choice(answer: Any, choices: Sequence[str]) -> str:
     """Return the choice that an answer means."""
     listed = ", ".join(f'"{choice}"' for choice in choices)
     if not isinstance(answer, str) or not answer.strip():
-        raise InputError(f"choose one of {listed}, in quotes.")
+        raise InputError(f"Choose one of {listed}, in quotes.")
     wanted = answer.strip().casefold()
     meant = [choice for choice in choices if choice.casefold() == wanted]
     meant = meant or [choice for choice in choices if choice.casefold().startswith(wanted)]
@@ -203,7 +203,7 @@ def _parse_numbers(answer: Any, unit: str, count: int) -> Any:
     right = f"Write {wanted}{f', in {unit}' if unit else ''}, such as {form}."
     if given is None:
         raise InputError(
-            f"{'a text' if isinstance(answer, str) else 'this'} cannot be used here. {right}"
+            f"{'Text' if isinstance(answer, str) else 'This'} cannot be used here. {right}"
         )
     if given.ndim > 1 or given.size != count:
         raise InputError(
@@ -211,7 +211,7 @@ def _parse_numbers(answer: Any, unit: str, count: int) -> Any:
             f"{right}"
         )
     if not np.all(np.abs(given) <= MAX_MAGNITUDE):
-        raise InputError(f"this number is infinite, NaN or far too large. {right}")
+        raise InputError(f"This number is infinite, NaN or far too large. {right}")
     said = [int(x) if x.is_integer() else x for x in given.ravel().tolist()]
     return said if count > 1 else said[0]
 
@@ -225,7 +225,7 @@ def _stored_result(value: Any) -> Any:
     given = numeric_copy(value)
     if given is None:
         raise InputError(
-            f"value must be a number, an array of numbers or a text, not {short_repr(value)}."
+            f"value must be a number, an array of numbers or a string, not {short_repr(value)}."
         )
     whole = np.asarray(value).dtype.kind in "iu"
     kept = [int(x) if whole else float(f"{x:.6g}") for x in np.ravel(given).tolist()]

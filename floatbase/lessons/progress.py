@@ -125,8 +125,8 @@ def append(name: str, entry: dict[str, Any]) -> str:
     name : str
         Name of the exercise or prediction.
     entry : dict
-        What to store. In predictions, "said" and "is" are a number, a list of numbers or a text,
-        and "unit" is a text.
+        What to store. In predictions, "said" and "is" are a number, a list of numbers or a string,
+        and "unit" is a string.
 
     Returns
     -------
@@ -146,9 +146,9 @@ def storage_problem() -> str:
 
 
 def as_json(answer: Any) -> Any:
-    """Convert an answer to a form that can be stored: numbers, texts, lists or a dict.
+    """Convert an answer to a form that can be stored: numbers, strings, lists or a dict.
 
-    `from_json` returns an answer that a judge treats in the same way. Of a function, only the
+    `from_json` returns an answer that a judge treats in the same way. For a function, only the
     source code is kept.
 
     Parameters

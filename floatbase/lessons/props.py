@@ -112,7 +112,7 @@ def hydraulic_cylinder(
     if not 0.0 < stroke[0] < stroke[1]:
         raise InputError(
             f"stroke of the cylinder is {stroke}; it must be the smallest and the largest length "
-            f"(m), both above zero and in ascending order."
+            f"[m], both above zero and in ascending order."
         )
     start = as_array("base of the cylinder", base, (3,), "m")
     way, length = vector_and_length(

@@ -3,8 +3,8 @@
 `python -m floatbase.lessons.publish push-recovery 05` measures the map of lesson 05 again, which
 takes a minute or two, and writes it to push_recovery.json beside this file, where the lessons read
 it. The package of such a lesson has `make_controller()`, which returns its controller. The grey map
-below is that of the lesson before. If that lesson used another robot, a lesson can have a second
-map of its own instead: "09 standing" is the map of `make_standing_controller()` in the package of
+below is that of the lesson before. If that lesson used another robot, a lesson can have a separate
+second map instead: "09 standing" is the map of `make_standing_controller()` in the package of
 lesson 09.
 """
 
@@ -86,14 +86,14 @@ def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
 
 
 def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """Draw what `plot_push_recovery` plots on the ground below the robot.
+    """Draw the map of `plot_push_recovery` on the ground below the robot.
 
     Parameters
     ----------
     lesson : str
         Name of the lesson, such as "05".
     scale : float, optional
-        Length of a push in the picture [m/N]. By default the widest map is half as wide again as
+        Length of a push in the picture [m/N]. By default, the widest map is 1.5 times as wide as
         the stance.
 
     Returns

@@ -54,7 +54,7 @@ def plot(
     Raises
     ------
     InputError
-        If the QP has another number of variables or equality constraints.
+        If the QP does not have two variables, or has equality constraints.
     UnknownNameError
         If a name in `working_set` is unknown.
 
@@ -102,7 +102,7 @@ def feasible_polygon(qp: QP, box: Box) -> Array:
     Raises
     ------
     InputError
-        If the QP has another number of variables or equality constraints.
+        If the QP does not have two variables, or has equality constraints.
     """
     if as_instance("qp", qp, QP).n != 2 or len(qp.A):
         raise InputError(
@@ -136,7 +136,7 @@ def _clipped(corners: Array, normal: Array, bound: float) -> Array:
 def _plot_levels(qp: QP, box: Box, axis: Axes) -> None:
     """Plot curves of equal objective.
 
-    Their objective grows like a square, so that the curves of a bowl are equally spaced.
+    Their objective values grow quadratically, so that the curves of a bowl are equally spaced.
     """
     try:
         # this maps a circle of radius r to the ellipse on which the objective is r²/2 above its

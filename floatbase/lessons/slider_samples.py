@@ -36,10 +36,12 @@ DIRECTIONS = {
 # s: start of a recorded push, and how long the recording goes on from then
 _PUSH_START, _TIME_SEEN = 0.1, 1.5
 _FRAME_RATE = 15.0  # pictures per second of a recorded push
-_SAMPLED_NOTE = "Computed for these positions only. In the live lesson the sliders move "
-"continuously."
-_ONE_AT_A_TIME_NOTE = " Here one slider moves at a time: the others return to their initial "
-"position."
+_SAMPLED_NOTE = (
+    "Computed for these positions only. In the live lesson the sliders move continuously."
+)
+_ONE_AT_A_TIME_NOTE = (
+    " Here one slider moves at a time: the others return to their initial position."
+)
 _OUTCOME_TEXTS = {
     "completed": "it stands",
     "fell": "it falls",
@@ -65,7 +67,7 @@ def sample_values(
     far = [float(x) for x in inner if min(abs(x - bound) for bound in fixed) > _MIN_GAP * between]
     snapped = {low + step * round((x - low) / step) for x in far}
     digits = max(0, 2 - math.floor(math.log10(step)))
-    return tuple(sorted({*(round(float(x), digits) for x in snapped), *map(float, fixed)}))
+    return tuple(sorted({round(float(x), digits) for x in snapped} | set(map(float, fixed))))
 
 
 def _round_spacings(width: float, step: float) -> list[float]:
@@ -173,7 +175,7 @@ def recorded_pushes(
     Parameters
     ----------
     titles : mapping of str to tuple
-        For each title of a picture: its viewer, simulation and controller.
+        For each picture title: the viewer, simulation and controller.
     forces : iterable of float
         Forces of the pushes [N].
     directions : sequence of str

@@ -1,4 +1,4 @@
-"""Pictures for pages without a kernel: the first scene of some viewers, and the changes from there.
+"""Pictures for pages without a kernel: the first scene of some viewers, and the changes from it.
 
 If the environment has FLOATBASE_VIEWER=site, a display adds this to the output beside its image, as
 plain data: the commands of the scenes (see `protocol`), each stored once, and numbers that refer to
@@ -61,14 +61,14 @@ class Control:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS or not 0 <= self.first < len(self.values):
             raise ViewerError(
-                f"A control of the kind {self.kind!r} cannot start at stop {self.first} of "
-                f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the stop must "
-                f"exist."
+                f"A control of the kind {self.kind!r} cannot start at position {self.first} of "
+                f"{self.values}. The kind must be one of {', '.join(_KINDS)}, and the "
+                f"position must exist."
             )
 
 
 class StaticExport:
-    """What some viewers show now, and what they show at other positions of the controls.
+    """Scenes that viewers show now, and those at other positions of the controls.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class StaticExport:
     beside : bool, optional
         Whether a note is to the right of the pictures.
     words : str, optional
-        Text below, such as what only the live lesson can do.
+        Text below the pictures, such as what only the live lesson can do.
     titles : sequence of str, optional
         Title above each picture.
     """
@@ -174,7 +174,7 @@ class StaticExport:
     def _changes(
         self, first: dict[protocol.Key, bytes], now: dict[protocol.Key, bytes]
     ) -> list[int]:
-        """Return numbers of key and command, in turn, of everything that differs from the first."""
+        """Return the numbers of key and command, in turn, of all that differs from the first."""
         gone = [self._numbers(key, None) for key in first if key not in now]
         fresh = [
             self._numbers(key, command) for key, command in now.items() if first.get(key) != command
@@ -196,7 +196,7 @@ def _entries(scene: Scene) -> dict[protocol.Key, bytes]:
 
 
 def bundle(view: Viewer, words: str = "") -> dict[str, Any]:
-    """Return the mimebundle of what a viewer shows now, with a text below."""
+    """Return the mimebundle of what a viewer shows now, with text below it."""
     return StaticExport([view], words=words).bundle()
 
 

@@ -16,7 +16,7 @@ def element(tag: str, content: str = "", /, **attributes: str | float) -> str:
     tag : str
         Name of the element.
     content : str, optional
-        What it contains.
+        Contents of the element.
     **attributes : str or float
         Attributes; "_" in a name stands for "-". Floats are lengths in pixels and get one decimal.
 

@@ -98,10 +98,11 @@ class TargetTask(Value):
     """Base of the tasks of this package: dataclasses that declare their targets.
 
     A derived class defines its fields, `block`, `target_shapes` and `residual`. `target_shapes`
-    maps the field of each target to its shape, in numbers or "nq", "d" and "k". The first target
-    may be a function of time; the others are its derivatives. `compiled_as` names the form of this
-    task in the compiled tick, see `control.tick.problem_arrays`; without it, the compiled tick
-    calls `residual`. Derived classes do not inherit `compiled_as`, since their residual may differ.
+    maps the field of each target to its shape, whose entries are numbers, "nq", "d" or "k". The
+    first target may be a function of time; the others are its derivatives. `compiled_as` names the
+    form of this task in the compiled tick (see `control.tick.problem_arrays`). Without it, the
+    compiled tick calls `residual`. Derived classes do not inherit `compiled_as`, since their
+    residual may differ.
     """
 
     target_shapes: ClassVar[Shapes]

@@ -1,6 +1,6 @@
 """Centroidal dynamics: momentum, net force and moment, force bias and torques for given forces.
 
-Sections 3.1.1 and 3.1.2 of the course text.
+Section 3.1 of the course text, eqs. (20) to (25).
 """
 
 from __future__ import annotations
@@ -329,7 +329,7 @@ def normal_bias(contacts: Contacts, a: npt.ArrayLike) -> Quadratic:
 def force_bias(contacts: Contacts, alpha: float, a: npt.ArrayLike) -> Quadratic:
     """Make the cost Σ ½ ‖tangential part‖² + (α/2) ‖normal part - a‖² on contact forces.
 
-    It is a preference, not a limit: it keeps no force inside its friction cone, and it allows
+    The cost is a preference, not a limit: it keeps no force inside its friction cone, and it allows
     forces that pull.
 
     Parameters
@@ -450,7 +450,7 @@ def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
 def _normal_matrix(contacts: Contacts) -> Array:
     """Return N with the normal of each point as a column, shape (k, n).
 
-    Nᵀ λ are the normal components of the forces, and N Nᵀ λ are the normal parts as vectors.
+    Nᵀ λ holds the normal components of the forces, and N Nᵀ λ the normal parts as vectors.
     """
     _require_point_forces(contacts)
     return (np.eye(contacts.n_points)[:, None] * contacts.normals[:, :, None]).reshape(

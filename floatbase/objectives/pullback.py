@@ -76,8 +76,8 @@ def minimum_norm_pullback(cost: Quadratic, space: FeasibleSpace, block: Block) -
     """Express a cost on β as a cost on one block, using the smallest β for each value.
 
     The result answers the question "What does this motion cost if everything that it leaves open is
-    set to zero in β?" This choice depends on the origin v of β. It has no physical meaning where V
-    of the block loses rank, as for four point feet with 12 columns and rank 6. See
+    set to zero in β?" This choice depends on the origin v of β. The result has no physical meaning
+    where V of the block loses rank, as for four point feet with 12 columns and rank 6. See
     `partial_minimum` for the least cost.
 
     Parameters

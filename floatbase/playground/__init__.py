@@ -1,6 +1,6 @@
 """Playground: a live robot whose model and physics can be changed separately.
 
-It runs in a notebook and on a page of its own.
+The playground runs in a notebook or on a separate page.
 """
 
 from floatbase.playground.build import nodding_rotation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,7 @@ from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, unknown_name
+from floatbase.errors import InputError, SimulationWarning, unknown_name
 from floatbase.objectives import (
     CoMTask,
     ForceTask,
@@ -244,7 +245,9 @@ def controller(
     made: Controller
     if settings.gait is not None:
         *velocity, yaw_rate = settings.velocity
-        made = Walk(robot, contacts, gait(settings, robot), velocity, yaw_rate, **options)
+        with warnings.catch_warnings():  # the speed may be limited
+            warnings.simplefilter("ignore", SimulationWarning)
+            made = Walk(robot, contacts, gait(settings, robot), velocity, yaw_rate, **options)
     elif settings.steps_when_pushed:
         name, swing = recovery_gait(robot)
         made = Stand(robot, contacts, _by_feet(GAITS, robot)[name](robot, swing=swing), **options)

@@ -83,7 +83,7 @@ class Judge:
             self._apply_verdict(self.challenge.end(self, status, session), session)
 
     def _apply_verdict(self, verdict: bool | str, session: Session) -> None:
-        """Store a verdict: True wins, a text becomes the message. A won challenge stays won."""
+        """Store a verdict: True wins, a string becomes the message. A won challenge stays won."""
         if self.won:
             return
         if violations := self.challenge.violations(session.settings):
@@ -123,7 +123,7 @@ class Challenge:
         Names of paired settings whose actual value must not be changed.
     end : callable or None
         Function `end(judge, status, session)`, called when the run stops by itself, for challenges
-        that this can solve. It returns the same as `watch`.
+        that can be solved in this way. It returns the same as `watch`.
     paused : bool
         Whether the challenge starts paused, so that the user must press run.
     """

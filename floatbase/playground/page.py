@@ -38,8 +38,8 @@ _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 class Playground:
     """A live simulated robot with controls for its model, its physics and its controller.
 
-    It also offers challenges. In a notebook, it displays itself as the last line of a cell.
-    Elsewhere, open `playground.url` in a browser.
+    The playground also offers challenges. In a notebook, it displays itself as the last line of a
+    cell. Elsewhere, open `playground.url` in a browser.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ class Playground:
             self._redraw()
 
     def _update_text(self) -> None:
-        """Update the texts of the panel: the challenge and the program."""
+        """Update the text in the panel: the challenge and the program."""
         judge = self.judge  # another thread may change the challenge
         with suppress(ViewerError):
             if judge is not None:
@@ -359,9 +359,9 @@ class Playground:
             )
 
     def _on_status(self, status: str) -> None:
-        """Show over the last picture why the run stopped."""
-        told = "left the ground" if status == "fell" and self._is_airborne else status
-        self.outcome = "" if status == "running" else status_message(told, self.run.reason)
+        """Show the reason why the run stopped, over the last picture."""
+        shown = "left the ground" if status == "fell" and self._is_airborne else status
+        self.outcome = "" if status == "running" else status_message(shown, self.run.reason)
         judge = self.judge
         if judge is not None and status not in ACTIVE_STATUSES:
             judge.run_ended(": ".join(filter(None, [status, self.run.reason])), self.session)

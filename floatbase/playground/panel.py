@@ -246,7 +246,7 @@ class Panel:
             play.view.set_control_value(name, value)
 
     def show_settings(self, settings: Settings) -> None:
-        """Show settings at the controls; only a robot with a floating base has these.
+        """Show settings at the controls; only a robot with a floating base has these controls.
 
         Parameters
         ----------

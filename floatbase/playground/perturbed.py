@@ -56,7 +56,8 @@ class Perturbation(Value):
         Friction coefficient of all feet on the ground, dimensionless. None keeps the ground's
         coefficient.
     disabled_contacts : iterable of str
-        Names of contact points that pass through the ground. Their forces are missing in Jᵀ λ.
+        Names of contact points that pass through the ground. The forces of these points are missing
+        in Jᵀ λ.
     adhesion_force : float
         Force with which the ground attracts each touching contact point [N]. The normal force nᵀ λ
         may be negative by this amount.
@@ -213,7 +214,7 @@ class PerturbedSimulation(Simulation):
                 )
 
     def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Return contact forces as `Simulation.contact_forces_of` does, without adhesion.
+        """Return contact forces as `Simulation.contact_forces_of` does, minus the adhesion force.
 
         Parameters
         ----------
@@ -241,9 +242,9 @@ class PerturbedSimulation(Simulation):
 class BaseMotors:
     """Controller that also drives motors of the base, as if S had no zero rows.
 
-    It wraps another controller. At each control step, `sim.base_wrench` becomes the base's rows of
-    M q̈ + h - Jᵀ λ in eq. (7) for the planned values, with M, h and J as the controller assumes
-    them. The wrench is zero, up to rounding, unless the controller assumes such motors.
+    This controller wraps another one. At each control step, `sim.base_wrench` becomes the base's
+    rows of M q̈ + h - Jᵀ λ in eq. (7) for the planned values, with M, h and J as the controller
+    assumes them. The wrench is zero, up to rounding, unless the controller assumes such motors.
 
     Parameters
     ----------

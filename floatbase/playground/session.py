@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from floatbase._geometry import rotation_z
 from floatbase._validation import as_instance
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
+from floatbase.errors import SimulationWarning
 from floatbase.playground import build
 from floatbase.playground.perturbed import BaseMotors, PerturbedSimulation
 from floatbase.playground.program import program
@@ -163,11 +165,13 @@ class Session:
                 gait = replace(gait, stop=self.sim.time)
             elif settings.gait != before.gait:
                 gait = build.gait(settings, self.robot)
-            walk.gait, walk.velocity, walk.yaw_rate = (
-                gait,
-                settings.velocity[:2],
-                settings.velocity[2],
-            )
+            with warnings.catch_warnings():  # the speed may be limited; each slider would warn
+                warnings.simplefilter("ignore", SimulationWarning)
+                walk.gait, walk.velocity, walk.yaw_rate = (
+                    gait,
+                    settings.velocity[:2],
+                    settings.velocity[2],
+                )
         else:
             self.controller = build.controller(
                 settings, self.robot, self.sim, self._standing_state_here()

@@ -43,7 +43,7 @@ def term_arrows(
 ) -> Picture:
     """Draw a term of `EQUATION` at the last row of a record.
 
-    Forces and cones are drawn by the viewer itself. A text behind the robot replaces a term that is
+    Forces and cones are drawn by the viewer itself. Text behind the robot replaces a term that is
     too small to be seen or that is switched off in the simulation.
 
     Parameters
@@ -65,7 +65,7 @@ def term_arrows(
     Returns
     -------
     dict
-        Picture, path -> item; empty for a term without arrows of its own.
+        Picture, path -> item; empty for a term that has no arrows.
     """
     if term not in TERM_LEGEND:
         return {}
@@ -101,7 +101,7 @@ def _arrow(name: str, at: Array, vector: Array, words: str, size: float) -> Pict
 
 
 def _inertia(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """Draw mass times the acceleration of the centre of mass, by differences over the record."""
+    """Draw mass times the acceleration of the centre of mass, from differences over the record."""
     state = record.final
     if len(record) < 2:
         return {}

@@ -272,9 +272,9 @@ def _starting_point(problem: QP, y: Array | None, rows: list[int]) -> Array:
 def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int) -> _Result:
     """Find a point that satisfies all rows, and the rows of W that it lies on (phase 1).
 
-    It minimizes s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and G y ≤ h
-    on the others, by the same method. s = 0 is reached exactly if all rows can be satisfied.
-    Otherwise, the rows that keep s above 0 are in conflict.
+    The search minimizes s ≥ 0 subject to G y - s size ≤ h on the rows that the start violates, and
+    G y ≤ h on the others, by the same method. s = 0 is reached exactly if all rows can be
+    satisfied. Otherwise, the rows that keep s above 0 are in conflict.
     """
     n, norms = problem.n, problem.row_norms
     violation = (problem.G @ y - problem.h) / norms
@@ -367,7 +367,7 @@ def _longest_step(
 def _multipliers(problem: QP, x: Array, rows: list[int]) -> Array:
     """Return the multipliers μ of the rows of W at their minimizer, shape (len(rows),).
 
-    They solve Gᵀ μ = -(H x + g) in the least-squares sense.
+    The multipliers solve Gᵀ μ = -(H x + g) in the least-squares sense.
     """
     return np.linalg.lstsq(problem.G[rows].T, -(problem.H @ x + problem.g), rcond=None)[0]
 

@@ -146,10 +146,10 @@ def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
 
     Notes
     -----
-    By Farkas' lemma, infeasibility is proved by multipliers m ≥ 0 with Gᵀ m = 0 and hᵀ m < 0. They
-    minimize ‖Gᵀ m‖² + (hᵀ m + 1)². The active-set method for m ≥ 0 ends with linearly independent
-    columns (G, h), so the proof needs every row it uses. Source: Lawson and Hanson, Solving Least
-    Squares Problems (1974), ch. 23.
+    By Farkas' lemma, infeasibility is proved by multipliers m ≥ 0 with Gᵀ m = 0 and hᵀ m < 0. These
+    multipliers minimize ‖Gᵀ m‖² + (hᵀ m + 1)². The active-set method for m ≥ 0 ends with linearly
+    independent columns (G, h), so the proof needs every row it uses. Source: Lawson and Hanson,
+    Solving Least Squares Problems (1974), ch. 23.
     """
     from scipy.optimize import nnls  # slow to import, and rarely needed
 
@@ -166,8 +166,8 @@ def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
         )
     except RuntimeError as error:
         raise SolverError(
-            f"The search for conflicting constraints among {len(G)} did not end: {error}. Check "
-            f"the scaling of the problem."
+            f"The search for conflicting constraints among {len(G)} rows did not end: {error}. "
+            f"Check the scaling of the problem."
         ) from None
     m /= np.sum(m) or 1.0
     infeasible_certificate = (

@@ -56,7 +56,7 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
     Parameters
     ----------
     names : iterable of str
-        Names of the rows, or none. Rows without names get "equality 0", "equality 1", and so on.
+        Names of the rows, or none. The default names are `kind` and a number, as in "equality 0".
     count : int
         Number of rows.
     kind : {"equality", "inequality"}

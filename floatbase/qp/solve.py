@@ -82,7 +82,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
 
 def solvers() -> tuple[str, ...]:
-    """List the solvers that `solve` accepts here.
+    """List the solvers that `solve` accepts on this machine.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def check_solver(solver: str) -> None:
     if not isinstance(solver, str) or solver not in _BACK_ENDS:
         raise unknown_name("solver", solver, _BACK_ENDS)
     if solver == "cvxpy":
-        require("cvxpy", extra="course")
+        require("cvxpy", extra="cvxpy")
 
 
 def _daqp(qp: QP) -> Solution | None:
@@ -161,7 +161,7 @@ def _active_set(qp: QP) -> Solution:
 
 def _cvxpy(qp: QP) -> Solution | None:
     """Solve the whole problem, equalities included, with Clarabel at tight tolerances."""
-    cp = require("cvxpy", extra="course")
+    cp = require("cvxpy", extra="cvxpy")
     reduced = qp.reduced
     # Clarabel does not check convexity
     if np.any(

@@ -63,13 +63,14 @@ def clamp_to_limits(model: pin.Model, q: Array) -> Array:
 def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
     """Return a standing configuration, shape (nq,), after checking that it is valid.
 
-    Its quaternions have length 1, and its joints are within their limits.
+    The quaternions of a valid configuration have length 1, and its joints are within their limits.
     """
-    layout = (
-        f"7 numbers for the base, then {model.nq - 7} for the joints"
-        if has_floating_base(model)
-        else "the joint positions"
-    )
+    layout = "the joint positions"
+    if has_floating_base(model):
+        layout = f"{model.nq - 7} joint positions, or 7 numbers for the base and then the joints"
+        joints_alone = numeric_copy(posture)
+        if joints_alone is not None and joints_alone.shape == (model.nq - 7,):
+            posture = np.concatenate([pin.neutral(model)[:7], joints_alone])
     q = as_array("posture", posture, (model.nq,), layout)
     check_unit_norms(model, "posture", q)
     joints, index, lower, upper = joint_limits(model)
@@ -77,7 +78,7 @@ def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
         if not minimum - _LIMIT_TOLERANCE <= x <= maximum + _LIMIT_TOLERANCE:
             raise InputError(
                 f"The posture of {name} has joint {model.names[int(joint)]} at {x:.6g}. It must "
-                f"lie between its limits {minimum:.6g} and {maximum:.6g} (rad or m)."
+                f"lie between its limits {minimum:.6g} and {maximum:.6g} [rad or m]."
             )
     return q
 
@@ -122,7 +123,8 @@ def check_unit_norms(
                 else f"The {numbers} {entries} of joint {model.names[i]!r}"
             )
             raise InputError(
-                f"{entries} has length {length:.8g}; the length must be 1. Divide by it{hint}."
+                f"{entries} has length {length:.8g}; the length must be 1. Divide by this "
+                f"length{hint}."
             )
 
 
@@ -154,6 +156,6 @@ def as_torque_limits(d: int, value: npt.ArrayLike) -> Array:
     ):  # NaN is not > 0 either
         got = short_repr(value) if limits is None else f"shape {limits.shape}: {short_repr(value)}"
         raise InputError(
-            f"torque_limits must be one number > 0, or {d} such numbers (N·m), not {got}."
+            f"torque_limits must be one number > 0, or {d} such numbers [N·m], not {got}."
         )
     return read_only(np.broadcast_to(limits, (d,)))

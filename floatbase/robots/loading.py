@@ -80,11 +80,12 @@ def load(
         Radius of the feet that are given as frames [m]; 0 by default.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the catalogue or the URDF.
-    posture : array_like, shape (nq,), optional
-        Standing configuration of the robot before joints are locked. By default the one that comes
-        with the robot, with its joints brought within their limits.
+    posture : array_like, shape (nq,) or (nq - 7,), optional
+        Standing configuration of the robot before joints are locked, or its joints alone. By
+        default the one that comes with the robot, with its joints brought within their limits.
     locked : sequence of str, optional
-        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
+        Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
+        and τ.
 
     Returns
     -------
@@ -189,9 +190,9 @@ def load_urdf(
         Radius of the feet that are given as frames [m]; 0 by default.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the URDF.
-    posture : array_like, shape (nq,), optional
-        Standing configuration of the robot before joints are locked. By default all joints are at
-        zero, or at the limit nearest to zero.
+    posture : array_like, shape (nq,) or (nq - 7,), optional
+        Standing configuration of the robot before joints are locked, or its joints alone. By
+        default all joints are at zero, or at the limit nearest to zero.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 

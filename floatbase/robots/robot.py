@@ -120,7 +120,7 @@ class Robot(Value):
     Raises
     ------
     InputError
-        If the arguments do not fit together, if nothing of the robot can move, or if its inertia
+        If the arguments do not fit together, if no part of the robot can move, or if its inertia
         matrix M of eq. (1) is singular.
 
     Notes
@@ -197,7 +197,7 @@ class Robot(Value):
 
     @cached_property
     def _fingerprint(self) -> bytes:
-        """Digest of what equations, simulation and viewer use, the same in every process."""
+        """Digest of the data for equations, simulation and viewer, the same in every process."""
         shapes = [foot.centre if foot.corners is None else foot.corners for foot in self.feet]
         feet = [
             (foot.frame, foot.radius, shape.shape, shape.tobytes())
@@ -209,7 +209,7 @@ class Robot(Value):
         ).digest()
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the other is the same robot, even if loaded again or unpickled."""
+        """Return whether `other` is the same robot, even if loaded again or unpickled."""
         return self is other or (
             isinstance(other, Robot) and self._fingerprint == other._fingerprint
         )
@@ -238,7 +238,7 @@ class Robot(Value):
     def nv(self) -> int:
         """Length of v, of q̈ and of each row of J.
 
-        It is d + 6 for a floating base and d for a fixed base.
+        The length is d + 6 for a floating base and d for a fixed base.
 
         Notes
         -----
@@ -248,7 +248,7 @@ class Robot(Value):
 
     @cached_property
     def d(self) -> int:
-        """Count of the actuated joints, which is the length of τ.
+        """Length of τ: the number of actuated joints.
 
         Notes
         -----

@@ -82,7 +82,7 @@ class State(Value):
     def _data(self) -> pin.Data:
         """Pinocchio's results at (q, v).
 
-        They hold the kinematics; other results may be added without changing these. Never return
+        The results hold the kinematics; others may be added without changing these. Never return
         them to the user, since the next state that this thread uses overwrites them.
         """
         workspace = self.robot._workspace
@@ -98,7 +98,7 @@ class State(Value):
     def M(self) -> Array:
         """Generalized inertia matrix M(q) of eq. (1), shape (nv, nv), positive definite.
 
-        It is symmetric and includes the rotor inertias.
+        M is symmetric and includes the rotor inertias.
         """
         return frozen(pin.crba(self.robot.model, self._data, self.q, pin.Convention.WORLD))
 
@@ -106,7 +106,7 @@ class State(Value):
     def h(self) -> Array:
         """Generalized bias force h(q, q̇) of eq. (1), shape (nv,).
 
-        It contains the Coriolis, centrifugal and gravity terms.
+        h contains the Coriolis, centrifugal and gravity terms.
         """
         return frozen(pin.nonLinearEffects(self.robot.model, self._data, self.q, self.v))
 
@@ -131,7 +131,7 @@ class State(Value):
     def com_jacobian(self) -> Array:
         """Jacobian of the centre of mass, shape (3, nv), world frame.
 
-        It satisfies com_velocity = com_jacobian v.
+        The Jacobian satisfies com_velocity = com_jacobian v.
         """
         J = frozen(pin.jacobianCenterOfMass(self.robot.model, self._data, False))
         return J.reshape(3, self.robot.nv)  # for one joint Pinocchio returns shape (3,)
@@ -140,7 +140,7 @@ class State(Value):
     def com_drift(self) -> Array:
         """Drift J̇ v of the centre of mass, shape (3,), world frame [m/s²].
 
-        It is the acceleration of the centre of mass if q̈ = 0.
+        The drift is the acceleration of the centre of mass if q̈ = 0.
         """
         return self._centre_of_mass[2]
 

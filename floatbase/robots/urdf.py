@@ -1,4 +1,4 @@
-"""URDF texts: reading, checking, locking joints and removing the world link."""
+"""URDF text: reading, checking, locking joints and removing the world link."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
     Raises
     ------
     InputError
-        If the text is not valid XML or not a URDF. Pinocchio accepts some texts that later readers
+        If the text is not valid XML or not a URDF. Pinocchio accepts some text that later readers
         reject.
     """
     try:
@@ -80,7 +80,7 @@ def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
 
 
 def _parse_error(urdf: str, error: Exception) -> str:
-    """Return why a text is not a URDF; Pinocchio prints the reason instead of raising it."""
+    """Return why text is not a URDF; Pinocchio prints the reason instead of raising it."""
     if "xacro:" in urdf:
         return (
             f"{str(error).rstrip('.')}. The file is written in xacro. Run xacro first, as in "
@@ -147,7 +147,7 @@ def _check_inertials(name: str, root: ElementTree.Element, model: pin.Model) -> 
             if invalid:
                 raise InputError(
                     f"<inertial> of link {link.get('name')!r} of {name} has {invalid[0]}. It needs "
-                    f"a mass ≥ 0 (kg) and six numbers ixx … izz (kg m²)."
+                    f"a mass ≥ 0 [kg] and six numbers ixx … izz [kg m²]."
                 )
 
 

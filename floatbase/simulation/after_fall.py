@@ -18,7 +18,8 @@ _REST_SPEED = 0.05  # m/s and rad/s: a robot that is slower counts as at rest
 def joint_damping(sim: Simulation, period: float) -> Array:
     """Return the damping that each motor applies, shape (d,) [N·m·s/rad].
 
-    It is the joint's effective inertia in the present state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05 s.
+    The damping is the joint's effective inertia in the present state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05
+    s.
 
     Parameters
     ----------

@@ -23,7 +23,9 @@ from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
-# of friction to the normal force: stiffer friction makes feet creep less under a steady load
+
+# impedance of friction relative to that of the normal force: stiffer friction makes feet creep less
+# under a steady load
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
@@ -49,7 +51,7 @@ _RELATIVE_ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Ground(Value):
-    """The ground: a plane, or several planes that are all solid below, as the sides of a valley.
+    """The ground: a plane, or several planes that are solid below, such as the sides of a valley.
 
     Parameters
     ----------
@@ -157,8 +159,9 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
         )
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
-    for foot, feet in zip(robot.feet, Contacts.feet(robot).friction_contacts, strict=True):
-        _add_foot_balls(spec, foot, feet.point_names)
+    feet = Contacts.feet(robot) if robot.feet else Contacts.none()
+    for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
+        _add_foot_balls(spec, foot, contact_of_foot.point_names)
     _add_link_hulls(spec, robot)
     try:
         model = spec.compile()
@@ -178,7 +181,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 def body_name(link: str) -> str:
     """Return MuJoCo's name of a floating robot's link.
 
-    It is the link's own name, except for "world": MuJoCo would weld that link to the ground.
+    The name is that of the link, except for "world": MuJoCo would weld that link to the ground.
     """
     return "world of the robot" if link == "world" else link
 

@@ -54,7 +54,7 @@ class FootContacts:
         data : mujoco.MjData
             MuJoCo's data of the model.
         link_collisions : bool
-            Whether links may touch the ground, too; their contacts are left out.
+            Whether links may touch the ground, too; contacts of links are left out.
 
         Returns
         -------

@@ -17,9 +17,9 @@ from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
 
 _MIN_THICKNESS = 1e-3  # m: MuJoCo builds no hull from flatter sets of points
-_PRISM_SIDES = 24  # of the prism that approximates a cylinder: it is within 1 % of the radius
+_PRISM_SIDES = 24  # sides of the prism that approximates a cylinder to 1 % of its radius
 _BLOCK_SIZE = 1024  # points at a time: as many as one core's cache holds
-# a hull keeps the farthest point in each: a ball of 10 cm becomes flatter by 0.2 mm
+# directions in each of which a hull keeps its farthest point: a ball of 10 cm flattens by 0.2 mm
 _N_DIRECTIONS = 1000
 
 

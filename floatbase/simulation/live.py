@@ -31,7 +31,7 @@ class LiveSimulation:
     """A rollout that runs in the background, in real time, in slices of a 30th of a second.
 
     The run has its own thread, which passes the record of each slice to `show`. Calls take effect
-    between slices, and none but `close` waits.
+    between slices, and only `close` waits.
 
     A fall or a failure is reported immediately. The simulation then continues with the controller
     off, as with `settling_time` of `rollout`, until the robot lies still, but for at most 1.5 s.
@@ -52,7 +52,7 @@ class LiveSimulation:
         Called as after_reset() in the run's thread after each reset, to reset other objects with a
         state, such as the actuators.
     idle_timeout : float, optional
-        Time without any call of a method after which the run pauses by itself [s], so that a
+        Time without a method call after which the run pauses by itself [s], so that a
         forgotten page uses no computing time.
     push_memory : float, optional
         Time for which the `pushes` of a slice still include pushes that are over [s].
@@ -112,8 +112,9 @@ class LiveSimulation:
     def status(self) -> Status:
         """Status of the run.
 
-        It is "running", "paused", "idle" (paused after `idle_timeout`), or the reason why the run
-        ended: "fell", "diverged", "controller failed", or "stopped" by the exception in `error`.
+        The status is "running", "paused", "idle" (paused after `idle_timeout`), or the reason why
+        the run ended: "fell", "diverged", "controller failed", or "stopped" by the exception in
+        `error`.
         """
         return self._status
 
@@ -280,7 +281,7 @@ class LiveSimulation:
         return previous != status
 
     def _notify(self, changed: bool) -> None:
-        """Call the listener; never under the lock, because the listener may call methods."""
+        """Call the listener. The lock must not be held, because the listener may call methods."""
         if changed and self._listener is not None:
             self._listener(self._status)
 

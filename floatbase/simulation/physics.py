@@ -51,7 +51,7 @@ class Simulation:
     collide with it, too (`link_collisions`).
 
     Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
-    copy has a `model` and `data` of its own.
+    copy has its own `model` and `data`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Simulation:
         self._robot = as_instance("robot", robot, Robot)
         self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
-        self._feet = Contacts.feet(robot)
+        self._feet = Contacts.feet(robot) if robot.feet else Contacts.none()
         self._model = build_model(robot, self.ground, self.timestep)
         self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)
@@ -127,7 +127,7 @@ class Simulation:
         )  # origin and z axis
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore a copy, which has MuJoCo data of its own."""
+        """Restore a copy, which has its own MuJoCo data."""
         vars(self).update(state)
         self._refresh_views()
 
@@ -221,10 +221,10 @@ class Simulation:
     def link_collisions(self) -> bool:
         """Whether the links can collide with the ground, too, through hulls of their shapes.
 
-        They are off until a fall, so that only feet touch the ground, as in eq. (7), and a reset
-        switches them off again. `rollout(..., settling_time=1.0)` switches them on after a fall, so
-        that the robot comes to lie on its links. Links that are below the ground at that time come
-        out slowly. Links never collide with each other.
+        These collisions are off until a fall, so that only feet touch the ground, as in eq. (7),
+        and a reset switches them off again. `rollout(..., settling_time=1.0)` switches them on
+        after a fall, so that the robot comes to lie on its links. Links that are below the ground
+        at that time come out slowly. Links never collide with each other.
         """
         return self._link_collisions
 
@@ -254,13 +254,13 @@ class Simulation:
         Raises
         ------
         InputError
-            If the state belongs to another robot.
+            If the state belongs to a different robot.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
         if state.robot != self.robot:
             raise InputError(
-                f"The state belongs to another robot than this simulation, which has "
-                f"{self.robot.name}. Give a state of the simulation's robot."
+                f"The state belongs to a different robot. This simulation is for "
+                f"{self.robot.name}. Give a state of that robot."
             )
         self.link_collisions = False
         mujoco.mj_resetData(self.model, self.data)
@@ -288,7 +288,7 @@ class Simulation:
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep without the checks of `step`.
 
-        It is meant for loops that have checked the torques.
+        This method is meant for loops that have checked the torques.
 
         Parameters
         ----------

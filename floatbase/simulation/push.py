@@ -92,7 +92,7 @@ def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
     """Return a list of pushes as a tuple, checked."""
     if not isinstance(pushes, Sequence):
         raise InputError(
-            f"pushes must be a list, as in pushes=[fb.Push(…)]; it is {short_repr(pushes)}."
+            f"pushes must be a list, as in pushes=[fb.Push(…)], not {short_repr(pushes)}."
         )
     return tuple(
         as_instance("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])")

@@ -21,18 +21,17 @@ from floatbase._validation import (
     signature_error,
 )
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError, SimulationError
+from floatbase.errors import InfeasibleError, InputError, SimulationError, require
 from floatbase.friction import WrenchSet, wrench_set
 from floatbase.robots import State
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
-from floatbase.simulation.row_store import require
 from floatbase.simulation.sweep import sweep
 
 _MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
-_FACETS = 16  # of the polyhedra inside the friction cones: they leave out 2 % of the cones
+_FACETS = 16  # facets of the polyhedra inside the friction cones: 2 % of a cone is lost
 # times the robot's weight: if a larger push is survived, it is not the ground that resists it
 _MAX_FORCE_IN_WEIGHTS = 100.0
 # least cosine between a direction and an edge's normal: below it, the edge is parallel to the
@@ -179,7 +178,7 @@ def push_recovery(
     observation_time : float, optional
         Time after the push [s]. A fall is noticed only if it happens within this time.
     initial_force : float, optional
-        First push to try, by default the robot's weight [N]. It is doubled as long as it is
+        First push to try, by default the robot's weight [N]. The push is doubled as long as it is
         survived.
     resolution : float, optional
         Spacing of the pushes to try [N]: all pushes are multiples of it.
@@ -260,10 +259,11 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         if fault := signature_error(controller):
             raise InputError(f"push_recovery needs {needs}; {fault}.")
         return partial(_simulation_and_controller, controller)
+    cloudpickle = require("cloudpickle", "sweep")
     try:
         return partial(
             _simulation_and_controller,
-            partial(pickle.loads, require("cloudpickle").dumps(controller)),
+            partial(pickle.loads, cloudpickle.dumps(controller)),
         )
     except Exception as error:
         raise InputError(
@@ -342,7 +342,7 @@ def _unit_vectors(directions: Any) -> Array:
 def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> float:
     """Return the largest multiple of a push that the stance withstands together with the weight.
 
-    It is 0 if rounding puts the weight itself outside the set.
+    The result is 0 if rounding puts the weight itself outside the set.
     """
     try:
         return max(0.0, wrenches.max_scaling(push, weight_wrench))

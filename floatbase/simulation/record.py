@@ -206,7 +206,7 @@ class Rollout(Value):
     def rolling_displacement(self) -> Array:
         """Compute how far the ball at each contact point has rolled.
 
-        It is the integral of ω × radius · normal.
+        The displacement is the integral of ω × radius · normal.
 
         Returns
         -------
@@ -314,7 +314,7 @@ class Recorder:
         stance : Contacts
             The controller's contacts.
         planned : ndarray, shape (k,), or None
-            Forces that it planned at the contacts, in the world frame [N].
+            Forces that the controller planned at the contacts, in the world frame [N].
         """
         n = self._n
         self._tau_desired[n] = tau_desired
@@ -357,7 +357,8 @@ class Recorder:
         InputError
             If a contact was a point in one stance and a flat foot in another.
         """
-        contacts = self._initial_stance
+        # the stance before the first row is a walk's last one of the run before: it must not count
+        contacts = self._stances[0] if self._stances else self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):
             if contact.name not in contacts.names:
                 contacts += Contacts([contact])

@@ -93,14 +93,15 @@ def rollout(
     duration : float
         Simulated time [s], a whole number of control periods.
     pushes : sequence of Push, optional
-        Forces on the robot. Their start refers to the simulation's clock, which a reset sets to 0.
+        Forces on the robot. The start of a push refers to the simulation's clock, which a reset
+        sets to 0.
     control_period : float, optional
         Time between two calls of the controller [s], a whole number of timesteps; by default one
         timestep.
     actuators : Actuators, optional
         Model such as `HydraulicActuators` that converts the controller's torques in every timestep.
-        Without it, the joints get the controller's torques, within the motors' limits. Its state is
-        kept from one rollout to the next, so reset it together with the simulation.
+        Without it, the joints get the controller's torques, within the motors' limits. The model's
+        state is kept from one rollout to the next, so reset the model together with the simulation.
     settling_time : float, optional
         Time for which the simulation continues after a fall or a controller failure, so that the
         robot comes to lie on the ground [s]; a whole number of control periods. Meanwhile,
@@ -235,7 +236,7 @@ def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -
 def _check_arguments(
     sim: Simulation, controller: Controller, pushes: tuple[Push, ...], actuators: Actuators | None
 ) -> None:
-    """Raise `InputError` for arguments of the wrong type or of another robot."""
+    """Raise `InputError` for arguments of the wrong type or for a different robot."""
     as_instance("sim", sim, Simulation)
     timestep = sim.model.opt.timestep
     if timestep != sim.timestep:
@@ -271,7 +272,7 @@ def check_actuators(actuators: Actuators | None) -> None:
 class _NonFiniteTorques(InputError):
     """Torques that are NaN, infinite or not numbers.
 
-    They end the rollout; other errors in a controller are raised.
+    Such torques end the rollout; other errors in a controller are raised.
     """
 
 
@@ -318,8 +319,8 @@ def _desired_torques(sim: Simulation, command: Any) -> Array:
 def _as_torques(sim: Simulation, name: str, tau: Any) -> Array:
     """Return torques as an array, shape (d,) [N·m].
 
-    Raises `_NonFiniteTorques` if an entry is not a finite number, and `InputError` for another
-    shape.
+    Raises `_NonFiniteTorques` if an entry is not a finite number, and `InputError` if the shape is
+    wrong.
     """
     if (
         type(tau) is np.ndarray

@@ -7,31 +7,19 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from floatbase._validation import short_repr
-from floatbase.errors import InputError
+from floatbase.errors import InputError, require
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 RESERVED_NAMES = ("point", "error")  # columns that the store itself writes
 Row = dict[str, Any]
-
-
-def require(library: str) -> Any:
-    """Import an optional library of sweeps; raise `InputError` if it is not installed."""
-    try:
-        return import_module(library)
-    except ImportError:
-        raise InputError(
-            f"A sweep needs {library}, which is not installed. Install it with "
-            'pip install "floatbase[sweep]".'
-        ) from None
 
 
 def read_sweep(path: str | Path) -> DataFrame:
@@ -63,7 +51,7 @@ def read_sweep(path: str | Path) -> DataFrame:
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:
     """Return rows, as point number -> row, as a `pandas.DataFrame` that ends in "error"."""
-    pandas, points = require("pandas"), sorted(rows)
+    pandas, points = require("pandas", "sweep"), sorted(rows)
     names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
     return pandas.DataFrame(
         [rows[i] for i in points],
@@ -155,7 +143,7 @@ class RowStore:
                     path, f"with {what} {_joined(found[key])}, not {_joined(header[key])}"
                 )
         if found["grid"] != header["grid"]:
-            raise _wrong_file_error(path, "with the same parameters, but other values of them")
+            raise _wrong_file_error(path, "with the same parameters but different values")
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
             point = self._points[i] if 0 <= i < len(self._points) else {}
@@ -241,7 +229,7 @@ def _joined(value: Any) -> str:
 
 
 def _wrong_file_error(path: str | Path, what: str) -> InputError:
-    """Return the error about a file of something else."""
+    """Return the error for a file that does not belong to this sweep."""
     return InputError(
         f"{path} is a file {what}. It was not changed. Give another file, or remove this one."
     )

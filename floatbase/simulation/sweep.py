@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from floatbase._validation import signature_error
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InputError, SimulationError, require
 from floatbase.simulation.row_store import (
     RESERVED_NAMES,
     Row,
     RowStore,
     as_frame,
     as_json_value,
-    require,
 )
 
 if TYPE_CHECKING:
@@ -72,13 +71,14 @@ def sweep(
     file : str or Path, optional
         Path of a JSON Lines file to which each row is written as it finishes. Running the same
         sweep with the same file resumes it, even after it was killed; at most two points for each
-        worker are computed again. The file identifies the function by its name, so use another file
-        after changing what the function does. `read_sweep` reads a file.
+        worker are computed again. Points whose row has an error are also computed again. The file
+        identifies the function by its name, so use another file after changing what the function
+        does. `read_sweep` reads a file.
     workers : int, optional
         Number of processes, by default one for each core. Each process uses one thread for linear
         algebra, so that the rows are bit-identical for any number of workers.
     cluster : distributed.Client or str, optional
-        A Dask client or the address of a scheduler, to run the sweep there. It needs `pip install
+        A Dask client or the address of a scheduler, to run the sweep there. Dask needs `pip install
         "floatbase[cluster]"`.
     progress : bool, optional
         Whether to show a progress bar.
@@ -126,14 +126,14 @@ def sweep(
             "workers is the number of processes on this computer, so it cannot be combined with "
             "cluster. Give one of the two."
         )
-    require("pandas")  # missing libraries are reported before hours of work
+    require("pandas", "sweep")  # missing libraries are reported before hours of work
     job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
     with closing(RowStore(file, name, json_points)) as store:
-        pending = [i for i in range(len(points)) if i not in store.rows]
-        failed = sum(row["error"] is not None for row in store.rows.values())
-        bar = require("tqdm.auto").tqdm(
+        done = {i for i, row in store.rows.items() if row["error"] is None}
+        pending, failed = [i for i in range(len(points)) if i not in done], 0
+        bar = require("tqdm.auto", "sweep").tqdm(
             total=len(points),
-            initial=len(store.rows),
+            initial=len(done),
             desc=name,
             unit="point",
             disable=not progress,
@@ -149,7 +149,7 @@ def sweep(
 
 
 class _Job(NamedTuple):
-    """What a worker needs for all points: the sweep's token, and the pickled function and setup."""
+    """Data of a worker for all points: the sweep's token, and the pickled function and setup."""
 
     token: str
     payload: bytes
@@ -190,7 +190,7 @@ def _grid_points(grid: Any) -> list[Row]:
             f"The grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
         )
     if not points:
-        raise InputError("The grid has no points. Give at least one.")
+        raise InputError("The grid has no points. Give at least one point.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
@@ -214,7 +214,7 @@ def _function_name(function: Any, file: Any) -> str:
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
-    """Raise `InputError` if the function does not fit the parameters or setup is no function."""
+    """Raise `InputError` if the function does not fit the grid or `setup` is not a function."""
     if setup is not None and not callable(setup):
         raise InputError(f"setup must be a function without parameters, not {setup!r}.")
     made = () if setup is None else (None,)
@@ -229,7 +229,7 @@ def _check_function(function: Callable[..., Any], setup: Any, points: list[Row])
 def _worker_count(workers: Any) -> int:
     """Return the number of processes, checked."""
     if workers is None:
-        return int(require("loky").cpu_count())
+        return int(require("loky", "sweep").cpu_count())
     if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
         raise InputError(
             f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
@@ -241,7 +241,7 @@ def _worker_count(workers: Any) -> int:
 def _make_job(function: Any, setup: Any) -> _Job:
     """Pickle the function and setup."""
     try:
-        return _Job(uuid.uuid4().hex, require("cloudpickle").dumps((function, setup)))
+        return _Job(uuid.uuid4().hex, require("cloudpickle", "sweep").dumps((function, setup)))
     except InputError:
         raise
     except Exception as error:
@@ -258,7 +258,7 @@ def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
     On an exception, unfinished points are dropped.
     """
     if cluster is None:
-        executor = require("loky").get_reusable_executor(
+        executor = require("loky", "sweep").get_reusable_executor(
             workers,
             timeout=_WORKER_IDLE_TIMEOUT,
             initializer=_watch_parent,
@@ -345,7 +345,7 @@ def _completed_points(
                 except BrokenExecutor as error:
                     raise SimulationError(
                         "A worker process died. If it ran out of memory, use fewer workers; "
-                        "otherwise compiled code crashed."
+                        "otherwise, compiled code has crashed."
                     ) from error
                 except Exception as error:  # from the cluster: `_run_point` raises nothing
                     raise SimulationError(
@@ -363,7 +363,8 @@ _this_thread = threading.local()  # of a worker: function and token of its prese
 def _run_point(job: _Job, point: Row) -> Row | Exception:
     """Return the results of a point, or the exception that ends the sweep.
 
-    It runs in a worker. It does not raise, because Dask would log the exception for each point.
+    This function runs in a worker. It does not raise, because Dask would log the exception for each
+    point.
     """
     try:
         return _evaluate(job, point)
@@ -374,7 +375,7 @@ def _run_point(job: _Job, point: Row) -> Row | Exception:
 
 
 def _evaluate(job: _Job, point: Row) -> Row:
-    """Return what the function returned at a point, as JSON values, and "error"."""
+    """Return the function's results at a point, as JSON values, and "error"."""
     if getattr(_this_thread, "token", None) != job.token:
         try:
             function, setup = pickle.loads(job.payload)

@@ -20,7 +20,8 @@ except ModuleNotFoundError as error:
     if str(error.name).startswith("floatbase"):
         raise
     raise ViewerError(
-        f'The viewer needs {error.name}. Install it with: pip install "floatbase[viewer]"'
+        f"The viewer needs {error.name}, which is not installed. Install it with "
+        'pip install "floatbase[viewer]".'
     ) from None
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Controls in the page: sliders, lists, check boxes, buttons, toggles, texts and a plot."""
+"""Controls in the page: sliders, lists, check boxes, buttons, toggles, text and a plot."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Controls:
         column : {"", "model", "reality"}, optional
             Column of the slider in a row of two; the name must end in this word.
         at_most : str, optional
-            Word shown instead of the highest value, such as "perfect".
+            Word shown instead of the highest value, such as "ideal".
         on_release : bool, optional
             Whether to call `changed` only when the slider is released.
 
@@ -166,11 +166,11 @@ class Controls:
         Parameters
         ----------
         name : str
-            What it toggles, for its tooltip and for screen readers.
+            Purpose of the toggle, for its tooltip and for screen readers.
         changed : callable
-            Called as `changed(value)` with whether it is on, in the window's thread.
+            Called as `changed(value)` in the window's thread; `value` is True if the toggle is on.
         value : bool
-            Whether it is on initially.
+            Whether the toggle is on initially.
         symbol : str
             Symbol of the term; toggles of the same symbol are stacked.
         part : str
@@ -186,7 +186,7 @@ class Controls:
         )
 
     def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
-        """Write a text into the panel, or change it.
+        """Write text into the panel, or change it.
 
         Parameters
         ----------
@@ -272,6 +272,6 @@ def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
     ):
         raise InputError(
             f'column of {name!r} is {column!r}; it must be "model" or "reality", and the name must '
-            f"end in it."
+            f"end in the same word."
         )
     return {"section": as_string("section", section), **({"column": column} if column else {})}

@@ -97,8 +97,8 @@ class Output:
     def widget(self) -> Widget:
         """Make a widget that shows the picture, for use in panels.
 
-        It is live until the viewer is displayed again; then it shows the image with which it
-        opened. If the environment variable FLOATBASE_VIEWER is "static", or if the viewer is
+        The widget is live until the viewer is displayed again; then it shows the image with which
+        it opened. If the environment variable FLOATBASE_VIEWER is "static", or if the viewer is
         closed, the widget is a static copy of the scene.
 
         Returns
@@ -124,7 +124,7 @@ class Output:
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the live picture, and an image of it for readers that cannot show widgets.
 
-        A program that stores notebooks can replace both, see `MIMEBUNDLES`.
+        A program that stores notebooks can replace both; see `MIMEBUNDLES`.
         """
         if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             return bundle(self)

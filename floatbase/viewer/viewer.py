@@ -202,8 +202,8 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the state belongs to another robot, if forces are given without contacts or in the
-            wrong number, or if a value is NaN.
+            If the state belongs to a different robot, if forces are given without contacts or in
+            the wrong number, or if a value is NaN.
         ViewerError
             If the window is closed.
 
@@ -244,8 +244,9 @@ class Viewer(Controls, Output):
         """Make labels for the multipliers of active friction constraints, for `extra` of `show`.
 
         The multiplier of a friction facet is drawn at the middle of the facet, that of a normal
-        force on top of the cone. It tells how much the objective would decrease if its constraint
-        were relaxed by one newton; two significant digits are shown. To draw the labels::
+        force on top of the cone. A multiplier tells by how much the objective would decrease if its
+        constraint were relaxed by one newton; two significant digits are shown. To draw the
+        labels::
 
             labels = view.multiplier_labels(state, contacts, command.solution)
             view.show(state, contacts, planned=command.forces, extra=labels)
@@ -286,8 +287,8 @@ class Viewer(Controls, Output):
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
         """Make markers for the plan of a `Walk`, for `extra` of `show`.
 
-        They mark the planned footholds, the swing paths, the capture point and the planned ZMP. To
-        draw them::
+        The markers show the planned footholds, the swing paths, the capture point and the planned
+        ZMP. To draw them::
 
             view.show(state, walk.contacts, extra=view.walk_overlay(walk, state))
 
@@ -306,7 +307,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the walk or the state belongs to another robot.
+            If the walk or the state belongs to a different robot.
         """
         self.painter.check_robot("walk", as_instance("walk", walk, Walk).robot)
         self.painter.check_robot("state", as_instance("state", state, State).robot)
@@ -332,7 +333,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the state belongs to another robot.
+            If the state belongs to a different robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
         return gait_overlay.step_overlay(step, t, state, self._overlay_style)
@@ -419,7 +420,7 @@ class Viewer(Controls, Output):
         Raises
         ------
         InputError
-            If the rollout belongs to another robot or is empty.
+            If the rollout belongs to a different robot or is empty.
         """
         self.painter.check_robot("rollout", recording.as_rollout(rollout).robot)
         if not len(rollout.time):

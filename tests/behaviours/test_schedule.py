@@ -18,6 +18,7 @@ from floatbase.behaviours import (
     Swing,
     capture_point,
     neutral_point,
+    pitch_and_yaw,
     step_adjustment,
     support_margin,
 )
@@ -223,3 +224,23 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
     assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx(
         (3.0, 3.25)
     )  # 30 · 0.1 is not 3 but more, due to rounding
+
+
+def test_a_swing_of_no_duration_is_refused() -> None:
+    for touchdown in (0.0, 1e-200, 1e-160, 5e-4):
+        refused(
+            lambda touchdown=touchdown: Swing(np.zeros(3), np.ones(3), 0.0, touchdown),
+            InputError,
+            "touchdown",
+            0.001,
+        )
+    assert np.all(np.isfinite(Swing(np.zeros(3), np.ones(3), 0.0, 1e-3)(5e-4)[2]))
+
+
+def test_pitch_and_yaw_take_any_sequence_of_two_angles() -> None:
+    listed, stacked = (
+        pitch_and_yaw(lambda t, kind=kind: kind([0.1 * t, 0.2 * t])) for kind in (list, np.array)
+    )
+    for a, b in zip(listed(1.0), stacked(1.0), strict=True):
+        assert np.array_equal(a, b)
+    refused(lambda: pitch_and_yaw(lambda t: [0.1])(0.0), InputError, "angles", 1, 2)

@@ -7,7 +7,11 @@ and thirty pushes each.
 from __future__ import annotations
 
 import copy
+import itertools
+import os
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -15,11 +19,12 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
-from messages import refused
+from messages import refused, warns
 
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
-from floatbase.errors import InputError
+from floatbase.errors import InputError, SimulationWarning
+from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -446,6 +451,20 @@ def test_another_gait_takes_over_when_all_feet_stand() -> None:
     assert standing[0] == 4 and set(standing) == {3, 4}
 
 
+@pytest.mark.parametrize(("name", "velocity"), [("go2", 0.1), ("solo12", 0.0)])
+def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(
+    name: str, velocity: float
+) -> None:
+    """The body was shifted for another foot; both robots fell within 0.5 s."""
+    walk = walk_of(name, Gait.crawl, (velocity, 0.0))
+    sim = fb.Simulation(walk.robot)
+    fb.rollout(sim, walk, 2.5, control_period=PERIOD)
+    walk.gait = Gait.crawl(walk.robot, start=sim.time)
+    assert fb.rollout(sim, walk, 1.5, control_period=PERIOD).outcome == "completed"
+    lift_offs = [step.time for step in walk.history if step.time > 2.5 and len(step.stance) == 3]
+    assert lift_offs[0] == pytest.approx(3.3, abs=2 * PERIOD)
+
+
 def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.2, 0.0))
     sim = fb.Simulation(walk.robot)
@@ -585,3 +604,112 @@ def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
     assert (
         np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
     )  # 2 s, in which it speeds up at 1 m/s²
+
+
+SEEDED = """
+import hashlib
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+
+robot = fb.load("go2")
+walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.2), (0.3, 0.0))
+record = fb.rollout(fb.Simulation(robot), walk, 0.8, [fb.Push([0.0, 90.0, 0.0], 0.3)], 2e-3)
+arrays = (record.q, record.tau, record.measured)
+print(*record.contacts.names, *(hashlib.sha256(each.tobytes()).hexdigest() for each in arrays))
+"""
+
+
+def test_a_walk_does_not_depend_on_the_hash_seed() -> None:
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", SEEDED],
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for seed in range(4)
+    }
+    assert len(answers) == 1
+
+
+def test_a_walk_that_is_used_again_gives_the_same_record() -> None:
+    """A worker of a sweep uses one walk for many points, and stops at any stance."""
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.3, 0.0))
+    first, second, third = (run(walk, duration) for duration in (0.6, 0.34, 0.6))
+    assert len(second.contacts_at(-1)) == 2
+    assert third.contacts.names == first.contacts.names
+    for name in ("q", "tau", "measured", "planned"):
+        assert np.array_equal(getattr(third, name), getattr(first, name), equal_nan=True)
+
+
+@pytest.mark.parametrize("velocity", [(-0.3, 0.0), (0.0, 0.2)])
+def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity: tuple[float, float]) -> None:
+    """With straight knees, solo12 fell within 3 s; half a step was longer than its legs reach."""
+    with warns(SimulationWarning, "solo12", 2.0):
+        walk = walk_of("solo12", Gait.crawl, velocity)
+    assert 0.3 < walk.speed_fraction < 0.6
+    record = run(walk, 6.0)
+    assert record.outcome == "completed"
+    period = walk.gait.period
+    assert np.allclose(
+        speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period),
+        walk.speed_fraction * np.array(velocity),
+        atol=0.02,
+    )
+    walk.velocity = 0.1 * np.array(velocity)
+    assert walk.speed_fraction == 1.0
+
+
+def test_a_low_robot_trots_fast_with_short_swings() -> None:
+    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=0.2), (0.5, 0.0))
+    assert np.allclose(speed(run(walk, 4.0), 2.2, 3.8), [0.5, 0.0], atol=0.02)
+
+
+def hexapod() -> Robot:
+    """Load a robot of 4.5 kg and 13 cm height with six legs, each with joints for yaw, lift and
+    knee.
+    """
+    links, joints = [], []
+
+    def link(name: str, mass: float, x: float, inertia: float) -> None:
+        links.append(
+            f'<link name="{name}"><inertial><origin xyz="{x} 0 0"/><mass value="{mass}"/><inertia '
+            f'ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial>'
+            "</link>"
+        )
+
+    def joint(kind: str, parent: str, child: str, xyz: str, yaw: float = 0.0, z: int = 0) -> None:
+        joints.append(
+            f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/><child '
+            f'link="{child}"/><origin xyz="{xyz}" rpy="0 0 {yaw}"/><axis xyz="0 {1 - z} {z}"/>'
+            '<limit lower="-2.6" upper="2.6" effort="15" velocity="20"/></joint>'
+        )
+
+    link("body", 2.7, 0.0, 0.02)
+    for foot in HEXAPOD_FEET:
+        side, x = (1, -1)[foot[0] == "R"], {"F": 0.2, "M": 0.0, "H": -0.2}[foot[1]]
+        names = [f"{foot}_{part}" for part in ("hip", "thigh", "shank")] + [foot]
+        for name, mass, at in zip(names, (0.1, 0.1, 0.08, 0.02), (0, 0.06, 0.08, 0), strict=True):
+            link(name, mass, at, 1e-4)
+        joint("revolute", "body", names[0], f"{x} {0.1 * side} 0", side * np.pi / 2, 1)
+        for pair, length in zip(itertools.pairwise(names), (0.05, 0.13, 0.17), strict=True):
+            joint("fixed" if pair[1] == foot else "revolute", *pair, f"{length} 0 0")
+    urdf = f'<robot name="hexapod">{"".join(links + joints)}</robot>'
+    posture = [0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0, *([0.0, -0.4, 1.6] * 6)]
+    return fb.load_urdf(urdf, feet=HEXAPOD_FEET, foot_radius=0.015, posture=posture)
+
+
+HEXAPOD_FEET = [f"{side}{row}" for side in "LR" for row in "FMH"]
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.0), (0.0, 0.15)])
+def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
+    """The middle of three feet swayed a low body from side to side, and it fell within 1 s."""
+    robot = hexapod()
+    offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
+    gait = Gait(offsets, period=0.6, swing=0.25, start=0.2)
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, velocity)
+    record = run(walk, 2.6)
+    assert record.outcome == "completed" and tilt(record) < 2.0
+    assert np.ptp(record.com[:, 2]) < 0.02
+    assert np.allclose(speed(record, 1.39, 2.59), velocity, atol=0.02)

@@ -291,6 +291,14 @@ def test_feet_are_taken_as_they_are_flat_or_round() -> None:
     assert np.array_equal(mixed.mus, [0.3] * 4 + [0.7] * 4)
 
 
+def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts() -> None:
+    robot = judges.load("go2")
+    legs = fb.load_urdf(robot.urdf, posture=robot.posture)
+    refused(lambda: fb.Contacts.feet(legs), InputError, "Contacts.points", "feet")
+    assert len(fb.Simulation(legs).feet) == 0
+    assert len(fb.Contacts.feet(judges.load("ur5"))) == 0
+
+
 def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows() -> None:
     robot = judges.load("go2")
     state = robot.standing()

@@ -315,7 +315,7 @@ def test_the_playground_stands_still_and_says_why(go2: fb.Robot) -> None:
 
     field = playground("go2")
     data = data_of(field)
-    assert "live lesson" in data["words"] and data["controls"] == [] and not field.run.is_simulating
+    assert "live" in data["words"] and data["controls"] == [] and not field.run.is_simulating
     assert any("/robot/" in key[0] for key in scene_at(data))
     field.close()
 

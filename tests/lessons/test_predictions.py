@@ -256,7 +256,7 @@ def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_sa
 
 def test_a_name_that_was_left_out_is_missed() -> None:
     for call in (lambda: predict(3.0, unit="N"), lambda: compare(3.0, 2.0), lambda: review(2)):
-        with pytest.raises(InputError, match="text"):
+        with pytest.raises(InputError, match="string"):
             call()
     assert progress.predictions() == {}
 

@@ -255,7 +255,8 @@ def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
 
 def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
-    (path,) = write_solutions(learner / "solutions", [lesson])
+    path = learner / "solutions" / f"{lesson.stem}.solved.ipynb"
+    assert write_solutions(path.parent, [lesson]) == [f"{path.name}: new"]
     cells = read_notebook(path).cells
     solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
     assert {
@@ -263,3 +264,16 @@ def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
     } == solutions
     explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
     assert len(cells) == len(read_notebook(lesson).cells) + explained
+
+
+def test_solutions_that_a_teacher_has_annotated_are_kept(learner: Path) -> None:
+    lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
+    write_solutions(learner, [lesson])
+    assert write_solutions(learner, [lesson]) == []
+    path = learner / f"{lesson.stem}.solved.ipynb"
+    annotated = path.read_text().replace("**Why.**", "**Why?**")
+    path.write_text(annotated)
+    (message,) = write_solutions(learner, [lesson])
+    assert message.endswith(f"{lesson.stem}.solved.new.ipynb")
+    assert path.read_text() == annotated
+    assert (learner / f"{lesson.stem}.solved.new.ipynb").read_text() != annotated

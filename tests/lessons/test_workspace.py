@@ -99,8 +99,7 @@ def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
 def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
     course: Path, tmp_path: Path
 ) -> None:
-    folders = [tmp_path / "homes" / name for name in ("ada", "bob")]
-    (tmp_path / "homes").mkdir()
+    folders = [tmp_path / "homes" / name / "course" for name in ("ada", "bob")]
     for folder in folders:
         assert prepare_workspace(course, folder) == [f"{LESSON}: new"]
     write(folders[0] / LESSON, "first = 'my answer'")

@@ -164,6 +164,18 @@ def test_friction_can_change_during_a_run() -> None:
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 
 
+def test_links_of_a_fallen_robot_have_the_friction_of_the_perturbation() -> None:
+    sim = PerturbedSimulation(GO2, 0.8)
+    sim.link_collisions = True
+    sim.perturbation = Perturbation(friction=0.05)
+    touching = set()
+    for _ in range(600):  # without torques it falls onto its links
+        sim.step(np.zeros(12))
+        touching |= set(sim.data.contact.geom2.tolist())
+        assert np.all(sim.data.contact.friction[:, 0] == 0.05)
+    assert touching - set(sim.foot_contacts.geoms.tolist())
+
+
 def test_copies_are_independent_and_wrong_input_is_refused() -> None:
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(velocity_forces=False))
     other = copy.copy(sim)

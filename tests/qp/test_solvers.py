@@ -372,10 +372,10 @@ def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "cvxpy", None)  # as if it were not installed
     assert "cvxpy" not in solvers()
-    refused(lambda: solve(corner(), "cvxpy"), MissingDependencyError, "cvxpy", "floatbase[course]")
+    refused(lambda: solve(corner(), "cvxpy"), MissingDependencyError, "cvxpy", "floatbase[cvxpy]")
     robot = judges.load("go2")
     refused(
         lambda: fb.WholeBodyController(robot, judges.stance(robot), [], solver="cvxpy"),
         MissingDependencyError,
-        "floatbase[course]",
+        "floatbase[cvxpy]",
     )

@@ -103,6 +103,24 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     assert len(calls) - 60 <= 2 * 2  # for each of two workers, its present point and the next
 
 
+def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path: Path) -> None:
+    def root(i: int, folder: str) -> float:
+        with open(f"{folder}/calls", "a") as calls:
+            calls.write(f"{i}")
+        if i == 1 and not os.path.exists(f"{folder}/repaired"):
+            raise MemoryError
+        return float(i**0.5)
+
+    grid, file = {"i": [0, 1, 4], "folder": [str(tmp_path)]}, tmp_path / "rows.jsonl"
+    first = fb.sweep(root, grid, file=file, workers=1, progress=False)
+    assert first["error"].isna().tolist() == [True, False, True]
+    (tmp_path / "repaired").touch()
+    second = fb.sweep(root, grid, file=file, workers=1, progress=False)
+    assert second["result"].tolist() == [0.0, 1.0, 2.0] and second["error"].isna().all()
+    assert (tmp_path / "calls").read_text() == "0141"
+    assert_frame_equal(read_sweep(file), second)
+
+
 def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
     tmp_path: Path,
 ) -> None:

@@ -40,7 +40,7 @@ _JOINTS = (
 def announce_if_slow(
     text: str, is_true: Callable[[], bool] = lambda: True, after: float = 6.0
 ) -> Iterator[None]:
-    """Print a text on the error stream if the enclosed work takes more than `after` seconds.
+    """Print a message to stderr if the enclosed code takes more than `after` seconds.
 
     Parameters
     ----------
@@ -143,16 +143,16 @@ class CompiledTick:
     Attributes
     ----------
     qdd, tau, forces : slice
-        Where these are among the numbers of a result.
+        Slices of q̈, τ and λ in the array of a result.
     unchecked_tasks : list of Task
         Tasks that the problem arrays do not check: user-defined and time-varying ones.
     arguments : tuple
         Arguments of `tick.tick` after q, v and `TickInputs.packed`, without the result and the
         number of stages.
     default_inputs : TickInputs
-        Inputs without a state: zeros for time-varying targets, nothing user-defined.
+        Inputs without a state: zeros for time-varying targets, and no user-defined terms.
     workspace : tuple of ndarray
-        Memory of the tick, for real and for whole numbers.
+        Memory of the tick, for real numbers and for integers.
 
     Raises
     ------
@@ -363,7 +363,7 @@ class CompiledTick:
         -------
         TickInputs or None
             None if something is wrong with the inputs. The reference backend then finds and reports
-            it.
+            the error.
         """
         try:
             targets = (

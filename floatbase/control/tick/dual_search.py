@@ -1,6 +1,6 @@
 """The optimum of the QP (27) by the dual active-set method of Goldfarb and Idnani.
 
-Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities. It brings one
+Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities, and brings one
 violated inequality after another to its bound. An inequality that is never violated is only
 evaluated. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
 the number of active inequalities, mu their multipliers.
@@ -231,11 +231,11 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
 
 @jit
 def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
-    """Take one Newton step on the optimality conditions; (β, mu) are correct up to rounding.
+    """Take one Newton step on the optimality conditions.
 
-    Updates β and the multipliers. Returns the largest change of an entry of β. grad: (nb,),
-    gradient of the cost at β; overwritten. L: Cholesky factor of the Hessian. step, delta_beta, y:
-    (nb,), memory.
+    It starts from (β, mu), which are correct up to rounding, and updates both. Returns the largest
+    change of an entry of β. grad: (nb,), gradient of the cost at β; overwritten. L: Cholesky factor
+    of the Hessian. step, delta_beta, y: (nb,), memory.
     """
     nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
     if q == 0:

@@ -34,10 +34,10 @@ class Parametrisation(NamedTuple):
 def gauss_jordan(B, first, last, first_cleared, columns, weights, lengths, pivots):
     """Reduce rows first:last of B in place, each to one pivot equal to 1.
 
-    Returns the smallest fraction of a row that was left at its turn. B: (·, n + 1), right-hand side
-    in the last column; rows first:last have other entries in the first `columns` only.
-    first_cleared: the pivots are cleared from all rows from there on. weights: (n,), each row takes
-    the pivot of the largest weight × |entry|. lengths: norms of the rows of B before the
+    Returns the smallest fraction of a row that remained when its turn came. B: (·, n + 1),
+    right-hand side in the last column; rows first:last have other entries in the first `columns`
+    only. first_cleared: the pivots are cleared from all rows from there on. weights: (n,), each row
+    takes the pivot of the largest weight × |entry|. lengths: norms of the rows of B before the
     elimination. pivots: receives the column of each row's pivot.
     """
     right, smallest_pivot = B.shape[1] - 1, 1.0
@@ -114,10 +114,10 @@ def independent_rows(A, b, v, rows, rhs):
 def eliminate(A, b, M, h, J, base, workspace, B, pivots):
     """Solve the equalities for as many entries of (q̈, λ) as possible: eqs. (13), (17).
 
-    Returns the smallest fraction of a motion row, and of any row, that was left at its turn. A, b:
-    (m, nv), (m,), motion rows (5). M, h, J: (nv, nv), (nv,), (k, nv), of (7). base: number of rows
-    of (7) without a motor, 6 or 0. B: (m + base, n + 1), receives the reduced rows. pivots: (m +
-    base,), receives the entry of (q̈, λ) that each row is solved for.
+    Returns the smallest fraction of a motion row, and of any row, that remained when its turn came.
+    A, b: (m, nv), (m,), motion rows (5). M, h, J: (nv, nv), (nv,), (k, nv), of (7). base: number of
+    rows of (7) without a motor, 6 or 0. B: (m + base, n + 1), receives the reduced rows. pivots: (m
+    + base,), receives the entry of (q̈, λ) that each row is solved for.
 
     Motion rows are solved for joints if possible, and for the base if knees are straight. Base rows
     are solved for the base, and for λ if the contacts already constrain the base.
@@ -142,8 +142,8 @@ def eliminate(A, b, M, h, J, base, workspace, B, pivots):
 def parametrise(B, pivots, m, free_columns, V, beta_index):
     """Write V and beta_index of `Parametrisation` from the reduced rows of `eliminate`.
 
-    The first m reduced rows are motion rows. They still contain the pivots of the later rows, which
-    are substituted here. free_columns: (nb,), memory.
+    The first m reduced rows are motion rows. These rows still contain the pivots of the later rows,
+    which are substituted here. free_columns: (nb,), memory.
     """
     n, nb = V.shape[0], V.shape[1] - 1
     for c in range(n):

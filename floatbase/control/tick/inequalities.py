@@ -1,9 +1,9 @@
 """The inequalities G β ≤ h of eqs. (27), (28), assembled only for the rows that β violates.
 
 Rows are numbered: F facets and the minimum normal force of each of P points, then their P maximum
-normal forces, d upper torque limits, d lower ones, and the user-defined rows. What every problem
-needs is inlined into the search (`jit_forceinline`); what few problems need is not. Without this
-choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
+normal forces, d upper torque limits, d lower ones, and the user-defined rows. Code that every
+problem needs is inlined into the search (`jit_forceinline`); code that few problems need is not.
+Without this choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def forces_of(space: Parametrisation, beta, forces):
 
 @jit_forceinline
 def worst_facet(limits: Inequalities, first, f):
-    """Return the facet of a point that the force f violates most and by how much, or -1; eq. (28).
+    """Return the row of the facet that a point's force f violates most, or -1, and by how much.
 
-    first: row of the point's first facet. Forces inside the circle that the facets touch violate
-    none.
+    The facets are those of eq. (28). first: row of the point's first facet. Forces inside the
+    circle that the facets touch violate none.
     """
     normal = times(-1.0, row_part(limits.cones, first + limits.facets, 0))
     mu, normal_force = -dot(row_part(limits.cones, first, 0), normal), dot(normal, f)
@@ -85,7 +85,7 @@ def worst_facet(limits: Inequalities, first, f):
 
 @jit_forceinline
 def violated_force_row(limits: Inequalities, forces):
-    """Return the row on forces that forces (k,) violate most, or -1 if they violate none.
+    """Return the row on forces that forces (k,) violate most, or -1 if they satisfy all rows.
 
     Violations are measured on rows of unit length.
     """
@@ -112,7 +112,7 @@ def force_rows_of(limits: Inequalities):
 
 @jit
 def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
-    """Do as `violated_row` for maximum normal forces and user-defined rows.
+    """Do the same as `violated_row` for maximum normal forces and user-defined rows.
 
     Violations are measured on rows of unit length. forces, tau: (k,), (d,), those at β. qdd: (nv,),
     memory.
@@ -171,7 +171,7 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
 
 @jit
 def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
-    """Do as `row_in_beta` for a user-defined row, numbered from the first of them."""
+    """Do the same as `row_in_beta` for a user-defined row, numbered from the first of them."""
     V, T, inputs, at = space.V, space.T, limits.inputs, limits.user_start
     k, nb = V.shape[0] - nv, V.shape[1] - 1
     clear(out)

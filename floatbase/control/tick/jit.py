@@ -2,8 +2,8 @@
 
 numba caches a compiled function on disk and recompiles it when its own file changes, but not when
 the file of a function that it calls changes. So only one function is cached, the entry point
-`tick`. Its closure contains a digest of this folder, which is part of numba's cache key. An edit in
-any file therefore triggers recompilation.
+`tick`. The closure of `tick` contains a digest of this folder, which is part of numba's cache key.
+An edit in any file therefore triggers recompilation.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Velocities, drifts and Jacobians of bodies and contacts: eqs. (1), (4), (5).
 
-They follow from Pinocchio's world Jacobian. All quantities are in the world frame. A drift is the
-acceleration at q̈ = 0, that is J̇ v. Joint 0 is the world itself.
+These quantities follow from Pinocchio's world Jacobian. All quantities are in the world frame. A
+drift is the acceleration at q̈ = 0, that is J̇ v. Joint 0 is the world itself.
 """
 
 from __future__ import annotations

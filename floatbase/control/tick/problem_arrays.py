@@ -1,6 +1,6 @@
 """A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays.
 
-Pinocchio overwrites its arrays in place. What belongs to one robot or one contact is made once, so
+Pinocchio overwrites its arrays in place. The arrays of one robot or one contact are made once, so
 that a controller with other contacts is cheap.
 """
 
@@ -171,7 +171,7 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
     """Return contacts (C, 6), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
 
-    The first three are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
+    The first three arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
     limits = problem.limits
     found = [
@@ -233,7 +233,7 @@ def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
 def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
     """Return tasks (N, 3), gains (N, 3) and frames (N, 12), targets, and the time-varying tasks.
 
-    The tables are those of `costs.TaskTable`. They contain the built-in tasks only, so the
+    The tables are those of `costs.TaskTable`. Only the built-in tasks are included, so the
     positions of user-defined tasks in the list do not matter.
     """
     known = [

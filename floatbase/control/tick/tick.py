@@ -44,8 +44,8 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
     joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets,
     numbers of user-defined contacts, user-defined tasks, groups of user-defined rows; then 1 or 0:
     whether all contacts are points, and `Inequalities.has_optional`. int_tables, float_tables:
-    whole and real numbers of all tables, one table after another, as in a workspace. inputs: as for
-    `tick`.
+    integers and real numbers of all tables, one table after another, as in a workspace. inputs: as
+    for `tick`.
     """
     n, n_contacts, n_points, n_rows, n_tasks = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5]
     d, k = sizes[6], sizes[7]
@@ -71,7 +71,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
 
 
 def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
-    """Return how many real and how many whole numbers a tick needs as memory.
+    """Return how many real numbers and how many integers a tick needs as memory.
 
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """

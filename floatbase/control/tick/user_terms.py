@@ -52,7 +52,7 @@ class UserTerms:
     any : bool
         Whether the problem has user-defined objects.
     varies : bool
-        Whether they, or a bound of a normal force, must be evaluated at every tick.
+        Whether these objects, or a bound of a normal force, must be evaluated at every tick.
     """
 
     def __init__(self, problem: Problem):
@@ -144,5 +144,5 @@ class UserTerms:
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Replace infinite upper bounds of normal forces by `UNBOUNDED`."""
+    """Replace infinite upper bounds of normal forces with `UNBOUNDED`."""
     return bounds[0], np.minimum(bounds[1], UNBOUNDED)

@@ -1,6 +1,6 @@
 """Memory of the tick, which allocates nothing: arrays are carved out of a workspace.
 
-workspace: one array of real or of whole numbers; its first entry counts how many are in use.
+workspace: one array of real numbers or of integers; its first entry counts how many are in use.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def take_vector(workspace, n):
     first = int(workspace[0])
     last = first + n
     if last > workspace.size:
-        raise MemoryError("the workspace of the compiled controller is too small")
+        raise MemoryError("The workspace of the compiled controller is too small.")
     workspace[0] = last
     return workspace[first:last]
 

@@ -33,7 +33,8 @@ def _pressing_arm() -> tuple[fb.State, Array, Array]:
 def _bolts_moment() -> Array:
     """Compute the moment of the bolts from the constraint forces of (7).
 
-    It is the wrench of the welded base with the wall's force, minus the wrench without it.
+    The moment is from the wrench of the welded base with the wall's force, minus that without the
+    force.
     """
     state, _, force = _pressing_arm()
     J = state.frame_jacobian("tool0")[:3]
@@ -115,7 +116,7 @@ def _in_proportion() -> float:
 def _judge_thrust(f: Array) -> Verdict:
     """Judge thrusts at the four feet of a standing go2.
 
-    They must add up to 200 N straight up, without a moment about the centre of mass.
+    The thrusts must add up to 200 N straight up, without a moment about the centre of mass.
     """
     f = f.reshape(4, 3)
     state = fb.load("go2").standing()
@@ -247,7 +248,7 @@ EXERCISES = (
                     "base_last": "The base comes first in q, as in (2). Here its rows come last.",
                     "zeros": "All entries are zero, so no motor drives anything. Where does "
                     "each torque act?",
-                    "sign": "Does a positive torque push a joint backwards? One sign is wrong.",
+                    "sign": "The sign is wrong. Should a positive torque push its joint backwards?",
                 },
             ),
         ),

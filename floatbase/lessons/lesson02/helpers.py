@@ -126,7 +126,7 @@ def disc_state(
     heading : float, optional
         Direction of rolling: angle about the vertical [rad]; 0 is along x.
     rolled : float, optional
-        Angle by which it has turned about its axle [rad].
+        Angle by which the disc has turned about its axle [rad].
     speed : float, optional
         Speed along its heading [m/s].
     turning : float, optional
@@ -156,9 +156,9 @@ def parking_states(
     robot : Robot
         The disc.
     distance : float, optional
-        Distance that it rolls [m].
+        Distance that the disc rolls [m].
     angle : float, optional
-        Angle that it turns [rad].
+        Angle that the disc turns [rad].
     steps : int, optional
         States per second.
 

@@ -242,7 +242,7 @@ def play_collapse_comparison(
 ) -> Viewer:
     """Play the robot without b, and the robot with b as a ghost.
 
-    Marks show where the feet belong, and lines lead from there to where they are.
+    Marks show where the feet belong, and lines lead from there to the feet.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ EXERCISES = (
                 },
             ),
             {
-                (18,): "18 numbers are generalised forces of base and joints. Motors act only on "
+                (18,): "18 numbers are generalized forces of base and joints. Motors act only on "
                 "the joints: see S.",
                 (6,): "6 numbers are the base columns of J. The base has no motors.",
             },

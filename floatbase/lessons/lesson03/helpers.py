@@ -71,7 +71,7 @@ def rising_solo8_eom() -> EquationsOfMotion:
 
 
 def beta_direction(space: FeasibleSpace, base: npt.ArrayLike) -> Array:
-    """Return the step in β that changes the base's acceleration and the contact forces least.
+    """Return the step in β that changes the base's acceleration as given, and the forces least.
 
     Parameters
     ----------

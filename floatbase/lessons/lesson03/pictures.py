@@ -33,7 +33,7 @@ _Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bool = True) -> str:
-    """Draw (q̈, τ, λ) of a β: forces as arrows, and where q̈ leads from rest as a ghost.
+    """Draw (q̈, τ, λ) of a β: forces as arrows, and the motion due to q̈ from rest as a ghost.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def _bar(x: int, part: float, colour: str) -> str:
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
-    """Draw the non-zero entries of a matrix, and beside it its singular values.
+    """Draw the non-zero entries of a matrix, and its singular values beside them.
 
     Parameters
     ----------

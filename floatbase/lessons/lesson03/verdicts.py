@@ -44,7 +44,7 @@ def _turned(forces: Array, R: Array) -> Array:
 
 
 def squeeze_mistakes() -> dict[str, Any]:
-    """Return for each hint a function that computes the torques of this mistake."""
+    """Return, for each hint, a function that computes the torques of this mistake."""
 
     def torques(change: Any = lambda eom, f: f, after: Any = lambda eom, tau: tau) -> Any:
         def value() -> Array:
@@ -254,8 +254,8 @@ def judge_all_pairs(answer: Any) -> Verdict:
 
 
 def unloading_examples() -> list[Example]:
-    # forces whose sum and moment are zero
     """Return examples for exercise 03.3."""
+    # forces whose sum and moment are zero
     wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
     forces, squeezes = standing_forces(), internal_forces(standing_go2_eom())
     less = 20.0 - forces[2]

@@ -27,7 +27,7 @@ from floatbase.objectives import tangential_bias
 def _gradient_by_newton() -> Array:
     """Compute the gradient from the contact forces: a_c = Σ f / m + g with λ = ζ(τ).
 
-    It needs neither the Jacobian nor the drift of the centre of mass.
+    This computation needs neither the Jacobian nor the drift of the centre of mass.
     """
     eom = tilted_go2_eom()
     zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
@@ -155,7 +155,7 @@ def _judge_design(answer: Any) -> Verdict:
         most = f"the friction force at one foot is {friction:.1f} N"
         return Verdict(
             False,
-            f"The robot moves as desired, but {most}. The effort does not depend on friction. Use "
+            f"The robot moves as desired, but {most}. The effort does not penalize friction. Use "
             f"a cost on λ, pulled back to τ.",
             "friction",
         )

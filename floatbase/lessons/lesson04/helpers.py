@@ -21,7 +21,7 @@ SETTLING_TIME = 0.02  # s in which the engine's soft contact settles
 
 
 class MinimumCostController:
-    """Controller that minimises a cost on the torques in every control step.
+    """Controller that minimizes a cost on the torques in every control step.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def measured_acceleration(record: Rollout) -> Array:
 def rescaled_space(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
     """Return the same space of motions with another β, whose unit of length is set by a matrix.
 
-    v and V⊥ of (13) become what they are if a vector has the length ‖W (q̈, τ, λ)‖.
+    v and V⊥ of (13) become those of a space in which vectors have the length ‖W (q̈, τ, λ)‖.
 
     Parameters
     ----------

@@ -136,7 +136,7 @@ def level_curves(
 
 
 def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) -> Figure:
-    """Plot the effort over the acceleration to the left.
+    """Plot the effort against the acceleration to the left.
 
     Parameters
     ----------

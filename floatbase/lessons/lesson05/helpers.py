@@ -80,8 +80,8 @@ def squeeze_forces(contacts: fb.Contacts) -> dict[str, Array]:
 def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
     """Return the ratio of tangential to normal force at each contact point.
 
-    The ratio equals μ for a force on the surface of its cone. It is infinite if the force pulls or
-    has no normal component.
+    The ratio equals μ for a force on the surface of its cone. For a force that pulls or has no
+    normal component, the ratio is infinite.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def arm_robot_eom() -> EquationsOfMotion:
 def squeezed_standing_forces() -> Array:
     """Return the contact forces of exercise 05.3, shape (12,), world frame [N].
 
-    They are the forces of standing still, with an internal force of 20 N between the front feet.
+    The forces are those of standing still, with an internal force of 20 N between the front feet.
     """
     space = fb.feasible_space(arm_robot_eom())
     forces = space.forces(standing_still_beta(space)).copy()

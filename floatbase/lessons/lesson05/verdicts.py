@@ -52,7 +52,7 @@ def _blocks(levers: Any, order: float = 1.0) -> Array:
 
 
 def moment_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the matrix of this mistake."""
+    """Return, for each hint, a function that computes the matrix of this mistake."""
 
     def moments(
         about: Callable[[fb.State], Any], factor: float = 1.0, feet: Any = (0, 1, 2)
@@ -82,7 +82,7 @@ def moment_mistakes() -> dict[str, Callable[[], Any]]:
 def force_by_momentum() -> Array:
     """Compute the force from the rate of momentum of all links.
 
-    It takes any q̈ with the desired acceleration of the centre of mass.
+    Any q̈ with the desired acceleration of the centre of mass will do.
     """
     state = standing_go2_eom().state
     rate = centroidal_momentum_rate(state, np.linalg.pinv(state.com_jacobian) @ UPWARDS)[:3]
@@ -90,7 +90,7 @@ def force_by_momentum() -> Array:
 
 
 def force_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the force of this mistake."""
+    """Return, for each hint, a function that computes the force of this mistake."""
     robot = standing_go2_eom().robot
     m, weight = robot.mass, np.array([0.0, 0.0, robot.weight])
     g = weight / m
@@ -113,7 +113,7 @@ def smallest_by_zeta() -> Array:
 
 
 def torque_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the torques of this mistake."""
+    """Return, for each hint, a function that computes the torques of this mistake."""
 
     def torques(
         offset: float = 1.0, forces: float = 1.0, back: Callable[[Array], Array] = np.linalg.pinv
@@ -223,7 +223,7 @@ def _wrong_forces(eom: EquationsOfMotion, forces: Array) -> Verdict | None:
 
 
 def _is_on_torques(eom: EquationsOfMotion, torques: Array) -> bool:
-    """Return whether a minimum with twelve numbers has about the desired wrench as torques τ."""
+    """Return whether a minimum with twelve entries, read as torques, nearly gives the wrench."""
     points = fb.forces_from_torques(eom)(torques).reshape(-1, 3)
     return bool(
         np.linalg.norm(points.sum(axis=0) - [FORWARDS, 0.0, eom.robot.weight])
@@ -251,7 +251,7 @@ def _on_physics(eom: EquationsOfMotion, forces: Array) -> Verdict:
 
 
 def _leaning(direction: Any, weight: float = 1e-3) -> fb.Quadratic:
-    """Return the cost with the friction measured from another direction than the normal."""
+    """Return the cost with the friction measured from a direction other than the normal."""
     eom = standing_go2_eom()
     normals = np.asarray(direction) / np.linalg.norm(direction)
     return _cost_60(eom) + weight * tangential_bias(fb.Contacts.points(eom.robot, normals=normals))

@@ -67,7 +67,7 @@ def _fewest(lost: Any) -> int:
 def _lost_force(facets: int, inside: bool = True) -> float:
     """Return the fraction of μ that is lost in the middle of a facet.
 
-    It follows from the largest tangential force along t1.
+    The result follows from the largest tangential force along t1.
     """
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
     leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])

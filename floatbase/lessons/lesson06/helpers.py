@@ -35,7 +35,7 @@ _MAX_STEPS, _FOOT_TOLERANCE, _LARGEST_STEP = 50, 1e-9, 0.2
 
 
 class ConeController:
-    """Controller that minimises a cost on the contact forces, subject to the friction polyhedra.
+    """Controller that minimizes a cost on the contact forces, subject to the friction polyhedra.
 
     The torques follow from the contact forces by (25). The cost is that of lesson 05: (22) for the
     wrench that brings back the centre of mass and the base, plus a small multiple of (23). The
@@ -47,7 +47,7 @@ class ConeController:
     robot : Robot
         The robot.
     contacts : Contacts
-        Its contacts with the ground. Each gets a polyhedron of 4 facets inside its cone.
+        Contacts of the robot with the ground. Each gets a polyhedron of 4 facets inside its cone.
     state : State
         Where to stand.
     moment_weight : float, optional
@@ -99,7 +99,7 @@ def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (n,)
-        The minimiser.
+        The minimizer.
     """
     matrix = np.asarray(G)
     return fb.solve(

@@ -181,7 +181,7 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
 
 
 def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
-    """Draw a robot on a slope, and from above where its centre of mass may be.
+    """Draw a robot on a slope, and from above the region in which its centre of mass may be.
 
     The body is tilted with the slope.
 
@@ -225,7 +225,7 @@ def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:
-    """Draw from above where the centre of mass may be, the hull of the feet, and where it is.
+    """Draw from above the region of the centre of mass, the hull of the feet, and the centre.
 
     The region is filled, the hull is dashed, and a dot marks the centre of mass.
 

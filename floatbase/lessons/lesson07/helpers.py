@@ -41,7 +41,7 @@ class WithoutInequalities(SolverController):
 class WithConstraints(SolverController):
     """Controller with the costs of one controller and the constraints of another.
 
-    It minimises the ψ of lesson 05 subject to (27).
+    The controller minimizes the ψ of lesson 05 subject to (27).
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figur
 def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
     """Plot how far the centre of mass and the feet are from their initial positions.
 
-    Of the feet, the largest displacement is plotted.
+    For the feet, the largest displacement is plotted.
 
     Parameters
     ----------

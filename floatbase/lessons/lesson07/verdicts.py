@@ -158,7 +158,7 @@ def change_of_psi() -> float:
 
 
 def change_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the change of this mistake."""
+    """Return, for each hint, a function that computes the change of this mistake."""
 
     def change(
         cos: float = np.pi / 8, part: str = "own", grows: float = STEP, sign: float = -1.0
@@ -246,8 +246,8 @@ def judge_design(given: Array) -> Verdict:
     if away.max() > AWAY and strayed > STRAYED:
         return Verdict(
             False,
-            f"The robot goes too far, and a foot slips: {text}. A spring pulls hardest at the far "
-            f"end, a damper earlier.",
+            f"The robot goes too far, and so does a foot: {text}. A spring pulls hardest at the "
+            f"far end, a damper earlier.",
             "too_far_and_strays",
         )
     if away.max() > AWAY:
@@ -259,7 +259,9 @@ def judge_design(given: Array) -> Verdict:
         )
     if strayed > STRAYED:
         return Verdict(
-            False, f"A foot slips: {text}. The robot pulls back harder than necessary.", "strays"
+            False,
+            f"A foot moves too far: {text}. The robot pulls back harder than necessary.",
+            "strays",
         )
     return Verdict(
         True,

@@ -37,7 +37,7 @@ _HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")
 
 
 def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
-    """Draw from above where the centre of mass may be while a foot is lifted, and where it is.
+    """Draw from above the centre of mass, and where it may be while a foot is lifted.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str)
 
 
 def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
-    """Plot how far the centre of mass falls away from the line between two feet, and the pendulum.
+    """Plot the distance of a falling centre of mass from the line between two feet, and a pendulum.
 
     Parameters
     ----------

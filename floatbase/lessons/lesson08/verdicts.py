@@ -49,7 +49,7 @@ def com_shift() -> Array:
 
 
 def shift_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the shift of this mistake."""
+    """Return, for each hint, a function that computes the shift of this mistake."""
     state = uneven_stance()
     feet = dict(
         zip(
@@ -118,8 +118,8 @@ BUMP_MISTAKES: Mapping[str, Callable[[], Any]] = {
 def _backwards() -> tuple[fb.State, float, float, float]:
     """Return anymal_kinova standing and three lengths [m].
 
-    These are the height of its centre of mass, and its distances along x from the hind and front
-    feet.
+    The lengths are the height of the centre of mass, and its distances along x from the hind and
+    front feet.
     """
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
@@ -130,7 +130,7 @@ def _backwards() -> tuple[fb.State, float, float, float]:
 def hardest_push() -> float:
     """Return the largest push [N] after which a pendulum above the hind feet does not pass them.
 
-    Its motion is integrated numerically.
+    The motion of the pendulum is integrated numerically.
     """
     state, height, away, _ = _backwards()
     rate = state.robot.gravity / height
@@ -144,7 +144,7 @@ def hardest_push() -> float:
 
 
 def push_mistakes() -> dict[str, Callable[[], Any]]:
-    """Return for each hint a function that computes the force of this mistake."""
+    """Return, for each hint, a function that computes the force of this mistake."""
 
     def push(
         mass: str = "mass",

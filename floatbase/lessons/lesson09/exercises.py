@@ -49,7 +49,7 @@ _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it, arms and t
 def ankle_sensor_reading() -> Array:
     """Return the reading of a sensor in the left ankle of Talos, shape (6,).
 
-    It contains the force [N] and the moment about the sensor [N·m], in the world frame.
+    The reading contains the force [N] and the moment about the sensor [N·m], in the world frame.
     """
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")

@@ -107,7 +107,7 @@ def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
     record : Rollout
         The record.
     every : int, optional
-        Only every so many rows are examined.
+        Distance between the rows that are examined.
 
     Returns
     -------

@@ -35,7 +35,7 @@ _ZERO_TOLERANCE = 1e-9  # rounding of a constraint of length one
 
 
 def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Draw planned forces at the corners of soles, and from above the centres of pressure.
+    """Draw planned forces at the corners of soles, and the centres of pressure from above.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
 
 
 def limit_kinds(rows: npt.ArrayLike) -> list[str]:
-    """Return what each constraint on the wrench of a level sole forbids.
+    """Return the motion that each constraint on the wrench of a level sole prevents.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str
     Returns
     -------
     str
-        What a rider on the table sees, as SVG.
+        The view of a rider on the table, as SVG.
     """
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
@@ -135,7 +135,7 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
     """Draw a robot in the air that moves to its left and turns, and its fictitious base force.
 
     The force is the velocity part of h on the base, written in the base's axes (dark) and in the
-    world's (light). It is grey, because no other body exerts it.
+    world's (light). The force is grey, because no other body exerts it.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
 
 
 def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
-    """Plot errors over speed on logarithmic axes, with the slope between the ends of each curve.
+    """Plot errors against speed on logarithmic axes, with the slope between the ends of each curve.
 
     Parameters
     ----------

@@ -141,7 +141,7 @@ class Bench:
         return side * self.lever * float(self.cylinder.force(rates)[0])
 
     def torque_range(self) -> tuple[float, float]:
-        """Return the smallest and largest torque that the supply allows at this angle [N·m]."""
+        """Return the smallest and largest torque at this angle that supply and tank allow [N·m]."""
         least, most = sorted((self.lever * self.cylinder.force_limits()[:, 0]).tolist())
         return least, most
 
@@ -175,7 +175,7 @@ class Bench:
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
     """Return one cylinder with its force loop, at zero torque.
 
-    Its size does not depend on the supply pressure.
+    The size of the cylinder does not depend on the supply pressure.
     """
     actuators = HydraulicActuators(standing_go2_eom().robot, hydraulics)
     size = KNEE_TORQUE / Hydraulics().weakest_torque

@@ -167,7 +167,7 @@ def _longest_step_examples() -> list[Example]:
         beyond: float = 1.0,
         held: bool = True,
     ) -> Callable[..., Any]:
-        """Return a `longest_step` that does one thing in another way."""
+        """Return a `longest_step` that does one thing differently."""
 
         def made(x: Any, p: Any, G: Any, h: Any, W: Any) -> Any:
             rows = [

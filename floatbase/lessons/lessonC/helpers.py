@@ -23,7 +23,7 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 def table_top(minimum: npt.ArrayLike = (0.5, -1.0), curvature: npt.ArrayLike = (1.0, 1.0)) -> fb.QP:
     """Return the table of the course text: a bowl above a level table, in the plane (along, up).
 
-    The QP minimises ½ Σ curvature (x - minimum)² subject to up ≥ 0. If the minimum is above the
+    The QP minimizes ½ Σ curvature (x - minimum)² subject to up ≥ 0. If the minimum is above the
     table, the constraint "table" is inactive and could be left out. If it is below, the constraint
     is active and could be an equality constraint.
 
@@ -193,8 +193,8 @@ def braking_qp() -> fb.QP:
 def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
     """Return points on the central path of a QP, as interior-point methods follow it.
 
-    Each point minimises ψ - t Σ log(h - G x): every inequality constraint repels the marble with
-    softness t. Newton's method with damping finds it. Source: Boyd and Vandenberghe, Convex
+    Each point minimizes ψ - t Σ log(h - G x): every inequality constraint repels the marble with
+    softness t. A damped Newton method finds each point. Source: Boyd and Vandenberghe, Convex
     Optimization, ch. 11.2.
 
     Parameters
@@ -269,7 +269,7 @@ def longest_step(
     G : ndarray, shape (m, n)
         Matrix of the inequality constraints G x ≤ h.
     h : ndarray, shape (m,)
-        Their right-hand side.
+        Right-hand side of the constraints.
     W : sequence of int
         Indices of the constraints in the working set, which cannot block.
 

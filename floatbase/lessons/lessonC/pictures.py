@@ -147,7 +147,7 @@ class ActiveSetGame(widgets.VBox):
         return pack.bundle([static_export.Control("bowl", bowls, 0, kind="choice"), *rows])
 
     def _current_view(self) -> tuple[str, list[str]]:
-        """Return the picture as HTML, and what is wrong with the constraints that are on."""
+        """Return the picture as HTML, with what is wrong with the chosen constraints."""
         x, faults = check_active_set(self.qp, self.working)
         axis = _flat_axis(self.qp, _BESIDE, self.working, x)
         axis.plot(*self._puzzles[self._at], "x", color=GREYS[1], markersize=9)

@@ -33,7 +33,7 @@ def _load() -> float:
 
 
 def _stiffness_slips() -> dict[str, float]:
-    """Return for each hint the kp of this mistake."""
+    """Return, for each hint, the kp of this mistake."""
     right, ratio, mass = _load() * G / (MAX_SAG / 1e3), _load(), fb.load("go2").mass
     return {
         "robot_too": right * (1.0 + ratio) / ratio,

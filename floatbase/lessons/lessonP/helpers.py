@@ -75,7 +75,7 @@ def time_on_two_feet(shift: npt.ArrayLike) -> float:
     Returns
     -------
     float
-        The time, at most 3 s [s].
+        Time, at most 3 s [s].
     """
     robot = fb.load("go2")
     sim = fb.Simulation(robot, MU)

@@ -23,7 +23,7 @@ class BlackBox(Value):
     name : str
         Name of the case.
     robot : Robot
-        Data sheet of the robot, which is right.
+        Data sheet of the robot, which is correct.
     contacts : Contacts
         What the controller assumed about the ground: feet, friction, normals.
     time : ndarray, shape (n,)
@@ -76,7 +76,7 @@ class BlackBox(Value):
     def fell(self) -> bool:
         """Whether the robot has fallen at the end.
 
-        It has fallen if its base is tilted by 45° or more, or is at half its height or less.
+        A robot has fallen if its base is tilted by 45° or more, or is at half its height or less.
         """
         x, y = self.q[-1, 3:5]
         return bool(

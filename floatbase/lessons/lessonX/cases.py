@@ -237,7 +237,7 @@ def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
 
 
 def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
-    """Return what a record leaves to an investigation; qdd: planned, shape (n, nv)."""
+    """Return the part of a record that an investigation may use; qdd: planned, shape (n, nv)."""
     return BlackBox(
         name, record.robot, record.contacts, record.time, record.q, record.v, record.measured,
         record.tau_desired,
@@ -247,7 +247,7 @@ def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
 
 @dataclass(frozen=True)
 class Case:
-    """Case as it was drawn at random, which the investigation does not know.
+    """Randomly drawn case, whose fault the investigation does not know.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
 def foot_centres(box: BlackBox, i: int | np.integer[Any]) -> Array:
     """Return the centres of the spherical feet in row i.
 
-    They are one radius above the ground, whatever its normal.
+    The centres are one radius above the ground, whatever the ground's normal.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def foot_centres(box: BlackBox, i: int | np.integer[Any]) -> Array:
 def ground_normal(box: BlackBox) -> Array:
     """Return the normal of the plane through the feet.
 
-    It is the mean over the rows in the first 0.1 s in which all four feet are loaded. If there are
-    none, the first row counts.
+    The result is the mean over the rows in the first 0.1 s in which all four feet are loaded. If
+    there are none, the first row counts.
 
     Parameters
     ----------

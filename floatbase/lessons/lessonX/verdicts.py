@@ -86,7 +86,7 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
     case : Case
         The case.
     box : BlackBox
-        Its black box.
+        Black box of the case.
     line : str
         The line.
 
@@ -118,7 +118,7 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
 
 
 def mistaken(case: Case, box: BlackBox) -> dict[str, str]:
-    """Return for each hint a line with the right fault and the evidence of this mistake."""
+    """Return, for each hint, a line with the right fault and the evidence of this mistake."""
     fault = str(case.injected_fault.kind)
     if fault not in _NUMBERS:
         return {}
@@ -169,8 +169,7 @@ def _friction(case: Case, box: BlackBox) -> _Evidence:
             "that is the angle of the cone. Give its tangent.",
         ),
     }
-    otherwise = "use feet that slide under load, and forces along and perpendicular to the "
-    "ground."
+    otherwise = "use feet that slide under load, and forces along the ground and normal to it."
     return _Evidence(mu, _EVIDENCE_TOLERANCES["friction"], known, otherwise)
 
 

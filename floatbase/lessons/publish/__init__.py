@@ -1,4 +1,4 @@
-"""What runs, stores, maps and publishes the lessons: `python -m floatbase.lessons.publish`."""
+"""Tools that run, store, map and publish the lessons: `python -m floatbase.lessons.publish`."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -47,5 +47,5 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY_MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}.")
     return import_module(f"{__name__}.{name}")

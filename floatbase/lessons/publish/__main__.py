@@ -133,8 +133,9 @@ def _roses(lessons: Sequence[str]) -> None:
 
 
 def _solutions(folder: Path) -> None:
-    for path in write_solutions(folder):
-        print(path)
+    for line in write_solutions(folder):
+        print(line)
+    print(f"The solutions are in {folder}.")
 
 
 def _grade(

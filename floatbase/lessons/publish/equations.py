@@ -128,7 +128,7 @@ def _public_objects() -> Iterator[tuple[str, str, list[str]]]:
 
 
 def _exported_objects() -> Iterator[tuple[str, str, object]]:
-    """Yield package, name and value of what each package exports and defines itself."""
+    """Yield package, name and value of each object that a package exports and defines itself."""
     for found in pkgutil.iter_modules(floatbase.__path__):
         if found.name.startswith("_") or found.name in _SKIPPED_PACKAGES:
             continue
@@ -165,7 +165,7 @@ def _tests_by_name() -> dict[str, set[str]]:
                 helpers = set().union(
                     *(functions[name] for name in names if name in functions), names
                 )
-                for name in helpers:
+                for name in sorted(helpers):
                     found.setdefault(name, set()).add(
                         f"{path.relative_to(_TESTS).as_posix()}::{test}"
                     )

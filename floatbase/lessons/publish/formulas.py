@@ -1,4 +1,4 @@
-r"""The sections, equations and notes of the course text, each with a sentence of our own.
+r"""The sections, equations and notes of the course text, each with an explanatory sentence.
 
 The page of equations shows them beside the functions, so that readers without the text can follow.
 Formulas are LaTeX in the notation of the lessons: M, h, S, J, A, b, λ = contact forces,
@@ -28,7 +28,7 @@ class Formula(NamedTuple):
     section : str
         Number of its section.
     title : str
-        A few words.
+        Title of a few words.
     latex : str
         The formula without its number.
     meaning : str
@@ -153,7 +153,7 @@ FORMULAS = (
         "(8)", "§2.2", "forces and torques, before solving",
         r"\left(J M^{-1} J^T\right)\lambda = b + J M^{-1}\left(h - S\,\tau\right)",
         "Both equations of (7) combined, with q̈ eliminated. The matrix on the left-hand side "
-        "maps contact forces to the accelerations of the contact points.",
+        "maps contact forces to the accelerations that they cause at the contacts.",
     ),
     Formula(
         "(9)", "§2.2", "forces from torques, ζ",
@@ -229,8 +229,9 @@ FORMULAS = (
         "(19)", "§3", "a cost on β as a cost on q̈",
         r"Q^{\ddot q}(\ddot q) = \widetilde Q\left(\left(V_\perp^{\ddot "
         r"q}\right)^{\dagger}\left(\ddot q - v^{\ddot q}\right)\right)",
-        "The opposite direction: a cost on β as a cost on accelerations alone, where the "
-        "pseudoinverse selects the minimum-norm β. Likewise for τ and λ.",
+        "The opposite direction: a cost on β as a cost on accelerations alone. Among the β that "
+        "come closest to them, the pseudoinverse selects the one with minimum norm. Likewise for "
+        "τ and λ.",
     ),
     Formula(
         "(20)", "§3.1", "net force, G_f",
@@ -338,8 +339,8 @@ NOTES = {
     "robust and clear.",
     9: "A point foot exerts a force but no moment. A foot with area, such as that of a humanoid, "
     "exerts both.",
-    10: "Internal forces cancel: the motion of the whole robot depends only on the sums of the "
-    "external forces and of their moments.",
+    10: "Internal forces cancel: the motion of the robot as a whole depends only on the sums of "
+    "the external forces and of their moments.",
     11: "A normal is a unit vector that points out of the ground.",
     12: "Solvers start from the solution of the previous control step (warm start).",
     13: "The equations can be reduced first to save time. A fast solver does not need this.",

@@ -168,7 +168,7 @@ def grade_files(
     latest : bool
         Whether to keep only the last file of each name.
     before : datetime, optional
-        Whether to leave out files that were written later, or that do not say when.
+        Leave out files that were written later, or that do not say when.
 
     Returns
     -------
@@ -285,7 +285,7 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
 
 
 def _csv_safe(value: object) -> object:
-    """Keep a spreadsheet from reading a value as a formula, also one that splits cells at ";"."""
+    """Keep a spreadsheet from reading a value as a formula, even if it splits cells at ";"."""
     if not isinstance(value, str):
         return value
     value = value.replace(";", ",")

@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from floatbase.lessons.exercises import all_exercises
-from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.publish.workspace import (
+    NOTEBOOKS,
+    read_record,
+    update_copy,
+    write_record,
+)
 
 # nbformat and nbclient are imported where they are used: `make lab` needs neither
 
@@ -22,7 +27,7 @@ def read_notebook(path: Path) -> Any:
 
 
 def with_solutions(notebook: Any) -> Any:
-    """Replace each exercise's stub by its solution, in place."""
+    """Replace each exercise's stub with its solution, in place."""
     known = all_exercises()
     for cell in notebook.cells:
         name = cell.metadata.get("exercise")
@@ -50,8 +55,11 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
         return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
 
 
-def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
+def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[str]:
     """Write lessons with a solution in place of each exercise, and an explanation below it.
+
+    A file that was edited after an earlier call is kept, and the new text is saved beside it as
+    NAME.solved.new.ipynb.
 
     Parameters
     ----------
@@ -62,14 +70,15 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
 
     Returns
     -------
-    list of Path
-        The files written.
+    list of str
+        One line for each file that was changed.
     """
     import nbformat
     from nbformat.v4 import new_markdown_cell
 
-    known, written = all_exercises(), []
+    known, messages = all_exercises(), []
     folder.mkdir(parents=True, exist_ok=True)
+    record = read_record(folder)
     for source in sources or sorted(NOTEBOOKS.glob("*.ipynb")):
         notebook, cells = with_solutions(read_notebook(source)), []
         for cell in notebook.cells:
@@ -78,9 +87,10 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[Path]:
             if name and known[name].explanation:
                 cells.append(new_markdown_cell(f"**Why.** {known[name].explanation}"))
         notebook.cells = cells
-        written.append(folder / f"{source.stem}.solved.ipynb")
-        nbformat.write(notebook, written[-1])
-    return written
+        text = f"{nbformat.writes(notebook)}\n".encode()
+        messages += update_copy(folder / f"{source.stem}.solved.ipynb", text, record)
+        write_record(folder, record)
+    return messages
 
 
 def run_and_store(path: Path) -> None:

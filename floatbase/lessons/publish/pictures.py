@@ -77,8 +77,8 @@ class Pictures:
     def _shared_files(self) -> dict[str, list[bytes]]:
         """Collect large commands that several pictures use: name of a file -> commands.
 
-        One file is for all robots. Each robot has one file for what most of its pictures use, and
-        one for the rest.
+        One file is shared by all robots. Each robot has one file for the commands that most of its
+        pictures use, and one file for the rest.
         """
         pictures = [
             (set(description["names"]), set(commands))

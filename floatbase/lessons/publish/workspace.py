@@ -33,9 +33,10 @@ _RUN_CELL_KEYS = {
 def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> list[str]:
     """Copy new lessons to the learner's folder, and update those that were not edited.
 
-    A lesson that the learner has not edited is replaced if the course has a newer text. An edited
-    lesson stays, and the newer text is saved beside it as NAME.new.ipynb, or NAME.new2.ipynb if the
-    learner has edited that file too, and so on. Outputs do not count as edits.
+    A lesson that the learner has not edited is replaced if the course has a newer version. An
+    edited lesson stays, and the newer version is saved beside it as NAME.new.ipynb, or
+    NAME.new2.ipynb if the learner has edited that file too, and so on. Outputs do not count as
+    edits.
 
     Parameters
     ----------
@@ -61,16 +62,16 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
         )
     mine = folder / MY_FOLDER if mine is None else mine
     try:
-        mine.mkdir(exist_ok=True)
+        mine.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"The folder {mine} cannot be created: {error.strerror}. Choose one that you can write "
             f"to."
         ) from None
-    record, messages = _read_record(mine / _RECORD_FILE), []
+    record, messages = read_record(mine), []
     for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
         try:
-            messages += _update_copy(mine / source.name, _course_text(source), record)
+            messages += update_copy(mine / source.name, _course_text(source), record)
         except OSError as error:
             messages.append(_failure(source.name, error))
         except _NOT_A_NOTEBOOK:
@@ -79,7 +80,7 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
                 f"status` may show why."
             )
     try:
-        _write(mine / _RECORD_FILE, json.dumps(record, indent=1).encode())
+        write_record(mine, record)
     except OSError as error:
         messages.append(_failure(_RECORD_FILE, error))
     return messages
@@ -92,10 +93,10 @@ def _failure(name: str, error: OSError) -> str:
     )
 
 
-def _update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
+def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
     """Save the course's text under the first name that is free or holds an unedited copy.
 
-    Returns a line that says what happened, or none if the learner already has this text.
+    Returns a line that says what happened, or none if the learner already has this version.
     """
     present, last = _digest(copy.name, text), record.get(copy.name)
     beside = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
@@ -128,13 +129,18 @@ def _write(path: Path, text: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
-def _read_record(path: Path) -> dict[str, str]:
-    """Read the record of digests. Without it, every other text counts as edited."""
+def read_record(folder: Path) -> dict[str, str]:
+    """Read a folder's record of digests. Without it, every other text counts as edited."""
     try:
-        found = json.loads(path.read_bytes())
+        found = json.loads((folder / _RECORD_FILE).read_bytes())
     except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def write_record(folder: Path, record: dict[str, str]) -> None:
+    """Write a folder's record of digests."""
+    _write(folder / _RECORD_FILE, json.dumps(record, indent=1).encode())
 
 
 def _course_text(source: Path) -> bytes:
@@ -155,7 +161,7 @@ def _without_outputs(notebook: Any) -> Any:
 
 
 def _digest(name: str, data: bytes) -> str:
-    """Compute a digest of a file; of a notebook without what running it adds."""
+    """Compute a digest of a file, without what running a notebook adds to it."""
     if name.endswith(".ipynb"):
         try:
             data = json.dumps(_authored_content(json.loads(data)), sort_keys=True).encode()

@@ -1,4 +1,4 @@
-"""What a viewer displays in a notebook: a live picture, or a stored form of it."""
+"""Display mode of a viewer in a notebook: a live picture, or a stored form of the picture."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     target : Path
         File to write; its extension determines the format.
     size : tuple of int
-        Width and height [pixels], see `checked_size`.
+        Width and height [pixels]; see `checked_size`.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
         from playwright.sync_api import Error, sync_playwright
     except ImportError as error:
         raise ViewerError(
-            f"No film can be made: {error.name} is not installed. {_REQUIREMENTS}"
+            f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     path = next(filter(None, map(shutil.which, _BROWSERS)), None)
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
@@ -151,8 +151,8 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
             browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
         except Error as error:
             raise ViewerError(
-                f"No browser could be started, so no film can be made. {_REQUIREMENTS} "
-                f"({str(error).splitlines()[0]})"
+                f"No browser could be started ({str(error).splitlines()[0]}), so no image or film "
+                f"can be made. {_REQUIREMENTS}"
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})
@@ -190,7 +190,7 @@ def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -
         import av
     except ImportError as error:
         raise ViewerError(
-            f"No film can be made: {error.name} is not installed. {_REQUIREMENTS}"
+            f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
         stream = film.add_stream(

@@ -1,4 +1,4 @@
-"""A rasteriser for meshes: triangles with a depth buffer in numpy, for images without a browser."""
+"""A rasterizer for meshes: triangles with a depth buffer in numpy, for images without a browser."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class _Mesh(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """The pixels that triangles cover.
+    """Pixels covered by triangles.
 
     `at` is the index of a pixel, row by row. `depth` is negative inverse distance [1/m]; less is
     nearer. `colour` has shape (n, 3).
@@ -252,7 +252,7 @@ def _linear_function(
 ) -> Pixels:
     """Evaluate a linear function on boxes of pixels, shape (n, tall, wide).
 
-    It is given by its value at the first pixel of each box and by its slopes.
+    The function is given by its value at the first pixel of each box and by its slopes.
     """
     first, x, y = (part[:, None] / area[:, None] for part in (at_start, along_x, along_y))
     return (first + y * down)[:, :, None] + (x * across)[:, None, :]

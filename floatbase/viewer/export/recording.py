@@ -60,9 +60,10 @@ class Animation:
 class _ItemHistory:
     """One item in n pictures.
 
-    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show it.
-    `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not present,
-    matrices and colours are those of the last picture before that shows it, else of the first.
+    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show the
+    item. `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not
+    present, matrices and colours are those of the last picture before that shows it, else of the
+    first.
     """
 
     item: Item
@@ -101,7 +102,7 @@ def animate(
     Raises
     ------
     InputError
-        If there are no pictures, or if `times` has another length.
+        If there are no pictures, or if `times` has a different length.
     """
     if (
         not isinstance(pictures, Sequence)
@@ -183,7 +184,7 @@ def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
     t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
         raise InputError(
-            f"times has {len(t)} entries and places has {len(x)}; they must have equally many."
+            f"times has {len(t)} entries and places has {len(x)}; their lengths must be equal."
         )
     if len(t) < 3 or not t[-1] > t[0]:
         return x
@@ -281,7 +282,7 @@ def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
 
 
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
-    """Return every item in time; a path whose shape changes becomes several items."""
+    """Return every item over time; a path whose shape changes becomes several items."""
     appearances: dict[str, dict[int, Item]] = {}
     for i, picture in enumerate(pictures):
         for path, item in with_normal_paths(picture).items():
@@ -348,7 +349,7 @@ def _packed_floats(values: Array) -> umsgpack.Ext:
 def _quaternions(rotations: Array) -> Array:
     """Return rotations (n, 3, 3) as quaternions x y z w, shape (n, 4).
 
-    Of q and -q, it is the one nearer to the previous quaternion.
+    Of q and -q, the one nearer to the previous quaternion is returned.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,7 @@
 """Images of pictures, drawn without a browser, for notebooks that are read without a kernel.
 
-An image resembles the page, but is simpler: one light, no gloss, no shadows, lines always behind.
-Drawing takes some tenths of a second.
+An image resembles the page, but is simpler: it has one light, no gloss and no shadows, and lines
+always lie behind meshes. Drawing takes some tenths of a second.
 """
 
 from __future__ import annotations

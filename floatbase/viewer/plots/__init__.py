@@ -1,6 +1,6 @@
 """Plots with matplotlib, in the colours of the 3-D scene.
 
-They show rollouts and, in `push_recovery_plots`, push-recovery maps.
+The plots show rollouts and, in `push_recovery_plots`, push-recovery maps.
 """
 
 from floatbase.viewer.plots import push_recovery_plots, run_plots

@@ -76,7 +76,7 @@ def picture(
     result : PushRecovery
         Map to draw, as from `fb.push_recovery`.
     scale : float, optional
-        Length of a drawn push [m/N]. By default, the widest curve is half as wide again as the
+        Length of a drawn push [m/N]. By default, the widest curve is 1.5 times as wide as the
         stance.
     theory : bool, optional
         Whether to draw the capture-point bound and the static bound as well.
@@ -143,7 +143,7 @@ def horizontal_force_limits(
     wrenches : WrenchSet
         Wrenches of the stance, as from `floatbase.friction.wrench_set`.
     scale : float, optional
-        Length of a drawn force [m/N]. By default, the curve is half as wide again as the stance.
+        Length of a drawn force [m/N]. By default, the curve is 1.5 times as wide as the stance.
     n : int, optional
         Number of directions.
 
@@ -267,7 +267,7 @@ def _unit_vectors(angles: Array | float) -> Array:
 
 
 def _legend_text(kind: str) -> str:
-    """Return what the legend says about a kind of curve."""
+    """Return the legend entry of a kind of curve."""
     return next(text for key, _, text in LEGEND if key == kind)
 
 

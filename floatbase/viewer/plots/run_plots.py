@@ -218,7 +218,8 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
     ]
     if len(made) != len(names):
         raise InputError(
-            f"Got {len(made)} axes. The record has {len(names)} contacts: {', '.join(names)}."
+            f"axes has {len(made)} entries; it must have one for each of the {len(names)} "
+            f"contacts: {', '.join(names)}."
         )
     planned, measured = (
         _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
@@ -239,7 +240,7 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """Plot the used fraction of friction at each contact point, planned and measured.
 
     The fraction is ‖f_tangent‖ / (μ f_normal). Above 1, a force is outside its cone. The curve of a
-    point has gaps where the point carries little load, see `friction_used`.
+    point has gaps where the point carries little load; see `friction_used`.
 
     Parameters
     ----------
@@ -322,14 +323,14 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
     Raises
     ------
     InputError
-        If the forces have another shape than `rollout.measured`.
+        If the forces do not have the shape of `rollout.measured`.
     """
     as_rollout(rollout)
     found = numeric_copy(forces)  # NaN where no forces were planned
     if found is None or found.shape != rollout.measured.shape:
         raise InputError(
-            f"forces must have shape {rollout.measured.shape} (N), as rollout.measured, not "
-            f"{short_repr(forces)}."
+            f"forces must have shape {rollout.measured.shape} [N], the shape of "
+            f"rollout.measured, not {short_repr(forces)}."
         )
     f = np.reshape(found, (len(rollout.time), -1, 3))
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
@@ -358,7 +359,7 @@ def _contact_names(rollout: Rollout) -> tuple[str, ...]:
 def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
     """Return the normal force of each contact and time, shape (contacts, n) [N].
 
-    That of a flat foot is the sum over its corners.
+    The force of a flat foot is the sum over its corners.
     """
     points, starts = (
         _normal(rollout, forces),

@@ -1,10 +1,10 @@
 """Colours of all 3-D pictures and plots, RGB from 0 to 1, safe for colour-blind readers.
 
-They are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces light
-blue. A friction cone is green when its force is inside, orange when the force reaches a facet or
-the surface, vermilion when it is outside, and a faint grey when there is no force. Everything that
-is neither a force nor a cone is grey, such as a curve, a position or a matrix entry, because all
-readers can tell greys apart by their lightness.
+The colours are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces
+light blue. A friction cone is green when its force is inside, orange when the force reaches a facet
+or the surface, vermilion when it is outside, and a faint grey when there is no force. Everything
+that is neither a force nor a cone is grey, such as a curve, a position or a matrix entry, because
+all readers can tell greys apart by their lightness.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def as_point_forces(
     n = contacts.n_points
     if array is None:
         raise InputError(
-            f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) (N), not {short_repr(value)}."
+            f"{name} must be numbers of shape ({3 * n},) or ({n}, 3) [N], not {short_repr(value)}."
         )
     if array.shape not in ((3 * n,), (n, 3)):
         raise InputError(

@@ -54,7 +54,7 @@ class Style:
 
 
 def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
-    """Draw what a walk currently plans.
+    """Draw the current plan of a walk.
 
     The picture shows footholds, swing paths, the capture point at its current position, and the
     planned zero-moment point.

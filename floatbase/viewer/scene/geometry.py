@@ -82,7 +82,7 @@ def sphere(radius: float, sides: int = 20) -> Mesh:
     radius : float
         Radius [m].
     sides : int, optional
-        Number of sides of its equator.
+        Number of sides of the sphere's equator.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int
     Parameters
     ----------
     start, end : array_like, shape (3,)
-        Centres of its ends [m].
+        Centres of the two ends [m].
     radius : float
         Radius [m].
     sides : int, optional

@@ -38,7 +38,7 @@ class Plane(NamedTuple):
 
     @property
     def planes(self) -> tuple[Plane, ...]:
-        """Tuple of this plane alone, as `Planes.planes` has several."""
+        """Tuple that contains this plane alone; `Planes.planes` contains several."""
         return (self,)
 
     def height(self, point: Array) -> float:

@@ -58,7 +58,7 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
 def font(is_subscript: bool = False) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     """Load the font of the labels.
 
-    It is matplotlib's DejaVu Sans, which has Greek letters and mathematical symbols. Without
+    The font is matplotlib's DejaVu Sans, which has Greek letters and mathematical symbols. Without
     matplotlib, it is Pillow's default font.
 
     Parameters

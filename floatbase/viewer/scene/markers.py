@@ -48,8 +48,8 @@ def wrench(
 ) -> Picture:
     """Draw a force as a straight arrow and a moment as a curled arrow around its axis.
 
-    The moment is drawn on top of the robot, which would hide it. A zero force or moment is left
-    out.
+    The moment is drawn on top of the robot, which would otherwise hide it. A zero force or moment
+    is left out.
 
     Parameters
     ----------

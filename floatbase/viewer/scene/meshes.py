@@ -1,6 +1,6 @@
 """Meshes of robots.
 
-They are the light meshes in `assets/` if there are any, otherwise those of the URDF, otherwise
+The meshes are the light ones in `assets/` if there are any, otherwise those of the URDF, otherwise
 balls and rods along the kinematic tree.
 """
 
@@ -78,9 +78,9 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
 def appearance_digest(urdf: str, moving: Collection[str]) -> str:
     """Compute a digest of everything in a URDF that light meshes are made from.
 
-    This is the visuals of the links, and how links are welded together. Positions of moving joints
-    and joints to the link "world" do not count, because a robot looks the same with joints locked
-    and without that link.
+    The digest covers the visuals of the links, and how links are welded together. Positions of
+    moving joints and joints to the link "world" do not count, because a robot looks the same with
+    joints locked and without that link.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class PictureKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PictureOptions:
-    """What a picture shows beside the robot, its contacts and their forces.
+    """Further contents of a picture, beside the robot, its contacts and their forces.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class PictureOptions:
     cones : bool
         Whether to draw the friction cones.
     arrows : bool
-        Whether to draw the forces. They colour the cones in any case.
+        Whether to draw the forces. Forces colour the cones in any case.
     support : bool
         Whether to draw the support polygon, the convex hull of the contact points.
     wrench : array_like, shape (6,), or None
@@ -60,8 +60,8 @@ class PictureOptions:
         Further items, path -> item, as from `floatbase.viewer.shapes` or
         `floatbase.viewer.markers`.
     swing_feet : frozenset of str
-        Names of contacts that are in the air. They have no patch and no cone, and are not part of
-        the support polygon.
+        Names of contacts that are in the air. Such contacts have no patch and no cone, and are not
+        part of the support polygon.
 
     Raises
     ------

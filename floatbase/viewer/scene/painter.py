@@ -15,7 +15,7 @@ from floatbase._validation import (
     cached_property,
 )
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.errors import InputError
+from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.viewer.scene import geometry, markers, shapes, threejs
 from floatbase.viewer.scene.colours import GHOST, RGB
@@ -99,8 +99,10 @@ class Painter:
         Raises
         ------
         InputError
-            If the state belongs to another robot, or if the forces do not match the contacts.
+            If the state belongs to a different robot, or if the forces do not match the contacts.
         """
+        for name in options.keys() - PictureOptions.__dataclass_fields__.keys():
+            raise unknown_name("option of a picture", name, PictureOptions.__dataclass_fields__)
         chosen = PictureOptions(**options)
         self._check_state(state)
         if contacts is not None:
@@ -156,7 +158,7 @@ class Painter:
     def replace(self, **changes: Any) -> Painter:
         """Return a painter with other facets or another ground.
 
-        It shares what this one has computed for the robot.
+        The new painter shares what this one has computed for the robot.
 
         Parameters
         ----------
@@ -171,7 +173,8 @@ class Painter:
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
         computed |= {"_ghost_shapes", "_scale_bars"}
-        other.__dict__.update({name: self.__dict__[name] for name in computed & set(self.__dict__)})
+        kept = {name: value for name, value in self.__dict__.items() if name in computed}
+        other.__dict__.update(kept)
         return other
 
     def ground_only(self) -> Picture:
@@ -250,8 +253,8 @@ class Painter:
     def cone_height(self, contacts: Contacts) -> float:
         """Return the height of the friction cones.
 
-        It is that of 1.5 times the normal force at rest. It is reduced where the cones would hide
-        the robot, or where cones at the corners of one foot would meet.
+        The height corresponds to 1.5 times the normal force at rest. It is reduced where the cones
+        would hide the robot, or where cones at the corners of one foot would meet.
 
         Parameters
         ----------
@@ -412,8 +415,8 @@ class Painter:
     def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
         """Draw a bar on the ground that shows the length of about a quarter of the weight.
 
-        The bar is to the left of the feet. It starts behind a tall robot, because its picture shows
-        little ground in front.
+        The bar is to the left of the feet. For a tall robot it starts behind the robot, because the
+        picture shows little ground in front.
         """
         force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box

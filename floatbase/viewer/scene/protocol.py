@@ -1,8 +1,8 @@
 """Commands for the page, encoded as bytes.
 
-They are the commands of meshcat and some of our own. Each command has a key: path, type, property.
-Of two commands with the same key only the later one counts, so a scene is a dict from key to the
-newest command. It does not grow when something is drawn again.
+The commands are those of meshcat and some custom ones. Each command has a key: path, type,
+property. Of two commands with the same key only the later one counts, so a scene is a dict from key
+to the newest command. The dict does not grow when something is drawn again.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def encode(command: Mapping[str, Any]) -> Update:
 def set_transform(path: str, matrix: Array) -> Update:
     """Place an object by a homogeneous transform.
 
-    Most commands are of this type, so it is packed by hand.
+    Most commands are of this type, so they are packed by hand.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def set_object(path: str, packed: bytes) -> Update:
     path : str
         Path of the object.
     packed : bytes
-        Object for three.js in MessagePack, see `threejs.Shape`.
+        Object for three.js in MessagePack; see `threejs.Shape`.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def set_object(path: str, packed: bytes) -> Update:
 
 
 def _text(text: str) -> bytes:
-    """Encode a text of at most 64 KB in MessagePack."""
+    """Encode text of at most 64 KB in MessagePack."""
     data = text.encode()
     return b"\xda" + struct.pack(">H", len(data)) + data
 
@@ -162,7 +162,7 @@ def delete(path: str) -> Update:
 def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> Update:
     """Point the camera at a target.
 
-    It is a command of our own, because meshcat's camera node cannot move the point around which the
+    It is a custom command, because meshcat's camera node cannot move the point around which the
     mouse rotates the view.
 
     Parameters
@@ -287,10 +287,10 @@ def no_animation() -> Update:
 def end_animation() -> list[Update]:
     """End the animation before the next picture is drawn.
 
-    A busy page may receive this, the next picture and the next animation in one frame. The command
-    therefore occurs twice. One has the key of the animation, which the next animation overwrites.
-    The other has its own key, so that the old animation ends before the picture is drawn and cannot
-    undo it.
+    A busy page may receive this command, the next picture and the next animation in one frame. The
+    command therefore occurs twice. One has the key of the animation, which the next animation
+    overwrites. The other has its own key, so that the old animation ends before the picture is
+    drawn and cannot undo it.
 
     Returns
     -------

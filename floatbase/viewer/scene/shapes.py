@@ -41,7 +41,7 @@ class Item(NamedTuple):
     Parameters
     ----------
     shape : Shape
-        What the object looks like.
+        Shape of the object.
     matrix : ndarray, shape (4, 4)
         Pose and scale in the world frame.
     colour : tuple of float or None
@@ -148,7 +148,7 @@ def transform(
     Raises
     ------
     InputError
-        If the position has another shape, or if a number is not finite.
+        If the position has the wrong shape, or if a number is not finite.
     """
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = (_IDENTITY if rotation is None else np.asarray(rotation)) * np.asarray(scale)
@@ -182,7 +182,7 @@ def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
     vector : ndarray, shape (3,)
         The vector [m].
     length : float
-        Its length [m].
+        Length of the vector [m].
 
     Raises
     ------
@@ -346,7 +346,7 @@ def cone_rim(
 ) -> Item:
     """Draw a dark rim around the mouth of a cone.
 
-    The rim marks a force outside the cone by more than a colour.
+    The rim marks a force outside the cone, so that readers need not rely on colour alone.
 
     Parameters
     ----------

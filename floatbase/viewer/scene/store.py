@@ -161,7 +161,7 @@ class Scene:
             return not any(kind == "set_object" for _, kind, _ in self._entries)
 
     def _sorted_entries(self) -> list[tuple[Key, bytes]]:
-        """Return keys and commands, oldest first, without deletions of our own objects."""
+        """Return keys and commands, oldest first, without deletions of the viewer's own objects."""
         with self._lock:
             entries = sorted(
                 (number, key, command) for key, (number, command) in self._entries.items()

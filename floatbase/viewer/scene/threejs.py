@@ -119,7 +119,7 @@ def mesh(
     Parameters
     ----------
     vertices : array_like, shape (n, 3)
-        Vertices [m]. They are sent as 16-bit integers, in units of 1/32767 of the largest
+        Vertices [m]. Vertices are sent as 16-bit integers, in units of 1/32767 of the largest
         coordinate.
     faces : array_like, shape (m, 3)
         Indices of the vertices.

@@ -1,7 +1,7 @@
 """Shapes of unit size.
 
-Each shape is made once. Equal shapes are the same object, so a picture that shows one again sends
-nothing.
+Each shape is made once. Equal shapes are the same object, so a picture that shows a shape again
+sends nothing.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def sphere(colour: RGB, on_top: bool = False) -> Shape:
     colour : tuple of float
         RGB.
     on_top : bool, optional
-        Whether it is drawn on top of objects in front of it.
+        Whether the ball is drawn on top of objects in front of it.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation
     facets : int
         Number of facets.
     inner_approximation : bool
-        Whether it lies inside the round cone.
+        Whether the polyhedron lies inside the round cone.
     facet_rotation : float
         Rotation of the facets about z [rad].
 
@@ -226,7 +226,7 @@ def facet(
 
 @lru_cache(maxsize=256)
 def label(text: str, height: float, plate: bool, colour: RGB, on_top: bool = True) -> Shape:
-    """Return a text.
+    """Return an object that shows text.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float)
 
 @lru_cache(maxsize=1)
 def invisible_point() -> Shape:
-    """Return an object without anything visible.
+    """Return an invisible object.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Visuals in a robot's URDF, from which light meshes are made; other robots show them directly.
 
 meshcat drops parts of files with several materials, and Pinocchio's loader reads some of them with
-wrong triangles. Therefore trimesh reads the files here, material by material. This needs trimesh,
-and pycollada for .dae files.
+wrong triangles. Therefore trimesh reads the files here, material by material. The module needs
+trimesh, and pycollada for .dae files.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Connections to pages: what each page has received, and when it receives the rest.
 
 A `Connection` sends the changes of the scene that its page has not received, as fast as the page
-draws. It uses a `Channel`: a websocket (`server`) or the notebook's own connection
+draws. A connection uses a `Channel`: a websocket (`server`) or the notebook's own connection
 (`notebook_widget`).
 """
 
@@ -30,7 +30,7 @@ MAX_UNANSWERED = (
 
 
 class Host(Protocol):
-    """What a connection needs from its server."""
+    """Interface that a connection needs from its server."""
 
     scene: Scene
     clients: list[Connection]
@@ -67,12 +67,12 @@ class Channel:
         number : int
             Number of the frame.
         data : bytes
-            The frame, see `protocol.frame`.
+            The frame; see `protocol.frame`.
         """
         raise NotImplementedError
 
     def close_page(self, reason: str) -> None:
-        """Disconnect the page. It may connect again as a new one.
+        """Disconnect the page. The page may connect again as a new one.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """The picture in a notebook: a widget whose frames use the kernel's own connection, like sliders.
 
-It works wherever sliders work, without a port of its own: JupyterLab, Notebook, VS Code, Colab,
+The widget works wherever sliders work, without its own port: JupyterLab, Notebook, VS Code, Colab,
 JupyterHub, Voilà. The base class, `anywidget`'s, contains what each of these needs; our part is
 widget.js, which shows the page in a frame. The page's code is sent once to each page of the
 notebook that requests it.
@@ -46,8 +46,8 @@ class NotebookWidget(anywidget.AnyWidget):
     height : int
         Height of the picture [pixels].
     thumbnail : bytes, optional
-        A PNG of the scene when the display opens; empty for none. It is shown until the page has
-        drawn, where no page can draw, and after a newer display has opened.
+        A PNG of the scene when the display opens; empty for none. The image is shown until the page
+        has drawn, where no page can draw, and after a newer display has opened.
     """
 
     _esm = pages.asset("widget.js")

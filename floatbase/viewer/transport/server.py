@@ -27,9 +27,9 @@ MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest report
 class Server:
     """The thread that serves one scene.
 
-    It has no reference to its `Window`, so a window without references can be garbage-collected and
-    stop it. `port` is the port that the server listens on; None until `listen`, since a notebook
-    needs none.
+    The thread has no reference to its `Window`, so a window without references can be
+    garbage-collected and stop it. `port` is the port that the server listens on; None until
+    `listen`, since a notebook needs none.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Server:
             client.channel.close_page("the window was closed")
         if self._http is not None:
             await self._http.close_all_connections()
-        rest = asyncio.all_tasks() - {asyncio.current_task()}
+        rest = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in rest:
             task.cancel()
         await asyncio.gather(*rest, return_exceptions=True)
@@ -172,7 +172,7 @@ class Server:
 
 
 class _Guarded(tornado.web.RequestHandler):
-    """Handler that refuses foreign host names; it serves only 127.0.0.1 and localhost."""
+    """Handler that serves 127.0.0.1 and localhost, and refuses other host names."""
 
     def prepare(self) -> None:
         """Refuse requests to another host name."""

@@ -1,6 +1,6 @@
 """The window: a thread of this process that serves the page.
 
-It serves its own notebook and, on request, this machine. meshcat's own server is a separate
+The thread serves its own notebook and, on request, this machine. meshcat's own server is a separate
 process, which listens on all interfaces, outlives the kernel, and waits for a browser.
 """
 
@@ -82,7 +82,7 @@ class Window:
     def widget(self, name: str, height: int, thumbnail: bytes = b"") -> NotebookWidget:
         """Make a display for a notebook, which needs no port.
 
-        It is live until the next display is made; then it shows its thumbnail.
+        The display is live until the next one is made; then it shows its thumbnail.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Window:
         except ImportError as error:
             raise ViewerError(
                 f"A viewer in a notebook needs the package {error.name}, which is not installed. "
-                'Install it with: pip install "floatbase[viewer]". The page at `url` does not need '
+                'Install it with pip install "floatbase[viewer]". The page at `url` does not need '
                 "it."
             ) from None
         if (before := self._newest_display()) is not None:
@@ -133,7 +133,7 @@ class Window:
         Parameters
         ----------
         updates : iterable of Update
-            Keys and commands, see `protocol`.
+            Keys and commands; see `protocol`.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 `build` is the entry point. `outputs` prepares lessons, `references` links equation numbers and
 lessons, `reference` writes the API reference, and `mathml` draws formulas. `conf` configures
-Sphinx. The pages' texts are in the folder `docs`. This needs the extra `site`.
+Sphinx. The text of the pages is in the folder `docs`. Building the site needs the extra `site`.
 """
 
 from floatbase.lessons.publish.site import mathml

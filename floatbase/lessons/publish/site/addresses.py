@@ -33,7 +33,7 @@ PACKAGES = {
 
 @cache
 def addresses() -> dict[str, str]:
-    """Map each name that a text may use, such as `Contacts.points`, to its full name."""
+    """Map each name that text may use, such as `Contacts.points`, to its full name."""
     found: dict[str, str] = {}
     for package in list(PACKAGES)[1:]:
         for name, value in exported(package):
@@ -48,7 +48,7 @@ def addresses() -> dict[str, str]:
 
 
 def exported(package: str) -> list[tuple[str, Any]]:
-    """List name and value of all that a package exports, or that a module defines itself."""
+    """List the name and value of everything that a package exports or a module defines itself."""
     module = import_module(package)
     names = getattr(module, "__all__", None)
     if names is None:

@@ -118,7 +118,7 @@ def replace_site(built: Path, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     # listed before they are copied, so that an interrupted build can be repeated
     listed.write_text("".join(f"{name}\n" for name in sorted(names)), encoding="utf-8")
-    for name in earlier - names:
+    for name in sorted(earlier - names):
         (folder / name).unlink(missing_ok=True)
     shutil.copytree(built, folder, dirs_exist_ok=True)
 

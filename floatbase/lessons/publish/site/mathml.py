@@ -62,9 +62,8 @@ def write_font(pages: Iterable[str], target: Path) -> None:
         letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))
     }
     cutter = subset.Subsetter(subset.Options(layout_features=["ssty"], notdef_outline=True))
-    cutter.populate(
-        unicodes=[ord(letter) for letter in letters | {_slanted(letter) for letter in letters}]
-    )
+    letters |= {_slanted(letter) for letter in letters}
+    cutter.populate(unicodes=[ord(letter) for letter in sorted(letters)])
     with subset.load_font(_font_file(), subset.Options()) as font:
         cutter.subset(font)
         font.flavor = "woff"
@@ -76,14 +75,14 @@ def _font_file() -> str:
     spec = find_spec("ziamath")
     if spec is None or not spec.submodule_search_locations:
         raise ViewerError(
-            "ziamath is not installed; the site needs its font. Install it with: pip install "
-            "floatbase[site]"
+            "The site needs the font of ziamath, which is not installed. Install it with "
+            'pip install "floatbase[site]".'
         )
     return str(Path(spec.submodule_search_locations[0]) / "fonts" / "STIXTwoMath-Regular.ttf")
 
 
 def _slanted(letter: str) -> str:
-    """Return the italic letter, its own character, that browsers draw for a single letter."""
+    """Return the italic character that browsers draw for a single letter."""
     for first, last, slanted in (("a", "z", 0x1D44E), ("A", "Z", 0x1D434), ("α", "ω", 0x1D6FC)):
         if first <= letter <= last:
             return "ℎ" if letter == "h" else chr(slanted + ord(letter) - ord(first))

@@ -59,8 +59,9 @@ def run_lessons(lessons: Iterable[Path], cache: Path) -> dict[Path, Any]:
         for path in pool.map(_run_lesson, new, new.values()):
             print(f"run: {path.name}", flush=True)
     for path, file in files.items():
-        for former in set(cache.glob(f"{path.stem}-*.ipynb")) - {file}:
-            former.unlink()
+        for former in cache.glob(f"{path.stem}-*.ipynb"):
+            if former != file:
+                former.unlink()
     return {path: read_notebook(file) for path, file in files.items()}
 
 
@@ -169,7 +170,7 @@ def _prediction_question(cell: Any) -> str:
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
-    """Return an output as a list of what a page can show of it."""
+    """Return the parts of an output that a page can show, as a list."""
     if output.output_type == "stream":
         output.text = _TERMINAL_CODES.sub("", output.text)
         return [output] if output.name == "stdout" else []

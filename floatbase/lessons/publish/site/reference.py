@@ -99,8 +99,8 @@ def link_equations(
 ) -> None:
     """Link equation numbers of a docstring (Sphinx's event autodoc-process-docstring).
 
-    Napoleon reads "Inertia matrix: …" of a property as a type and a text, so a property is parsed
-    again as a method.
+    Napoleon reads "Inertia matrix: …" of a property as a type and a description, so a property is
+    parsed again as a method.
     """
     if what in ("property", "attribute"):
         text = prepare_docstring(inspect.getdoc(value) or "")

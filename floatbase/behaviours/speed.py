@@ -1,0 +1,113 @@
+"""Speeds that the feet of a robot can follow with a given gait."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import sqrt
+
+import numpy as np
+
+from floatbase._validation import Array
+from floatbase.behaviours.gait import Gait
+from floatbase.robots import State
+
+# with four feet or fewer, the middle of all feet is at the edge of each smaller stance
+MAX_FEET_WITH_SWAY = 4
+# fraction of a leg's length that a walk uses: a straight leg cannot lift or press its foot
+_MAX_EXTENSION = 0.9
+
+
+def speed_fractions(
+    gait: Gait,
+    state: State,
+    nominal_feet: dict[str, Array],
+    flat_feet: set[str],
+    reach: float,
+    motion: Array,
+) -> tuple[float, float]:
+    """Return the largest fractions of a desired motion that the feet can follow, at most 1.
+
+    The first one holds for the first period and the second one from then on.
+
+    During its stance, a foot moves from half a step in front of its nominal position to half a step
+    behind it. Half a step must be at most `reach`. A ball foot must also stay within the length of
+    its leg, while the body shifts to the middle of the standing feet. In the first period, a foot
+    stays in its nominal position until its first lift-off, while the body accelerates.
+
+    Parameters
+    ----------
+    gait : Gait
+        The gait.
+    state : State
+        State whose posture the robot keeps.
+    nominal_feet : dict of str to ndarray, shape (3,)
+        Position of each foot's frame in that posture, relative to the middle of the feet [m].
+    flat_feet : set of str
+        Names of the flat feet.
+    reach : float
+        Largest distance of a foothold from the nominal one [m].
+    motion : ndarray, shape (3,)
+        Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
+    """
+    if not motion.any():
+        return 1.0, 1.0
+    first_fraction, fraction = 1.0, 1.0
+    wait, shifts = max(gait.offsets.values()) * gait.period, _weight_shifts(gait, nominal_feet)
+    for foot in gait.feet:
+        x, y = nominal_feet[foot][:2]
+        velocity = motion[:2] + motion[2] * np.array([-y, x])
+        speed, limit = float(np.linalg.norm(velocity)), reach
+        if speed == 0.0:
+            continue
+        if foot not in flat_feet:
+            direction = velocity / speed
+            shift = float(np.abs(shifts @ direction).max())
+            leg_limit = max(_leg_reach(state, foot, direction) - shift, 0.0)
+            limit = min(limit, leg_limit)
+            # at 1 m/s², the distance after `wait` is speed wait - speed² / 2
+            if wait**2 > 2.0 * leg_limit:
+                first_fraction = min(
+                    first_fraction, (wait - sqrt(wait**2 - 2.0 * leg_limit)) / speed
+                )
+        fraction = min(fraction, 2.0 * limit / ((gait.period - gait.swing) * speed))
+    return min(first_fraction, fraction), fraction
+
+
+def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
+    """Return how far the middle of the standing feet is from that of all feet, shape (n, 2) [m].
+
+    There is one row for each stance on three or more feet. On two, and with more than four feet in
+    all, the body hardly shifts.
+    """
+    if len(nominal_feet) > MAX_FEET_WITH_SWAY:
+        return np.zeros((1, 2))
+    middle = np.mean([position[:2] for position in nominal_feet.values()], axis=0)
+    shifts = [np.zeros(2)]
+    for offset in gait.offsets.values():
+        lift_off = gait.start + (1.0 + offset) * gait.period
+        standing = [
+            position[:2]
+            for foot, position in nominal_feet.items()
+            if foot not in gait.feet or gait.swing_at(foot, lift_off) is None
+        ]
+        if len(standing) > 2:
+            shifts.append(np.mean(standing, axis=0) - middle)
+    return np.array(shifts)
+
+
+def _leg_reach(state: State, foot: str, direction: Array) -> float:
+    """Return how far a foot can move horizontally in a direction, and in the opposite one [m].
+
+    It is the smaller distance of the two, from where the foot is in the standing posture.
+    """
+    model, placements = state.robot.model, state.joint_transforms
+    joint = model.frames[state.robot.frame_id(foot)].parentJoint
+    points = [state.point(foot)]
+    while joint > 0 and model.names[joint] in state.robot.joint_names:
+        points.append(placements[joint][:3, 3])
+        joint = model.parents[joint]
+    length = sum(np.linalg.norm(a - b) for a, b in pairwise(points))
+    leg = points[0] - points[-1]
+    along = abs(float(leg[:2] @ direction))
+    square = (_MAX_EXTENSION * length) ** 2 - float(leg @ leg) + along**2
+    return sqrt(max(square, 0.0)) - along
