@@ -273,7 +273,10 @@ def test_solutions_that_a_teacher_has_annotated_are_kept(learner: Path) -> None:
     path = learner / f"{lesson.stem}.solved.ipynb"
     annotated = path.read_text().replace("**Why.**", "**Why?**")
     path.write_text(annotated)
-    (message,) = write_solutions(learner, [lesson])
+    assert write_solutions(learner, [lesson]) == []
+    changed = learner / lesson.name
+    changed.write_text(lesson.read_text().replace("motion", "movement"))
+    (message,) = write_solutions(learner, [changed])
     assert message.endswith(f"{lesson.stem}.solved.new.ipynb")
     assert path.read_text() == annotated
     assert (learner / f"{lesson.stem}.solved.new.ipynb").read_text() != annotated
