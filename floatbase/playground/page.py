@@ -28,7 +28,7 @@ from floatbase.viewer import PUSH_DISPLAY_TIME, Picture, status_message
 from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
 from floatbase.viewer.export.recording import push_at
 
-_SITE_NOTE = "The playground runs only in a live notebook. Here the robot stands still."
+_SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
 _MAX_HISTORY = 100  # changes that `undo` remembers
