@@ -39,7 +39,7 @@ _PATH_SHIFT_THRESHOLD = 0.05
 # cross
 _MIN_SIDE_FRACTION = 0.25
 _MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
-_BISECTIONS = 10  # until the place of the ZMP is known to 0.1 % of the way
+_BISECTIONS = 10  # halvings of the way, so that the ZMP is known to 0.1 % of it
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,8 @@ class Planner:
     def weight_shift(self, gait: Gait, state: State, t: float) -> float:
         """Return how much later a gait must begin, so that the weight can shift before [s].
 
-        That is 0 if the capture point is above the feet that stand at the first lift-off, or if
-        only two points stand then: such a gait is kept in balance by its steps.
+        The delay is 0 if the capture point is above the feet that stand at the first lift-off, or
+        if only two points stand then: such a gait is kept in balance by its steps.
 
         Parameters
         ----------
@@ -289,9 +289,9 @@ class Planner:
     ) -> list[Array]:
         """Return the planned ZMP of each phase, (2,) [m], and set new footholds.
 
-        It is in the middle of the standing feet. With more than four feet, it is as near to the
-        middle of all feet as the support polygon allows, because the middle of the standing feet
-        would sway the body: a tripod has two feet on one side and one on the other.
+        The ZMP is in the middle of the standing feet. With more than four feet, it is as near to
+        the middle of all feet as the support polygon allows, because the middle of the standing
+        feet would sway the body: a tripod has two feet on one side and one on the other.
         """
         feet, centres = dict(ref.feet), []
         for begin, end, names in phases:
@@ -349,7 +349,7 @@ class Planner:
 def _nearest_inside(wanted: Array, centre: Array, feet: Array) -> Array:
     """Return the point nearest to `wanted`, on the line to `centre`, with `_MIN_STATIC_MARGIN`.
 
-    It is `centre` if that is no farther from the edge of the feet's support polygon.
+    The result is `centre` if `centre` is no farther from the edge of the feet's support polygon.
     """
     inside, outside = 1.0, 0.0  # fractions of the way from `wanted` to `centre`
     if support_margin(wanted, feet) >= _MIN_STATIC_MARGIN:

@@ -27,7 +27,7 @@ def speed_fractions(
 ) -> tuple[float, float]:
     """Return the largest fractions of a desired motion that the feet can follow, at most 1.
 
-    The first one holds for the first period and the second one from then on.
+    The first fraction holds for the first period, and the second one afterwards.
 
     During its stance, a foot moves from half a step in front of its nominal position to half a step
     behind it. Half a step must be at most `reach`. A ball foot must also stay within the length of
@@ -41,7 +41,8 @@ def speed_fractions(
     state : State
         State whose posture the robot keeps.
     nominal_feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame in that posture, relative to the middle of the feet [m].
+        Position of each foot's frame in the standing posture, relative to the middle of the feet
+        [m].
     flat_feet : set of str
         Names of the flat feet.
     reach : float
@@ -76,8 +77,8 @@ def speed_fractions(
 def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
     """Return how far the middle of the standing feet is from that of all feet, shape (n, 2) [m].
 
-    There is one row for each stance on three or more feet. On two, and with more than four feet in
-    all, the body hardly shifts.
+    There is one row for each stance on three or more feet. On two feet, and for robots with more
+    than four feet, the body hardly shifts.
     """
     if len(nominal_feet) > MAX_FEET_WITH_SWAY:
         return np.zeros((1, 2))
@@ -98,7 +99,7 @@ def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
 def _leg_reach(state: State, foot: str, direction: Array) -> float:
     """Return how far a foot can move horizontally in a direction, and in the opposite one [m].
 
-    It is the smaller distance of the two, from where the foot is in the standing posture.
+    The result is the smaller of the two distances from the foot's place in the standing posture.
     """
     model, placements = state.robot.model, state.joint_transforms
     joint = model.frames[state.robot.frame_id(foot)].parentJoint

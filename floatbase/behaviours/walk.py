@@ -68,19 +68,20 @@ class Walk:
     contacts : Contacts
         All contacts of the robot, such as `Contacts.feet(robot)`.
     gait : Gait
-        The contact schedule; at least one foot must stand at any time. It can be set while walking:
-        feet no longer lift off according to the former gait, and the new gait begins once all feet
-        stand, without its earlier lift-offs. It begins up to 0.8 s later if the weight must first
-        shift to the feet that stand at its first lift-off.
+        The contact schedule; at least one foot must stand at any time. The gait can be set while
+        walking: feet no longer lift off according to the former gait, and the new gait begins once
+        all feet stand, without its earlier lift-offs. The new gait begins up to 0.8 s later if the
+        weight must first shift to the feet that stand at its first lift-off.
     velocity : array_like, shape (2,), optional
-        Desired velocity of the body, forwards and to the left [m/s]. It can be set while walking,
-        and is approached at 1 m/s². If the legs are too short for its steps, a `SimulationWarning`
-        says so, and the robot walks at the fraction `speed_fraction` of it. In its first period, a
-        slow gait may be slower. At (0, 0) the robot marches on the spot; to make it stand, set
-        `walk.gait = dataclasses.replace(walk.gait, stop=walk.time)`.
+        Desired velocity of the body, forwards and to the left [m/s]. The velocity can be set while
+        walking, and is approached at 1 m/s². If the legs are too short for its steps, a
+        `SimulationWarning` says so, and the robot walks at the fraction `speed_fraction` of the
+        desired velocity. In its first period, a slow gait may be slower. At (0, 0) the robot
+        marches on the spot; to make it stand, set `walk.gait = dataclasses.replace(walk.gait,
+        stop=walk.time)`.
     yaw_rate : float, optional
-        Desired yaw rate, to the left [rad/s]. It can be set while walking, and is approached at 1
-        rad/s². It is limited together with the velocity.
+        Desired yaw rate, to the left [rad/s]. The yaw rate can be set while walking, and is
+        approached at 1 rad/s². It is limited together with the velocity.
     clearance : float, optional
         Height of the swings [m].
     reach : float, optional

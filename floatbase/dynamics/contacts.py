@@ -207,7 +207,7 @@ class Contacts(Value):
             raise InputError(
                 f"{robot.name} has no feet. Name them when you load the robot, "
                 f'fb.load_urdf(path, feet=["…"]), or name the frames in contact, '
-                f'fb.Contacts.points(robot, frames=["…"]). fb.Contacts.none() is no contact.'
+                f'fb.Contacts.points(robot, frames=["…"]). For free flight, use fb.Contacts.none().'
             )
         return Contacts(
             [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]

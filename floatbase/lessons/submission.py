@@ -81,7 +81,7 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
 
 
 def _own_path(folder: Path, name: str) -> Path:
-    """Return the path of a learner's file: the first one that is free or has this name inside."""
+    """Return the path of a learner's file: the first one that is free or holds this name."""
     stem = "answers-" + "_".join(re.findall(r"\w+", name))
     path, number = folder / f"{stem}.json", 1
     while os.path.lexists(path) and _name_inside(path) != name:
@@ -91,7 +91,7 @@ def _own_path(folder: Path, name: str) -> Path:
 
 
 def _name_inside(path: Path) -> str | None:
-    """Return the learner's name in a file of answers, or None if it is another kind of file."""
+    """Return the learner's name in a file of answers, or None for another kind of file."""
     try:
         if path.is_symlink() or not path.is_file():
             return None

@@ -201,7 +201,7 @@ class Playground:
         self._last_change = (fields, now)
 
     def _request(self, changes: dict[str, Any]) -> None:
-        """Have changes applied by the run before its next slice, or now if it does not run."""
+        """Let the run apply changes before its next slice, or now if it is not running."""
         with self._lock:
             waiting = bool(self._requested)
             self._requested |= changes
@@ -233,7 +233,7 @@ class Playground:
         Raises
         ------
         InputError
-            If the challenge is of another type.
+            If the challenge has the wrong type.
         """
         if challenge is not None:
             as_instance("challenge", challenge, Challenge, "CHALLENGES[0]")

@@ -167,7 +167,7 @@ class Panel:
 
     @property
     def _invitation(self) -> str:
-        """First sentences of the panel: what to do."""
+        """First sentences of the panel, which say what to do."""
         first = (
             "Push the robot: move and release the slider “push”, or drag the robot with the Shift "
             "key held."

@@ -23,7 +23,7 @@ from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
-_RECHECK_INTERVAL = 1.0  # s between two looks at whether numba compiles
+_RECHECK_INTERVAL = 1.0  # s between two checks whether numba is compiling
 
 # joints whose axes are fixed in their own frame
 _JOINTS = (
@@ -47,15 +47,15 @@ def announce_if_slow(
     text : str
         The text.
     is_true : callable, optional
-        Called as is_true() after that time, and every second from then on. The text is printed when
-        it first returns True.
+        Called as is_true() after that time, and every second from then on. The message is printed
+        when `is_true` first returns True.
     after : float, optional
         Delay [s].
     """
     ended = Event()
 
     def announce() -> None:
-        """Wait for the moment to print the text."""
+        """Wait for the moment to print the message."""
         delay = after
         while not ended.wait(delay):
             if is_true():
@@ -255,7 +255,7 @@ class CompiledTick:
         return ""
 
     def _compilation_count(self) -> int:
-        """Return how often the tick was compiled, or begun to be, rather than loaded from disk."""
+        """Return how often the tick was compiled instead of loaded, unfinished ones included."""
         return sum(self._tick.stats.cache_misses.values())
 
     def _tick_standing(self) -> None:

@@ -233,9 +233,9 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
 def newton_step(q, grad, L, step, delta_beta, y, active: ActiveSet, beta):
     """Take one Newton step on the optimality conditions.
 
-    It starts from (β, mu), which are correct up to rounding, and updates both. Returns the largest
-    change of an entry of β. grad: (nb,), gradient of the cost at β; overwritten. L: Cholesky factor
-    of the Hessian. step, delta_beta, y: (nb,), memory.
+    The step starts from (β, mu), which are correct up to rounding, and updates both. Returns the
+    largest change of an entry of β. grad: (nb,), gradient of the cost at β; overwritten. L:
+    Cholesky factor of the Hessian. step, delta_beta, y: (nb,), memory.
     """
     nb, mu, rows, W, U = beta.size, active.mu, active.rows, active.W, active.U
     if q == 0:
