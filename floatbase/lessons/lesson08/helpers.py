@@ -194,7 +194,7 @@ def shortest_com_shift(
     Parameters
     ----------
     state : State
-        The state before.
+        State before the shift.
     foot : str
         Foot that is to lift off.
     to : callable, optional
