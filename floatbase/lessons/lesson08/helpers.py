@@ -40,7 +40,7 @@ def state_with_moved_body(state: fb.State, move: npt.ArrayLike) -> fb.State:
     Parameters
     ----------
     state : State
-        The state before.
+        State before the move.
     move : array_like, shape (3,)
         Displacement of the body in the world frame [m].
 
@@ -194,7 +194,7 @@ def shortest_com_shift(
     Parameters
     ----------
     state : State
-        The state before.
+        State before the shift.
     foot : str
         Foot that is to lift off.
     to : callable, optional
