@@ -195,8 +195,8 @@ def test_a_panel_without_a_view_keeps_its_notes() -> None:
     assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
 
 
-def test_stops_of_a_control_must_be_there() -> None:
-    with pytest.raises(fb.errors.ViewerError, match="stop 3"):
+def test_positions_of_a_control_must_be_there() -> None:
+    with pytest.raises(fb.errors.ViewerError, match="position 3"):
         static_export.Control("x", ("0", "1"), 3)
 
 
