@@ -38,18 +38,6 @@ _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
-_DESCRIPTIONS = {
-    "equations": "Every equation of the course text, with the functions, tests and lessons "
-    "that belong to it.",
-    "conventions": "Symbols, frames, signs, units and tolerances of every function of floatbase.",
-    "how_to": "Where the course keeps your work, and what to do when something fails.",
-    "changelog": "What changed in each version of floatbase.",
-    "peers": "The computing time of a control step of floatbase, TSID and placo for the same QP.",
-    "tick": "The computing time of each part of a control step, and how it grows with the robot.",
-    "rollout": "The computing time of a simulated second in a rollout and in a bare loop.",
-    "walking": "How well robots walk with floatbase: measurements and requirements.",
-}
-
 
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
     """Build the site.
@@ -198,10 +186,7 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
         },
     }
     for name, text in made.items():
-        about = (
-            f'---\nmyst:\n  html_meta:\n    description: "{_DESCRIPTIONS[Path(name).stem]}"\n---\n'
-        )
-        (source / name).write_text(about + text, encoding="utf-8")
+        (source / name).write_text(text, encoding="utf-8")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
         if path.parent == source:
@@ -221,11 +206,20 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
             else "../lessons/"
         )
         path.write_text(
-            add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}),
+            _front_matter(text)
+            + add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}),
             encoding="utf-8",
         )
     for path in _ROOT.glob("benchmarks/*.png"):
         shutil.copy(path, source / "benchmarks")
+
+
+def _front_matter(text: str) -> str:
+    """Write the description that search engines show: the first plain paragraph of a page."""
+    paragraphs = (part for part in text.split("\n\n") if re.match(r"[A-Za-z`*]", part))
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\\"{}]", r"\1", next(paragraphs, ""))
+    about = " ".join(plain.split())[:200]
+    return f'---\nmyst:\n  html_meta:\n    description: "{about}"\n---\n\n'
 
 
 def _write_reference(target: Path) -> None:
