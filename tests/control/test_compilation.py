@@ -382,7 +382,7 @@ def test_the_tick_compiles_where_no_folder_can_be_written(
 def test_where_numba_fails_the_reference_backend_is_the_last_resort(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    fails = Mock(side_effect=NotImplementedError("no such target"))
+    fails = Mock(side_effect=NotImplementedError("no such target"), stats=None)
     monkeypatch.setattr(tick, "tick", fails)
     controller = judges.controller_of("go2")
     assert (

@@ -256,7 +256,8 @@ class CompiledTick:
 
     def _compilation_count(self) -> int:
         """Return how often the tick was compiled instead of loaded, unfinished ones included."""
-        return sum(self._tick.stats.cache_misses.values())
+        statistics = getattr(self._tick, "stats", None)  # plain Python has none: NUMBA_DISABLE_JIT
+        return sum(statistics.cache_misses.values()) if statistics else 0
 
     def _tick_standing(self) -> None:
         """Run one tick at the robot's standing state."""

@@ -169,12 +169,16 @@ def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
     Rollout
         The record.
     """
+    return run_go2(crawl(swing, pause, forwards), CRAWL_DURATION, period=SLOW_PERIOD)
+
+
+def crawl(swing: float, pause: float, forwards: float) -> Walk:
+    """Return the controller of `run_crawl`."""
     robot = standing_go2_eom().robot
     gait = Gait.crawl(robot, swing, pause, start=0.5)
-    with warnings.catch_warnings():  # the verdict says how far a limited speed goes
+    with warnings.catch_warnings():  # the verdict reports a limited speed
         warnings.simplefilter("ignore", SimulationWarning)
-        walk = Walk(robot, fb.Contacts.points(robot, mu=MU), gait, (forwards, 0.0))
-    return run_go2(walk, CRAWL_DURATION, period=SLOW_PERIOD)
+        return Walk(robot, fb.Contacts.points(robot, mu=MU), gait, (forwards, 0.0))
 
 
 def opposite_foot(foot: str) -> str:

@@ -21,6 +21,7 @@ from floatbase.lessons.judges import (
 )
 from floatbase.lessons.lesson08.helpers import (
     CRAWL_DURATION,
+    crawl,
     run_crawl,
     shortest_com_shift,
     smallest_support_margin,
@@ -214,6 +215,13 @@ def judge_crawl(given: Array) -> Verdict:
     record = lasting_or_verdict(lambda: run_crawl(swing, pause, forwards))
     if isinstance(record, Verdict):
         return record
+    if (fraction := crawl(swing, pause, forwards).speed_fraction) < 1.0:
+        return Verdict(
+            False,
+            f"The legs are too short for steps of this length, so the robot crawls at only "
+            f"{fraction * forwards:.2f} m/s. A step is the speed times the period of the gait.",
+            "too_long_steps",
+        )
     far = 1e3 * float((record.com[-1] - record.com[0])[0])
     inside, pressed = 1e3 * smallest_support_margin(record), float(record.measured[:, 2::3].max())
     text = (
@@ -266,7 +274,7 @@ def crawl_examples() -> list[Example]:
         ((0.3, 0.25, 0.12), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"),
         ((0.3, 0.1, 0.13), "near"),
         ((0.15, 0.1, 0.15), "near_and_stamps"), ((0.15, 0.3, 0.13), "stamps"),
-        ((2.0, 0.1, 0.4), "falls"),
+        ((2.0, 0.1, 0.4), "too_long_steps"),
         ((300.0, 250.0, -0.1), "backwards"),
         ((0.01, 0.2, 0.1), "too_short"),
     ]  # fmt: skip
