@@ -101,9 +101,7 @@ def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> N
         field = picture_in(page.locator(".jp-Cell", has=page.locator("iframe")).last)
         field.wait_for_function(MASS)
         standing = field.evaluate(HEIGHT)
-        field.evaluate(
-            f"{MASS}.setValue(1.5)"
-        )  # unknown to the controller
+        field.evaluate(f"{MASS}.setValue(1.5)")  # unknown to the controller
         field.wait_for_function(f"({HEIGHT})() < {standing - SINKS}")
         assert [url for url in strangers if ICONS not in url] == []
         assert page.get_by_text("Traceback").count() == 0

@@ -150,7 +150,8 @@ class Heel(PointContact):
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str) -> None:
     robot = judges.load("go2")
-    state, tasks = robot.random_state(1, 0.1), list(fb.standing_tasks(robot.standing()))
+    state = robot.standing()  # each foot carries more than the bound of 20 N
+    tasks = list(fb.standing_tasks(state))
     stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts(
         [Heel("RL_foot", radius=0.022)]
     )

@@ -179,13 +179,21 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
 
 @pytest.mark.parametrize("name", judges.KINDS)
 def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_an_honest_way(name: str) -> None:
-    active = ""
+    active, infeasible = "", 0
     for qp in controller_qps(name, 20, torque=0.3):
+        try:
+            solution = solve(qp)
+        except InfeasibleError:  # weak motors cannot hold each state; both must say so
+            infeasible += 1
+            with pytest.raises(InfeasibleError):
+                active_set(qp)
+            continue
         run = active_set(qp)
-        assert np.max(np.abs(run.solution.x - solve(qp).x)) < 1e-7
+        assert np.max(np.abs(run.solution.x - solution.x)) < 1e-7
         check_optimum(run)
         check_record(run)
         active += " ".join(run.solution.active)
+    assert infeasible <= 5
     assert "torque" in active
     assert "facet" in active or not judges.load(name).feet
 
