@@ -47,7 +47,7 @@ PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
 
 help:
 	@echo "make lab     open the course in JupyterLab"
-	@echo "make test    run ruff, mypy, the tests and the lessons (five minutes)"
+	@echo "make test    run ruff, mypy, the tests and the lessons"
 	@echo "make test-all  also test JupyterLab, Voilà, JupyterHub, the site, films and details of the pages"
 	@echo "make site    run the lessons and build the web site, into build/site"
 	@echo "make setup   only create .venv"

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy.typing as npt
-import pinocchio as pin
 
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
@@ -64,9 +63,6 @@ class AngularMomentumTask(TargetTask):
             Map from q̈ to the residual, shape (3,), in the world frame [N·m].
         """
         momentum, rate = self._targets(eom, t)
-        robot, state = eom.robot, eom.state
-        data = state._data
-        # of one joint Pinocchio gives (6,)
-        rate_matrix = pin.dccrba(robot.model, data, state.q, state.v).reshape(6, robot.nv)
-        drift, matrix = rate_matrix[3:] @ state.v, data.Ag.reshape(6, robot.nv)[3:]
-        return Affine(matrix, drift - rate + self.kd * (data.hg.angular - momentum))
+        state = eom.state
+        matrix, drift = state.centroidal_matrix[3:], state.centroidal_drift[3:]
+        return Affine(matrix, drift - rate + self.kd * (matrix @ state.v - momentum))

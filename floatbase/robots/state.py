@@ -145,6 +145,32 @@ class State(Value):
         return self._centre_of_mass[2]
 
     @cached_property
+    def _centroidal(self) -> tuple[Array, Array]:
+        """Return the matrix and the drift of the centroidal momentum."""
+        model, data = self.robot.model, self._data
+        # Pinocchio gives (6,) for one joint
+        rate_matrix = pin.dccrba(model, data, self.q, self.v).reshape(6, model.nv)
+        return read_only(data.Ag.reshape(6, model.nv)), frozen(rate_matrix @ self.v)
+
+    @property
+    def centroidal_matrix(self) -> Array:
+        """Matrix A_g of the centroidal momentum A_g v, shape (6, nv), world axes.
+
+        The first three rows are the linear momentum [kg·m/s], and the last three the angular
+        momentum about the centre of mass [kg·m²/s].
+
+        Notes
+        -----
+        The matrix is defined in [Orin2013]_.
+        """
+        return self._centroidal[0]
+
+    @property
+    def centroidal_drift(self) -> Array:
+        """Part of the centroidal momentum's rate without q̈, Ȧ_g v, shape (6,), [N] and [N·m]."""
+        return self._centroidal[1]
+
+    @cached_property
     def joint_transforms(self) -> Array:
         """World poses of Pinocchio's joints, shape (njoints, 4, 4); joint 0 is the world."""
         return read_only([placement.homogeneous for placement in self._data.oMi])

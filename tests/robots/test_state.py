@@ -9,6 +9,7 @@ from typing import Any
 
 import judges
 import numpy as np
+import pinocchio as pin
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -160,3 +161,22 @@ def test_joint_transforms_are_where_mujoco_has_the_joints(name: str) -> None:
         body = int(judge.model.joint(joint).bodyid[0])
         assert np.allclose(T[:3, 3], judge.data.xpos[body], atol=1e-9)
         assert np.allclose(T[:3, :3], judge.data.xmat[body].reshape(3, 3), atol=1e-9)
+
+
+def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(name: str) -> None:
+    robot, step = judges.load(name), 1e-6
+    state = robot.random_state(3, 0.3)
+
+    def momentum(q: np.ndarray) -> np.ndarray:
+        data = robot.model.createData()
+        return pin.computeCentroidalMomentum(robot.model, data, q, state.v).vector
+
+    rate = (
+        momentum(state.integrate(step * state.v)) - momentum(state.integrate(-step * state.v))
+    ) / (2.0 * step)
+    assert np.allclose(state.centroidal_matrix @ state.v, momentum(state.q), atol=1e-10)
+    assert np.allclose(state.centroidal_drift, rate, atol=1e-5)
+    linear = sum(inertia.mass for inertia in robot.model.inertias) * state.com_velocity
+    assert robot.is_floating is False or np.allclose(
+        state.centroidal_matrix[:3] @ state.v, linear, atol=1e-10
+    )
