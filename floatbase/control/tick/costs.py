@@ -50,7 +50,7 @@ class Cost(NamedTuple):
     """½ ‖R (β, 1)‖² + ½ Σ diagonal β² - linearᵀ β."""
 
     R: Any  # (·, nb + 1), a multiple of four rows, of which the last may be zero
-    diagonal: Any  # (nb,), from terms on single entries of (q̈, λ) that are a β
+    diagonal: Any  # (nb,), from terms on single entries of (q̈, λ) that are components of β
     linear: Any  # (nb,), likewise
 
 
@@ -212,7 +212,7 @@ def single_entry_costs(used, weights, weighted, space: Parametrisation, cost: Co
     """Add Σ (weight / 2) (x - desired)² over the entries x of (q̈, λ, τ) to a cost.
 
     Returns the number of rows of R in use. weights, weighted: (n + d,), weight and weight × desired
-    of each entry. Entries that are a β need no row of R.
+    of each entry. Components of β need no row of R.
     """
     V, beta_index, T = space
     R, diagonal, linear = cost

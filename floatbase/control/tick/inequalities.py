@@ -51,7 +51,7 @@ def affine_value(V, beta, first, last, out):
 
 @jit_forceinline
 def forces_of(space: Parametrisation, beta, forces):
-    """Write forces (k,) at β; most of them are a β themselves."""
+    """Write forces (k,) at β; most of them are components of β."""
     first = space.V.shape[0] - forces.size
     for i in range(forces.size):
         if space.beta_index[first + i] >= 0:
