@@ -173,7 +173,7 @@ def parametrise(B, pivots, m, free_columns, V, beta_index):
 
 @jit_forceinline
 def add_entry(factor, V, beta_index, entry, out, row):
-    """Add factor × row `entry` of V to a row of out (·, nb + 1); one number for a component of β."""
+    """Add factor × row `entry` of V to a row of out (·, nb + 1); one number for an entry of β."""
     if beta_index[entry] >= 0:
         out[row, beta_index[entry]] += factor
     else:
