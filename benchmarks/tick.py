@@ -107,7 +107,8 @@ def parts(n: int) -> Iterator[str]:
     for name in ROBOTS:
         robot = fb.load(name)
         command = controller(robot)
-        compiled, numbers = command.compiled, command.compiled.empty_result()
+        compiled = command.compiled
+        numbers = compiled.empty_result(compiled.default_inputs)
         for label, spread in SPREADS.items():
             spent = []
             for q, v in states(robot, n, spread):

@@ -3,12 +3,14 @@
 from floatbase.control.analytic import AnalyticController
 from floatbase.control.command import Command
 from floatbase.control.controller import WholeBodyController
+from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality
 from floatbase.control.problem import Problem, build_qp
 
 __all__ = [
     "AnalyticController",
     "Command",
+    "JointLimits",
     "Limits",
     "LinearInequality",
     "Problem",

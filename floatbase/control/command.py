@@ -31,7 +31,8 @@ class Command(Value):
     solution : Solution or callable
         Value of the property `solution`, or a function that computes it on first use.
     softened : bool, optional
-        Whether the contacts were made soft because the QP had no solution otherwise.
+        Whether limits, or limits and contacts, were made soft because the QP had no solution
+        otherwise.
     """
 
     tau: Array
@@ -95,6 +96,14 @@ class Command(Value):
     def multipliers(self) -> dict[str, float]:
         """Multiplier of each active inequality, by name."""
         return self.solution.multipliers
+
+    @property
+    def violations(self) -> dict[str, float]:
+        """Violation of each soft constraint that does not hold, by name.
+
+        The unit is that of the constraint: rad/s² or m/s² for joint limits, N for normal forces.
+        """
+        return self.solution.violations
 
     def __repr__(self) -> str:
         return (

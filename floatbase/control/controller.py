@@ -19,11 +19,18 @@ from floatbase._validation import (
     numeric_copy,
     read_only,
     refuse_new_attributes,
+    short_repr,
 )
 from floatbase.control.command import Command
+from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
 from floatbase.control.problem import ModifyQP, Problem, dry_run
-from floatbase.control.soft import SOFT_CONTACT_WEIGHT, contact_weight_of, with_soft_contacts
+from floatbase.control.soft import (
+    SOFT_CONTACT_WEIGHT,
+    SOFT_LIMIT_WEIGHT,
+    contact_weight_of,
+    with_soft_contacts,
+)
 from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, unknown_name
@@ -69,14 +76,23 @@ class WholeBodyController:
         Torque limits [N·m]; np.inf switches them off. The default is those of the robot.
     inequalities : sequence of LinearInequality, optional
         User-defined inequality constraints on q̈, τ or λ.
+    joint_limits : JointLimits or {"robot"}, optional
+        Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
+        `JointLimits.of(robot)`. None switches them off.
+    normal_force_weight : float, optional
+        None makes the bounds of normal forces hard. A number makes them soft: their violation
+        times this weight is added to the objective [1/N].
     contact_weight : float, optional
         None enforces the contacts as equality constraints, eq. (5). A number, such as 1e4, makes
         them soft: it adds ½ contact_weight ‖A q̈ - b‖² to the objective instead [1/(m/s²)²].
-        Contacts then yield if torques and friction cannot hold them, and only user-defined
-        inequalities and bounds of normal forces can make the QP infeasible.
+        Contacts then yield if torques and friction cannot hold them. Only joint limits,
+        user-defined inequalities and bounds of normal forces can still make the QP infeasible.
     on_infeasible : {"raise", "soften"}, optional
         What to do if the QP has no solution. "raise" raises `InfeasibleError`. "soften" solves
-        again with contact_weight=1e4, and sets `Command.softened`.
+        again with soft joint limits, user-defined inequalities and bounds of normal forces (weight
+        1e4), and sets `Command.softened`; `Command.violations` lists what is violated. If there
+        still is no solution, the contacts become soft as well (contact_weight=1e4). The equations
+        of motion, friction and torque limits always hold.
     modify_qp : callable, optional
         Function (qp, eom) -> QP that changes the problem before it is solved. It is called at every
         control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
@@ -143,6 +159,8 @@ class WholeBodyController:
         max_normal_force: NormalForces | None = None,
         torque_limits: npt.ArrayLike | None = None,
         inequalities: Sequence[LinearInequality] = (),
+        joint_limits: JointLimits | Literal["robot"] | None = "robot",
+        normal_force_weight: float | None = None,
         contact_weight: float | None = None,
         on_infeasible: OnInfeasible = "raise",
         modify_qp: ModifyQP | None = None,
@@ -160,6 +178,8 @@ class WholeBodyController:
             max_normal_force,
             inequalities,
             facet_rotation,
+            _joint_limits(robot, joint_limits),
+            normal_force_weight,
         )
         problem = Problem(robot, contacts, tasks, limits, modify_qp)
         if contact_weight is not None:
@@ -310,14 +330,26 @@ class WholeBodyController:
         try:
             return self._answer(q, v, t)
         except InfeasibleError:
-            if self._settings[2] == "raise" or contact_weight_of(self.tasks) is not None:
+            softer = self._settings[2] == "soften" and self._softer_controller
+            if not softer:
                 raise
-            return self._soft_controller._answer(q, v, t)
+        return softer(q, v, t)
 
     @cached_property
-    def _soft_controller(self) -> WholeBodyController:
-        """Build the same controller with soft contacts."""
-        other = self._with_problem(_softened(self._problem, SOFT_CONTACT_WEIGHT))
+    def _softer_controller(self) -> WholeBodyController | None:
+        """The same controller with soft limits; with soft contacts as well if limits are soft.
+
+        None if both are soft.
+        """
+        problem = self._problem
+        limits = problem.limits.softened(SOFT_LIMIT_WEIGHT)
+        if limits is not problem.limits:
+            problem = replace(problem, limits=limits)
+        elif contact_weight_of(self.tasks) is None:
+            problem = _softened(problem, SOFT_CONTACT_WEIGHT)
+        else:
+            return None
+        other = self._with_problem(problem)
         other._softened = True
         return other
 
@@ -427,6 +459,20 @@ def _check_choice(name: str, value: object, choices: object) -> None:
     """Raise `UnknownNameError` if a value is none of the choices of a `Literal`."""
     if not isinstance(value, str) or value not in get_args(choices):
         raise unknown_name(name, value, get_args(choices))
+
+
+def _joint_limits(robot: Robot, given: object) -> JointLimits | None:
+    """Return joint limits from the argument of a controller, checked."""
+    if given is None:
+        return None
+    if isinstance(given, JointLimits):
+        return given
+    if not isinstance(given, str) or given != "robot":
+        raise InputError(
+            f'joint_limits must be "robot", None or JointLimits, such as '
+            f"floatbase.control.JointLimits.of(robot, weight=1e4), not {short_repr(given)}."
+        )
+    return JointLimits.of(robot)
 
 
 def _softened(problem: Problem, weight: float) -> Problem:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, TypeAlias, cast
@@ -29,6 +29,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
+from floatbase.control.joint_limits import JointLimits, as_weight
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -61,6 +62,9 @@ class LinearInequality(Value):
         G x, for example N for forces, m/s² or rad/s² for accelerations.
     row_names : sequence of str, optional
         One label for each row instead of its number, such as the names of joints.
+    weight : float, optional
+        None makes the inequalities hard. A number makes them soft: their violation times this
+        weight is added to the objective [units of the objective per unit of h].
 
     Raises
     ------
@@ -89,6 +93,7 @@ class LinearInequality(Value):
     block: Block = field(metadata=checked(as_string))
     coefficients: Coefficients | Callable[[EquationsOfMotion, float], Coefficients]
     row_names: Sequence[str] = field(default=(), metadata=checked(as_strings))
+    weight: float | None = field(default=None, metadata=checked(as_weight))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -250,6 +255,12 @@ class Limits(Value):
         User-defined inequality constraints.
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
+    joint_limits : JointLimits, optional
+        Position, velocity and acceleration limits of the joints; none by default.
+    normal_force_weight : float, optional
+        None makes the bounds of normal forces hard. A number makes them soft: their violation
+        times this weight is added to the objective [units of the objective per N]. Normal forces
+        below 0 remain impossible.
 
     Raises
     ------
@@ -269,6 +280,43 @@ class Limits(Value):
     )
     inequalities: Sequence[LinearInequality] = field(default=(), metadata=checked(_as_inequalities))
     facet_rotation: float = field(default=0.0, metadata=checked(as_number, "rad"))
+    joint_limits: JointLimits | None = None
+    normal_force_weight: float | None = field(default=None, metadata=checked(as_weight))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.joint_limits is not None:
+            as_instance("joint_limits", self.joint_limits, JointLimits)
+
+    def softened(self, weight: float) -> Limits:
+        """Return limits whose hard constraints are soft, except the physical ones.
+
+        Soft are then all joint limits, user-defined inequalities and bounds of normal forces.
+        Friction, torque limits and normal forces ≥ 0 remain hard.
+
+        Parameters
+        ----------
+        weight : float
+            Weight of the constraints that are hard now [units of the objective per unit of h].
+
+        Returns
+        -------
+        Limits
+            The limits, or this object if nothing changes.
+        """
+        joints, inequalities = self.joint_limits, self.inequalities
+        bounded = bool(self.min_normal_force) or self.max_normal_force != {}
+        changes: dict[str, Any] = {}
+        if joints is not None and joints.weight is None:
+            changes["joint_limits"] = replace(joints, weight=weight)
+        if any(each.weight is None for each in inequalities):
+            changes["inequalities"] = [
+                replace(each, weight=weight) if each.weight is None else each
+                for each in inequalities
+            ]
+        if bounded and self.normal_force_weight is None:
+            changes["normal_force_weight"] = weight
+        return replace(self, **changes) if changes else self
 
     @property
     def polyhedron_options(self) -> tuple[int, bool, float]:
@@ -342,6 +390,47 @@ class Limits(Value):
             return _constant_normal_forces(contacts, self)
         return self._normal_forces_at(contacts, t)
 
+    def hard_normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
+        """Return the bounds that normal forces must satisfy: 0 and inf if the bounds are soft.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts with P points.
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        minimum, maximum : ndarray, shape (P,)
+            Normal forces [N].
+
+        Raises
+        ------
+        InputError
+            If a function returns a value that is not a number ≥ 0.
+        """
+        if self.normal_force_weight is None:
+            return self.normal_forces(contacts, t)
+        return np.zeros(contacts.n_points), np.full(contacts.n_points, np.inf)
+
+    def all_inequalities(self, contacts: Contacts) -> tuple[LinearInequality, ...]:
+        """Return the user-defined inequalities, and soft bounds of normal forces if there are any.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            Contacts to which the bounds apply.
+
+        Returns
+        -------
+        tuple of LinearInequality
+            The inequalities.
+        """
+        if self.normal_force_weight is None or not contacts.n_points:
+            return tuple(self.inequalities)
+        return *self.inequalities, _soft_force_bounds(contacts, self)
+
     def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
         """Return minimum and maximum normal force of each contact point at time t."""
         assert self.max_normal_force is not None  # __post_init__ replaces None
@@ -350,7 +439,7 @@ class Limits(Value):
         return least, largest
 
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
-        """Return which contact points have a maximum normal force.
+        """Return which contact points have a maximum normal force, hard or soft.
 
         Parameters
         ----------
@@ -394,6 +483,28 @@ def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, 
 
 
 @lru_cache(maxsize=64)
+def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality:
+    """Return soft bounds of the normal forces as an inequality on λ."""
+    bounded = np.flatnonzero(limits.bounded_points(contacts))
+    G = np.zeros((contacts.n_points, contacts.k))
+    for i in range(contacts.n_points):
+        at = contacts.point_force_indices[3 * i : 3 * i + 3]
+        G[i, at] = contacts.normals[i]
+    G = read_only(np.vstack([-G, G[bounded]]))
+
+    def coefficients(eom: EquationsOfMotion, t: float) -> Coefficients:
+        """Return the rows and the bounds at time t."""
+        least, largest = limits.normal_forces(contacts, t)
+        return G, np.concatenate([-least, largest[bounded]])
+
+    points = contacts.point_names
+    names = [f"smallest {point}" for point in points]
+    names += [f"largest {points[i]}" for i in bounded]
+    weight = limits.normal_force_weight
+    return LinearInequality("soft normal force", "forces", coefficients, names, weight)
+
+
+@lru_cache(maxsize=64)
 def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[ConstraintLabel, ...]]:
     """Return G of the constraints on contact forces, and their names.
 
@@ -427,7 +538,7 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
             for facet in range(limits.facets)
         ]
         names.append(ConstraintLabel(f"{point} normal force", "normal force", point))
-    bounded = np.flatnonzero(limits.bounded_points(contacts))
+    bounded = np.flatnonzero(hard_maximum(contacts, limits))
     names += [
         ConstraintLabel(
             f"{contacts.point_names[i]} largest normal force",
@@ -458,7 +569,25 @@ def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Arra
     """
     h = np.zeros((contacts.n_points, limits.facets + 1))
     h[:, -1] = -least
-    return np.concatenate([h.ravel(), largest[limits.bounded_points(contacts)]])
+    return np.concatenate([h.ravel(), largest[hard_maximum(contacts, limits)]])
+
+
+def hard_maximum(contacts: Contacts, limits: Limits) -> npt.NDArray[np.bool_]:
+    """Return which contact points have a hard maximum of the normal force.
+
+    Parameters
+    ----------
+    contacts : Contacts
+        Contacts with P points.
+    limits : Limits
+        The limits.
+
+    Returns
+    -------
+    ndarray of bool, shape (P,)
+        True for points with a hard maximum.
+    """
+    return limits.bounded_points(contacts) & (limits.normal_force_weight is None)
 
 
 @lru_cache(maxsize=64)

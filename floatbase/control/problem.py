@@ -82,6 +82,8 @@ class Problem(Value):
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
         object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
+        if self.limits.joint_limits is not None:
+            self.limits.joint_limits.check_size(self.robot)
 
     def _label(self) -> str:
         return "the control problem"
@@ -147,7 +149,7 @@ class Problem(Value):
             for task in self.tasks if tasks is None else tasks:
                 residual_of(task, eom)
             self.limits.normal_forces(self.contacts)
-            for inequality in self.limits.inequalities:
+            for inequality in self.limits.all_inequalities(self.contacts):
                 inequality.labels(len(inequality.at(eom)[0]))
 
 
@@ -205,8 +207,8 @@ def build_qp(
             f"{short_repr(tasks)}."
         )
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
-    inequalities = [each.at(eom, t) for each in limits.inequalities]
-    return assemble_qp(eom, costs, limits, limits.normal_forces(eom.contacts, t), inequalities)
+    inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
+    return assemble_qp(eom, costs, limits, limits.hard_normal_forces(eom.contacts, t), inequalities)
 
 
 def assemble_qp(
@@ -227,9 +229,9 @@ def assemble_qp(
     limits : Limits
         Inequality constraints.
     normal_forces : tuple of ndarray, shape (P,)
-        Minimum and maximum normal force of every contact point [N].
+        Hard minimum and maximum of the normal force at every contact point [N].
     inequalities : sequence of tuple
-        G and h of each of `limits.inequalities`.
+        G and h of each of `limits.all_inequalities`.
 
     Returns
     -------
@@ -255,9 +257,17 @@ def assemble_qp(
         ("tau", G_torque, h_torque),
     ]
     names += torque_names
-    for inequality, (G_user, h_user) in zip(limits.inequalities, inequalities, strict=True):
+    weights: list[float | None] = [None] * len(names)
+    if limits.joint_limits is not None:
+        G_joint, h_joint, joint_names = limits.joint_limits.rows(eom.state)
+        blocks_of_G.append(("qdd", G_joint, h_joint))
+        names += joint_names
+        weights += [limits.joint_limits.weight] * len(h_joint)
+    user_defined = limits.all_inequalities(eom.contacts)
+    for inequality, (G_user, h_user) in zip(user_defined, inequalities, strict=True):
         blocks_of_G.append((inequality.block, G_user, h_user))
         names += inequality.labels(len(G_user))
+        weights += [inequality.weight] * len(h_user)
     G, h, row = np.zeros((len(names), n)), np.concatenate([part[2] for part in blocks_of_G]), 0
     for each, G_part, _ in blocks_of_G:
         G[row : row + len(G_part), blocks[each]] = G_part
@@ -272,6 +282,9 @@ def assemble_qp(
         _equality_names(eom.robot, eom.contacts),
         names,
         blocks,
+        None
+        if not any(weights)
+        else np.array([np.inf if weight is None else weight for weight in weights]),
     )
 
 

@@ -183,7 +183,8 @@ def active_set(
     -----
     [FBR]_, App. C. [NocedalWright2006]_
     """
-    space, problem = as_instance("qp", qp, QP).equality_space, qp.reduced
+    qp = as_instance("qp", qp, QP).with_slacks
+    space, problem = qp.equality_space, qp.reduced
     rows = _independent_rows(
         problem, [_index(qp, name) for name in as_strings("working_set", working_set)]
     )

@@ -15,6 +15,10 @@ positive semidefinite H, x is an optimum exactly if there are multipliers ν, on
 To first order, raising h_i by one unit lowers the objective by μ_i. The same holds for ν_i and b_i,
 but ν_i can have either sign.
 
+An inequality can be soft: its violation s_i = max(0, (G x - h)_i) adds w_i s_i to the objective.
+This penalty is exact [Kerrigan2000]_: the constraint holds whenever its multiplier without the
+penalty is below w_i. The conditions are then 0 ≤ μ_i ≤ w_i, and s_i > 0 only if μ_i = w_i.
+
 [FBR]_, App. C. [Boyd2004]_, section 5.5.
 """
 
@@ -26,13 +30,23 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from floatbase._validation import Array, Value, as_array, as_strings, cached_property, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_strings,
+    cached_property,
+    numeric_copy,
+    read_only,
+    short_repr,
+)
 from floatbase.affine import Affine, as_blocks
-from floatbase.errors import InfeasibleError, unknown_name
+from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.linear_algebra import row_norms, svd_with_rank
 from floatbase.qp.conflicts import conflicting_constraints
-from floatbase.qp.labels import constraint_labels
+from floatbase.qp.labels import ConstraintLabel, constraint_labels
 
 # fraction of 1 + the largest |b| by which equalities of unit length may disagree: b is measured
 _CONSISTENCY_TOLERANCE = 1e-7
@@ -65,11 +79,14 @@ class QP(Value):
         `ConstraintLabel`.
     blocks : mapping of str to slice
         Names of slices of x.
+    penalties : array_like, shape (l,), optional
+        Weight w of the violation of each inequality in the objective; inf for a hard constraint. By
+        default all inequalities are hard [units of the objective per unit of h].
 
     Raises
     ------
     InputError
-        If shapes or names do not match.
+        If shapes or names do not match, or if a penalty is not positive.
 
     Notes
     -----
@@ -86,6 +103,7 @@ class QP(Value):
     equality_names: tuple[str, ...] = ()
     inequality_names: tuple[str, ...] = ()
     blocks: Mapping[str, slice] = field(default_factory=dict)
+    penalties: Array | None = None
 
     def __post_init__(self) -> None:
         g = as_array("g", self.g, (None,))
@@ -99,6 +117,8 @@ class QP(Value):
         values["blocks"] = as_blocks(self.blocks)
         values["equality_names"] = constraint_labels(self.equality_names, len(A), "equality")
         values["inequality_names"] = constraint_labels(self.inequality_names, len(G), "inequality")
+        if self.penalties is not None:
+            values["penalties"] = _as_penalties(self.penalties, len(G))
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -137,6 +157,42 @@ class QP(Value):
             self.equality_names,
             names,
             self.blocks,
+            None if self.penalties is None else self.penalties[kept],
+        )
+
+    @cached_property
+    def soft(self) -> npt.NDArray[np.int_]:
+        """Row numbers of the soft inequalities, shape (s,)."""
+        return np.flatnonzero(np.isfinite(np.inf if self.penalties is None else self.penalties))
+
+    @cached_property
+    def with_slacks(self) -> QP:
+        """Equivalent problem with hard inequalities only.
+
+        Its variables are x and the violations of the soft inequalities, in the block "violations".
+        """
+        n, s, soft = self.n, len(self.soft), self.soft
+        if not s:
+            return self
+        assert self.penalties is not None
+        H, G = np.zeros((n + s, n + s)), np.zeros((len(self.G) + s, n + s))
+        H[:n, :n], G[: len(self.G), :n] = self.H, self.G
+        G[soft, n + np.arange(s)] = -1.0
+        G[len(self.G) :, n:] = -np.eye(s)
+        names = [
+            ConstraintLabel(f"violation of {self.inequality_names[i]} ≥ 0", "violation")
+            for i in soft
+        ]
+        return QP(
+            H,
+            np.append(self.g, self.penalties[soft]),
+            np.hstack([self.A, np.zeros((len(self.A), s))]),
+            self.b,
+            G,
+            np.append(self.h, np.zeros(s)),
+            self.equality_names,
+            (*self.inequality_names, *names),
+            {**self.blocks, "violations": slice(n, n + s)},
         )
 
     @property
@@ -145,7 +201,7 @@ class QP(Value):
         return int(self.g.size)
 
     def objective(self, x: Array) -> float:
-        """Return ½ xᵀ H x + gᵀ x.
+        """Return ½ xᵀ H x + gᵀ x, without penalties.
 
         Parameters
         ----------
@@ -209,6 +265,7 @@ class QP(Value):
             H=0.5 * (H + H.T), g=g, A=np.zeros((0, g.size)), b=self.b[:0], G=G, h=h,
             row_norms=self.row_norms,
             equality_names=(), inequality_names=self.inequality_names, blocks=MappingProxyType({}),
+            penalties=self.penalties,
         )  # fmt: skip
 
     @cached_property
@@ -249,6 +306,17 @@ class InequalityQP(QP):
                 qp, name, read_only(value) if isinstance(value, np.ndarray) else value
             )
         return qp
+
+
+def _as_penalties(penalties: npt.ArrayLike, count: int) -> Array:
+    """Return penalties, shape (count,), after checking that all are positive or inf."""
+    weights = numeric_copy(penalties)
+    if weights is None or weights.shape != (count,) or not np.all(weights > 0.0):
+        raise InputError(
+            f"penalties must be {count} positive numbers, one for each inequality, or inf for "
+            f"hard constraints, not {short_repr(penalties)}."
+        )
+    return read_only(weights)
 
 
 def _zero_if_rounding(value: Array, terms: float) -> Array:

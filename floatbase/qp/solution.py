@@ -9,6 +9,7 @@ import numpy as np
 from floatbase._validation import Array, Value, cached_property, read_only
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_norms
+from floatbase.qp.conflicts import violation_tolerance
 from floatbase.qp.problem import QP
 
 # fraction of the largest slope above which a multiplier counts: solvers leave less on touching rows
@@ -26,11 +27,12 @@ class Residuals:
     equality : float
         Largest magnitude in A x - b [units of b].
     inequality : float
-        Largest positive entry of G x - h, or 0 [units of h].
+        Largest positive entry of G x - h in the hard inequalities, or 0 [units of h].
     complementarity : float
-        Largest magnitude in μ (G x - h), entry by entry [units of the objective].
+        Largest magnitude in μ (G x - h), entry by entry; (w - μ) (G x - h) for soft inequalities
+        that are violated [units of the objective].
     dual : float
-        Largest positive entry of -μ, or 0 [units of μ].
+        Largest positive entry of -μ, or of μ - w, or 0 [units of μ].
     """
 
     stationarity: float
@@ -51,7 +53,7 @@ class Solution(Value):
     x : ndarray, shape (n,)
         The minimizer.
     inequality_multipliers : ndarray, shape (l,)
-        Multipliers μ ≥ 0 of the inequalities.
+        Multipliers μ ≥ 0 of the inequalities; at most the penalties of soft ones.
     solver : str
         Name of the solver that found the solution.
     iterations : int
@@ -82,13 +84,18 @@ class Solution(Value):
         """Residuals of the optimality conditions, computed from the problem itself."""
         qp, mu = self.qp, self.inequality_multipliers
         slack = qp.G @ self.x - qp.h
+        weights = np.full(len(mu), np.inf) if qp.penalties is None else qp.penalties
+        products = mu * slack
+        violated = qp.soft[slack[qp.soft] > 0.0]
+        products[violated] = (weights - mu)[violated] * slack[violated]
+        slack[violated] = 0.0
         slope = qp.H @ self.x + qp.g + qp.A.T @ self.equality_multipliers + qp.G.T @ mu
         return Residuals(
             stationarity=float(np.max(np.abs(slope), initial=0.0)),
             equality=float(np.max(np.abs(qp.A @ self.x - qp.b), initial=0.0)),
             inequality=float(np.max(slack, initial=0.0)),
-            complementarity=float(np.max(np.abs(mu * slack), initial=0.0)),
-            dual=float(np.max(-mu, initial=0.0)),
+            complementarity=float(np.max(np.abs(products), initial=0.0)),
+            dual=float(max(np.max(-mu, initial=0.0), np.max(mu - weights, initial=0.0))),
         )
 
     @cached_property
@@ -114,8 +121,20 @@ class Solution(Value):
         return {name: float(mu[name]) for name in self.active}
 
     @property
+    def violations(self) -> dict[str, float]:
+        """Violation of each soft inequality that does not hold, by name [units of h]."""
+        qp = self.qp
+        size = qp.row_norms[qp.soft]
+        excess = (qp.G @ self.x - qp.h)[qp.soft]
+        violated = excess > size * violation_tolerance(qp.h[qp.soft] / size, self.x)
+        return {
+            qp.inequality_names[i]: float(amount)
+            for i, amount in zip(qp.soft[violated], excess[violated], strict=True)
+        }
+
+    @property
     def objective(self) -> float:
-        """Minimum of the objective."""
+        """Value of the objective at the minimizer, without penalties."""
         return self.qp.objective(self.x)
 
     def __getitem__(self, block: str) -> Array:

@@ -69,7 +69,10 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it.
     """
     check_solver(solver)
-    as_instance("qp", qp, QP)
+    if len(as_instance("qp", qp, QP).soft):
+        found = solve(qp.with_slacks, solver)
+        multipliers = found.inequality_multipliers[: len(qp.G)]
+        return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
     solution = _BACK_ENDS[solver](qp)
     if solution is not None:
         return solution

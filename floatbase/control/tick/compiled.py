@@ -17,6 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from floatbase._validation import Array
+from floatbase.control.limits import hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, residual_of
 from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
@@ -182,6 +183,16 @@ class CompiledTick:
         self._n_stages = tick.N_STAGES
         self._varies = bool(self._time_varying_tasks) or self.user_terms.varies
         self._n_user_rows = -1
+        limits = problem.limits
+        inequalities = limits.all_inequalities(problem.contacts)
+        joint_limits = limits.joint_limits
+        joint_weight = None if joint_limits is None else joint_limits.weight
+        # weights of the groups of user-defined inequalities, and of the joint limits
+        self._soft_weights = [each.weight or np.inf for each in inequalities]
+        self._joint_weight = joint_weight or np.inf
+        self._has_soft = np.isfinite(min(self._soft_weights, default=np.inf)) or (
+            joint_weight is not None
+        )
         self._make_workspace(0)
 
     def _make_workspace(self, n_user_rows: int) -> None:
@@ -219,7 +230,7 @@ class CompiledTick:
         inputs = self.inputs_at(q, v, t) if self._varies else self.default_inputs
         if inputs is None:
             return None
-        dynamics, result = self.dynamics, self.empty_result()
+        dynamics, result = self.dynamics, self.empty_result(inputs)
         with dynamics.lock:
             dynamics.update(q, v)
             n_active = self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
@@ -262,14 +273,29 @@ class CompiledTick:
     def _tick_standing(self) -> None:
         """Run one tick at the robot's standing state."""
         standing = self._problem.robot.standing()
-        q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs.packed
+        q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs
+        result = self.empty_result(inputs)
         with self.dynamics.lock:
             self.dynamics.update(q, v)
-            self._tick(q, v, inputs, *self.arguments, self.empty_result(), self._n_stages)
+            self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
 
-    def empty_result(self) -> Array:
-        """Return an uninitialized array for the numbers of one tick."""
-        return np.empty(self.forces.stop + 2 * self._n_multipliers)
+    def empty_result(self, inputs: TickInputs) -> Array:
+        """Return an uninitialized array for the numbers of one tick.
+
+        Parameters
+        ----------
+        inputs : TickInputs
+            Inputs of the tick.
+
+        Returns
+        -------
+        ndarray
+            The array.
+        """
+        size = self.forces.stop + 2 * self._n_multipliers
+        if self._has_soft:
+            size += 2 * self._problem.robot.d + sum(len(h) for _, h in inputs.inequalities)
+        return np.empty(size)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:
         """Return the reference QP of a tick, with the values that user functions returned in it.
@@ -334,17 +360,36 @@ class CompiledTick:
             One multiplier for each inequality, zero if it is inactive.
         """
         limits, contacts = self._problem.limits, self._problem.contacts
-        limited = np.isfinite(
-            limits.torque_limits
-        )  # the reference QP has rows for these joints only
-        friction = np.full(contacts.n_points * (limits.facets + 1), True)
-        user_rows = np.full(sum(len(G) for G, _ in inputs.inequalities), True)
-        has_row = np.concatenate(
-            [friction, limits.bounded_points(contacts), limited, limited, user_rows]
+        # the reference QP has rows for limited joints only
+        limited, d = np.isfinite(limits.torque_limits), limits.torque_limits.size
+        joints = (
+            np.full(2 * d, False)
+            if limits.joint_limits is None
+            else limits.joint_limits.bounded.ravel()
         )
-        mu, active = result[self.forces.stop :].reshape(2, -1)[:, :n_active]
+        friction = np.full(contacts.n_points * (limits.facets + 1), True)
+        group_sizes = [len(h) for _, h in inputs.inequalities]
+        has_row = np.concatenate(
+            [
+                friction,
+                hard_maximum(contacts, limits),
+                limited,
+                limited,
+                joints,
+                np.full(sum(group_sizes), True),
+            ]
+        )
+        sizes = self.forces.stop, 2 * self._n_multipliers
+        mu, active = result[sizes[0] : sum(sizes)].reshape(2, -1)[:, :n_active]
         all_rows = np.zeros(has_row.size)
         all_rows[active.astype(np.int64)] = np.maximum(mu, 0.0)
+        if self._has_soft:
+            weights = np.append(
+                np.full(2 * d, self._joint_weight), np.repeat(self._soft_weights, group_sizes)
+            )
+            soft_rows, saturated = all_rows[-len(weights) :], result[sum(sizes) :] > 0.0
+            # rows with the opposite sign start at their weight
+            soft_rows[saturated] = (weights - soft_rows)[saturated]
         multipliers: Array = all_rows[has_row]
         return multipliers
 

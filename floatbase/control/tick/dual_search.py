@@ -2,7 +2,8 @@
 
 Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities, and brings one
 violated inequality after another to its bound. An inequality that is never violated is only
-evaluated. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
+evaluated. The multiplier of a soft inequality is at most its weight. An inequality that reaches its
+weight leaves the active set, and its weight becomes part of the gradient of the cost. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
 the number of active inequalities, mu their multipliers.
 """
 
@@ -14,7 +15,13 @@ import numpy as np
 
 from floatbase.control.tick.costs import Cost, gradient, hessian
 from floatbase.control.tick.elimination import Parametrisation
-from floatbase.control.tick.inequalities import Inequalities, row_in_beta, violated_row
+from floatbase.control.tick.inequalities import (
+    Inequalities,
+    row_in_beta,
+    soft_rows_start,
+    violated_row,
+    weight_of_row,
+)
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
@@ -41,6 +48,8 @@ class ActiveSet(NamedTuple):
     rows: Any  # (nb, nb), its row of G
     W: Any  # (nb, nb), with W H Wᵀ = 1
     U: Any  # (nb, nb), W rowsᵀ = U, upper triangular in its first q columns
+    weights: Any  # (nb,), largest value of its multiplier, inf if it is hard
+    soft_gradient: Any  # (nb,), gradient of the penalties of saturated rows
 
 
 @jit
@@ -119,9 +128,10 @@ def add_row(W, U, d, z, q):
 @jit
 def drop_row(active: ActiveSet, at, q):
     """Remove row `at` from the q active ones, and rotate W so that U stays upper triangular."""
-    indices, mu, bounds, rows, W, U = active
+    indices, mu, bounds, rows, W, U, weights, _ = active
     for j in range(at, q - 1):
         indices[j], mu[j], bounds[j] = indices[j + 1], mu[j + 1], bounds[j + 1]
+        weights[j] = weights[j + 1]
         for c in range(rows.shape[1]):
             rows[j, c] = rows[j + 1, c]
         for i in range(j + 2):
@@ -186,14 +196,37 @@ def step_directions(W, U, d, q, z, r):
 
 
 @jit
-def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
+def saturate(number, row, weight, limits: Inequalities, soft_gradient):
+    """Make the penalty of a soft inequality, whose multiplier equals its weight, part of the cost.
+
+    If its penalty already is part of the cost, its row has the opposite sign, and the penalty
+    leaves the cost. number, row: of that inequality, as in `ActiveSet`.
+    """
+    for c in range(row.size):
+        soft_gradient[c] += weight * row[c]
+    at = number - soft_rows_start(limits)
+    limits.saturated[at] = 1.0 - limits.saturated[at]
+
+
+@jit
+def saturate_active(active: ActiveSet, at, limits: Inequalities):
+    """Do `saturate` for one of the active inequalities, which the caller drops."""
+    saturate(
+        active.indices[at], active.rows[at], active.weights[at], limits, active.soft_gradient
+    )
+
+
+@jit
+def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: Inequalities, beta):
     """Bring one violated inequality to its bound; drop those whose multiplier would turn negative.
 
-    Updates `active` and `beta`. Returns the new q, or an error code. number, row, bound: of that
-    inequality, as in `ActiveSet`. d, z, r: (nb,), memory for `step_directions`.
+    A soft inequality whose multiplier reaches its weight is saturated instead. Updates `active` and
+    `beta`. Returns the new q, or an error code. number, row, bound, weight: of that inequality, as
+    in `ActiveSet`. d, z, r: (nb,), memory for `step_directions`.
     """
     n, multiplier, mu, W, U = beta.size, 0.0, active.mu, active.W, active.U
-    for _ in range(2 * n + 2):
+    weights, has_soft = active.weights, limits.saturated.size > 0
+    for _ in range(2 * n + 2 + limits.saturated.size):
         multiply_by_row(W, row, d)
         step_directions(W, U, d, q, z, r)
         curvature, size, excess = 0.0, 0.0, -bound
@@ -206,10 +239,15 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
         for j in range(q):
             if r[j] > 0.0 and mu[j] < partial_step * r[j]:
                 partial_step, blocking = mu[j] / r[j], j
+        saturates = False
+        if has_soft:
+            for j in range(q):
+                if r[j] < 0.0 and weights[j] - mu[j] < -partial_step * r[j]:
+                    partial_step, blocking, saturates = (weights[j] - mu[j]) / -r[j], j, True
         full_step = (
             excess / curvature if q < n and curvature > DEPENDENCE_TOLERANCE * size else np.inf
         )
-        step = min(partial_step, full_step)
+        step = min(partial_step, full_step, weight - multiplier)
         if step == np.inf:
             return INFEASIBLE
         for j in range(q):
@@ -218,12 +256,18 @@ def enforce(number, row, bound, q, d, z, r, active: ActiveSet, beta):
         if full_step < np.inf:
             for j in range(n):
                 beta[j] += step * z[j]
+        if has_soft and multiplier >= weight:
+            saturate(number, row, weight, limits, active.soft_gradient)
+            return q
         if full_step <= partial_step:
             add_row(W, U, d, z, q)
             active.indices[q], mu[q], active.bounds[q] = number, multiplier, bound
+            weights[q] = weight
             for j in range(n):
                 active.rows[q, j] = row[j]
             return q + 1
+        if saturates:
+            saturate_active(active, blocking, limits)
         drop_row(active, blocking, q)
         q -= 1
     return INACCURATE
@@ -289,6 +333,15 @@ def wrong_signed_row(mu, q):
 
 
 @jit
+def saturated_row(active: ActiveSet, q):
+    """Return the index of an active inequality whose multiplier exceeds its weight, or -1."""
+    for a in range(q):
+        if active.mu[a] > active.weights[a] * (1.0 + SIGN_TOLERANCE):
+            return a
+    return -1
+
+
+@jit
 def dual_search(
     cost: Cost, limits: Inequalities, space: Parametrisation, nv, workspace, indices, mu, beta
 ):
@@ -309,7 +362,11 @@ def dual_search(
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
     forces, tau = take_vector(workspace, k), take_vector(workspace, d)
     qdd = take_vector(workspace, nv)
-    active = ActiveSet(indices, mu, bounds, rows, W, U)
+    weights, soft_gradient = take_vector(workspace, nb), take_vector(workspace, nb)
+    active = ActiveSet(indices, mu, bounds, rows, W, U, weights, soft_gradient)
+    has_soft = limits.saturated.size > 0
+    clear(soft_gradient)
+    clear(limits.saturated)
     hessian(cost, H, grad)
     if not cholesky(H, L):
         return INACCURATE
@@ -321,11 +378,18 @@ def dual_search(
             if refined == NEWTON_STEPS:
                 break
             gradient(cost, beta, grad)
+            if has_soft:
+                for i in range(nb):
+                    grad[i] += soft_gradient[i]
             moved = newton_step(q, grad, L, step, z, r, active, beta)
             refined = (
                 refined + 1 if moved > STEP_TOLERANCE * (1.0 + largest(beta)) else NEWTON_STEPS
             )
             wrong = wrong_signed_row(mu, q)
+            if wrong < 0 and has_soft:
+                wrong = saturated_row(active, q)
+                if wrong >= 0:
+                    saturate_active(active, wrong, limits)
             if wrong >= 0:
                 drop_row(active, wrong, q)
                 q, refined = q - 1, 0
@@ -338,7 +402,8 @@ def dual_search(
             clear(U)
             has_factors = True
         bound = row_in_beta(number, limits, space, nv, row)
-        q = enforce(number, row, bound, q, step, z, r, active, beta)
+        weight = weight_of_row(number, limits, nv, k)
+        q = enforce(number, row, bound, weight, q, step, z, r, active, limits, beta)
         if q < 0:
             return q
     if number >= 0 or refined == 0 or not moved <= MAX_FINAL_STEP * (1.0 + largest(beta)):

@@ -1,7 +1,8 @@
 """The inequalities G β ≤ h of eqs. (27), (28), assembled only for the rows that β violates.
 
 Rows are numbered: F facets and the minimum normal force of each of P points, then their P maximum
-normal forces, d upper torque limits, d lower ones, and the user-defined rows. Code that every
+normal forces, d upper torque limits, d lower ones, d largest joint accelerations, d least ones, and
+the user-defined rows. The last three groups can be soft (`Inequalities.saturated`). Code that every
 problem needs is inlined into the search (`jit_forceinline`); code that few problems need is not.
 Without this choice the compiler inlines neither, and a tick with many active rows takes 6 % longer.
 """
@@ -31,11 +32,60 @@ class Inequalities(NamedTuple):
     torque_limits: Any  # (d,), N·m
     inputs: Any  # packed by `user_terms.UserTerms`
     bounds: Any  # where the P minimum and P maximum normal forces start in it, N
-    # where user-defined rows start, one group after another: block, number m of rows, G (m, n), h
-    # (m,)
+    # where user-defined rows start, one group after another: block, number m of rows, weight (0 if
+    # hard), G (m, n), h (m,)
     user_start: Any
     n_user_groups: Any  # number of groups
     has_optional: Any  # whether there are any of these, or a maximum normal force
+    has_joint_limits: Any
+    least: Any  # (d,), bounds of the joint accelerations, rad/s² or m/s²; -inf for none
+    largest: Any  # (d,), and inf for none
+    joint_weight: Any  # weight of joint limits if they are soft, 0 if they are hard
+    # 1 for each row on joint accelerations, or user-defined row, that is soft and saturated: its
+    # multiplier began at its weight and its violation is part of the cost. The row then acts with
+    # the opposite sign: it is violated if its constraint holds with a margin. Empty if no row is
+    # soft
+    saturated: Any
+
+
+@jit
+def largest_acceleration(gap, v, speed, acceleration, brake, dt):
+    """Return the largest joint acceleration towards a limit, as `JointLimits.bounds` does.
+
+    gap: distance to the limit. v: velocity towards it. speed, acceleration: limits. brake: braking
+    acceleration. dt: control period, s.
+    """
+    bound = min(acceleration, (speed - v) / dt)
+    if gap < np.inf:
+        stop, position = -v / dt, 2.0 * (gap - v * dt) / dt**2
+        if v > 0.0 and position <= stop:
+            position = min(stop, -(v**2) / (2.0 * gap)) if gap > 0.0 else -np.inf
+        viable, square = stop, brake * (8.0 * gap - 4.0 * v * dt + brake * dt**2)
+        if square >= 0.0:
+            viable = max(stop, (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt))
+        bound = min(bound, position, viable)
+    return max(bound, -brake)
+
+
+@jit
+def joint_bounds(q, v, tree, table, dt, least, largest):
+    """Write the bounds of the joint accelerations into least and largest, (d,).
+
+    tree: as in `Bodies`. table: (5, d), lower and upper position limits, speeds, accelerations and
+    braking accelerations. dt: control period, s.
+    """
+    d = least.size
+    for j in range(d):
+        joint = tree.shape[0] - d + j
+        x, speed = q[tree[joint, 3]], v[tree[joint, 1]]
+        largest[j] = largest_acceleration(
+            table[1, j] - x, speed, table[2, j], table[3, j], table[4, j], dt
+        )
+        least[j] = -largest_acceleration(
+            x - table[0, j], -speed, table[2, j], table[3, j], table[4, j], dt
+        )
+        if least[j] > largest[j]:
+            least[j] = largest[j] = 0.5 * (least[j] + largest[j])
 
 
 @jit
@@ -110,6 +160,31 @@ def force_rows_of(limits: Inequalities):
     return limits.cones.shape[0] + limits.points
 
 
+@jit_forceinline
+def soft_rows_start(limits: Inequalities):
+    """Return the number of the first row that can be soft."""
+    return force_rows_of(limits) + 2 * limits.torque_limits.size
+
+
+@jit
+def violated_joint_row(limits: Inequalities, space: Parametrisation, beta, qdd):
+    """Return the row on joint accelerations that β (nb,) violates most, or -1. qdd: memory."""
+    d = limits.least.size
+    first, start = qdd.size - d, soft_rows_start(limits)
+    affine_value(space.V, beta, first, qdd.size, qdd[first:])
+    worst, found = FEASIBILITY_TOLERANCE, -1
+    for j in range(d):
+        above, below = qdd[first + j] - limits.largest[j], limits.least[j] - qdd[first + j]
+        if limits.saturated.size > 0:
+            above = -above if limits.saturated[j] > 0.0 else above
+            below = -below if limits.saturated[d + j] > 0.0 else below
+        if above > worst:
+            worst, found = above, start + j
+        if below > worst:
+            worst, found = below, start + d + j
+    return found
+
+
 @jit
 def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
     """Do the same as `violated_row` for maximum normal forces and user-defined rows.
@@ -127,7 +202,8 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
         excess = normal_force - limits.inputs[limits.bounds + limits.points + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], cones.shape[0] + i
-    at, number, inputs = limits.user_start, force_rows_of(limits) + 2 * tau.size, limits.inputs
+    start, inputs = soft_rows_start(limits), limits.inputs
+    at, number = limits.user_start, start + 2 * tau.size
     for _ in range(limits.n_user_groups):
         block, m = int(inputs[at]), int(inputs[at + 1])
         if block == QDD and not has_qdd:
@@ -135,15 +211,17 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
             has_qdd = True
         x = qdd if block == QDD else (forces if block == FORCES else tau)
         for i in range(m):
-            excess, square = -inputs[at + 2 + m * x.size + i], 0.0
+            excess, square = -inputs[at + 3 + m * x.size + i], 0.0
             for c in range(x.size):
-                entry = inputs[at + 2 + i * x.size + c]
+                entry = inputs[at + 3 + i * x.size + c]
                 excess += entry * x[c]
                 square += entry * entry
+            if limits.saturated.size > 0 and limits.saturated[number + i - start] > 0.0:
+                excess = -excess
             length = np.sqrt(square) if square > 0.0 else 1.0
             if excess > worst * length:
                 worst, found = excess / length, number + i
-        at, number = at + 2 + m * (x.size + 1), number + m
+        at, number = at + 3 + m * (x.size + 1), number + m
     return found
 
 
@@ -164,6 +242,8 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
         excess = abs(tau[j]) - limits.torque_limits[j]
         if excess > worst:
             worst, found = excess, n_force_rows + (j if tau[j] > 0.0 else tau.size + j)
+    if found < 0 and limits.has_joint_limits:
+        found = violated_joint_row(limits, space, beta, qdd)
     if found < 0 and limits.has_optional:
         return violated_optional_row(limits, space, beta, forces, tau, qdd)
     return found
@@ -180,16 +260,67 @@ def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, o
         size = nv if block == QDD else (k if block == FORCES else T.shape[0])
         if number < m:
             break
-        at, number = at + 2 + m * (size + 1), number - m
-    bound = inputs[at + 2 + m * size + number]
+        at, number = at + 3 + m * (size + 1), number - m
+    bound = inputs[at + 3 + m * size + number]
     for i in range(size):
-        entry = inputs[at + 2 + number * size + i]
+        entry = inputs[at + 3 + number * size + i]
         if entry != 0.0:
             row = V[i] if block == QDD else (V[nv + i] if block == FORCES else T[i])
             for c in range(nb):
                 out[c] += entry * row[c]
             bound -= entry * row[nb]
     return bound
+
+
+@jit
+def joint_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
+    """Do the same as `row_in_beta` for joint accelerations, numbered from the first of them."""
+    d, nb = limits.least.size, out.size
+    joint = number % d
+    sign = 1.0 if number < d else -1.0
+    for c in range(nb):
+        out[c] = sign * space.V[nv - d + joint, c]
+    bound = limits.largest[joint] if number < d else -limits.least[joint]
+    return bound - sign * space.V[nv - d + joint, nb]
+
+
+@jit
+def soft_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
+    """Do the same as `row_in_beta` for rows that can be soft, numbered from the first of them.
+
+    A saturated row gets the opposite sign.
+    """
+    d = limits.least.size
+    if number < 2 * d:
+        bound = joint_row_in_beta(number, limits, space, nv, out)
+    else:
+        bound = user_row_in_beta(number - 2 * d, limits, space, nv, out)
+    if limits.saturated.size > 0 and limits.saturated[number] > 0.0:
+        for c in range(out.size):
+            out[c] = -out[c]
+        bound = -bound
+    return bound
+
+
+@jit
+def weight_of_row(number, limits: Inequalities, nv, k):
+    """Return the weight of a row by its number: the largest value of its multiplier, inf if hard.
+
+    k: number of entries of λ.
+    """
+    number -= soft_rows_start(limits)
+    if number < 0 or limits.saturated.size == 0:
+        return np.inf
+    d, inputs, at = limits.least.size, limits.inputs, limits.user_start
+    weight = limits.joint_weight
+    if number >= 2 * d:
+        number -= 2 * d
+        while number >= int(inputs[at + 1]):
+            block, m = int(inputs[at]), int(inputs[at + 1])
+            size = nv if block == QDD else (k if block == FORCES else d)
+            at, number = at + 3 + m * (size + 1), number - m
+        weight = inputs[at + 2]
+    return weight if weight > 0.0 else np.inf
 
 
 @jit_forceinline
@@ -199,7 +330,7 @@ def row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     nb, d, n_cone_rows = V.shape[1] - 1, T.shape[0], cones.shape[0]
     force_rows = force_rows_of(limits)
     if number >= force_rows + 2 * d:
-        return user_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
+        return soft_row_in_beta(number - force_rows - 2 * d, limits, space, nv, out)
     clear(out)
     if number < force_rows:
         n_rows, row, sign, bound = limits.facets + 1, number, 1.0, 0.0

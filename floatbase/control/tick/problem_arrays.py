@@ -17,7 +17,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array
-from floatbase.control.limits import BLOCKS
+from floatbase.control.joint_limits import JointLimits
+from floatbase.control.limits import BLOCKS, hard_maximum
 from floatbase.control.problem import Problem
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
@@ -146,18 +147,23 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
     n_user_contact_numbers = sum(
         m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:]
     )
-    has_optional = bool(limits.inequalities) or np.any(limits.bounded_points(problem_contacts))
+    n_inequalities = len(limits.all_inequalities(problem_contacts))
+    has_optional = n_inequalities > 0 or np.any(hard_maximum(problem_contacts, limits))
     counts = (
         problem_contacts.k,
         targets.size,
         n_user_contact_numbers,
         len(problem.tasks) - len(tasks),
-        len(limits.inequalities),
+        n_inequalities,
         points_only,
         has_optional,
+        limits.joint_limits is not None,
     )
     # the first entry is the counter of a workspace
-    float_tables = (0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits)
+    float_tables = (
+        0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits,
+        *_pack_joint_limits(limits.joint_limits, problem.robot.d),
+    )  # fmt: skip
     int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
     return (
         np.array((*sizes, *counts), np.int64),
@@ -166,6 +172,15 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         targets,
         time_varying,
     )
+
+
+def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array]:
+    """Return the table (5, d) of `inequalities.joint_bounds`, then control period and weight."""
+    if limits is None:
+        return np.zeros((5, d)), np.zeros(2)
+    braking = np.minimum(limits.braking, limits.acceleration)
+    table = np.array([limits.lower, limits.upper, limits.velocity, limits.acceleration, braking])
+    return table, np.array([limits.period, limits.weight or 0.0])
 
 
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:

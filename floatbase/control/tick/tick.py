@@ -24,7 +24,7 @@ from floatbase.control.tick.elimination import (
     parametrise,
     torques,
 )
-from floatbase.control.tick.inequalities import Inequalities, affine_value
+from floatbase.control.tick.inequalities import Inequalities, affine_value, joint_bounds
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
 from floatbase.control.tick.workspace import all_finite, take_matrix, take_vector
@@ -37,13 +37,14 @@ MAX_ENTRY = 1e8
 
 
 @jit_inline
-def unpack(nv, sizes, int_tables, float_tables, inputs):
-    """Return tree, links, contacts, tasks and limits from their flat arrays.
+def unpack(nv, sizes, int_tables, float_tables, inputs, least, largest, saturated):
+    """Return tree, links, contacts, tasks, limits and joint limits from their flat arrays.
 
     `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: number of
     joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets,
     numbers of user-defined contacts, user-defined tasks, groups of user-defined rows; then 1 or 0:
-    whether all contacts are points, and `Inequalities.has_optional`. int_tables, float_tables:
+    whether all contacts are points, `Inequalities.has_optional` and whether there are joint limits.
+    least, largest, saturated: memory for `Inequalities`. int_tables, float_tables:
     integers and real numbers of all tables, one table after another, as in a workspace. inputs: as
     for `tick`.
     """
@@ -63,11 +64,12 @@ def unpack(nv, sizes, int_tables, float_tables, inputs):
     tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, sizes[10], n_user_rows)
     cones = take_matrix(float_tables, n_points * n_rows, 5)
     torque_limits = take_vector(float_tables, d)
+    joint_limits, period_and_weight = take_matrix(float_tables, 5, d), take_vector(float_tables, 2)
     limits = Inequalities(
         cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11],
-        sizes[13] == 1,
+        sizes[13] == 1, sizes[14] == 1, least, largest, period_and_weight[1], saturated,
     )  # fmt: skip
-    return tree, links, contacts, tasks, limits
+    return tree, links, contacts, tasks, limits, joint_limits, period_and_weight[0]
 
 
 def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
@@ -83,7 +85,7 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
     cost = (3 * n_tasks + n_user_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
-    search = (n + 1) ** 2 + 4 * n * n + 7 * n + k + d + nv
+    search = (n + 1) ** 2 + 4 * n * n + 9 * n + k + 3 * d + nv
     return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
 
 
@@ -138,16 +140,19 @@ def make_tick(digest):
         tasks and rows. sizes, int_tables, float_tables: as for `unpack`; few arrays, since each one
         costs time. M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
         float_workspace, int_workspace: workspaces of `workspace_sizes` numbers. result: receives
-        q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each. stages:
-        how many of N_STAGES to run, for benchmarks.
+        q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each, then
+        `Inequalities.saturated`. stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
         nv, m, d, k = v.size, sizes[3], sizes[6], sizes[7]
         base, n = nv - d, nv + k
-        tree, links, contacts, tasks, limits = unpack(nv, sizes, int_tables, float_tables, inputs)
+        float_workspace[0], int_workspace[0] = 1, 1
+        least, largest = take_vector(float_workspace, d), take_vector(float_workspace, d)
+        tree, links, contacts, tasks, limits, joint_limits, period = unpack(
+            nv, sizes, int_tables, float_tables, inputs, least, largest, result[3 * n + d :]
+        )
         if not inputs_valid(q, v, inputs, tree):
             return INVALID
-        float_workspace[0], int_workspace[0] = 1, 1
         velocity = take_matrix(float_workspace, tree.shape[0], 6)
         drift = take_matrix(float_workspace, tree.shape[0], 6)
         bodies = Bodies(tree, links, oMi, J, Ag, velocity, drift)
@@ -195,6 +200,8 @@ def make_tick(digest):
             return INVALID
         if stages == 3:
             return STOPPED
+        if limits.has_joint_limits:
+            joint_bounds(q, v, tree, joint_limits, period, least, largest)
         beta, active = take_vector(float_workspace, nb), take_vector(int_workspace, nb)
         mu = result[n + d : n + d + nb]
         n_active = dual_search(

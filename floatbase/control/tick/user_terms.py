@@ -65,13 +65,14 @@ class UserTerms:
         self._contacts = [
             contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS
         ]
-        self.any = bool(self._tasks or self._contacts or self._limits.inequalities)
+        self._inequalities = self._limits.all_inequalities(problem.contacts)
+        self.any = bool(self._tasks or self._contacts or self._inequalities)
         self.varies = self.any or self._limits.time_varying
         bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
         self._constant_bounds = (
             (bounds[0], bounds[1])
             if self._limits.time_varying
-            else self._limits.normal_forces(problem.contacts)
+            else self._limits.hard_normal_forces(problem.contacts)
         )
         self._finite_bounds = _finite(self._constant_bounds)
 
@@ -84,7 +85,7 @@ class UserTerms:
         contact_size = sum(
             len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts
         )
-        zeros = np.zeros(contact_size + 3 * len(self._tasks) + 2 * len(self._limits.inequalities))
+        zeros = np.zeros(contact_size + 3 * len(self._tasks) + 3 * len(self._inequalities))
         return TickInputs(
             np.concatenate([targets, *self._finite_bounds, zeros]),
             normal_forces=self._constant_bounds,
@@ -96,7 +97,7 @@ class UserTerms:
         Raises `InputError`, or what user functions raise.
         """
         problem, limits = self._problem, self._limits
-        bounds = limits.normal_forces(problem.contacts, t)
+        bounds = limits.hard_normal_forces(problem.contacts, t)
         packed: list[npt.ArrayLike] = [
             targets,
             *(_finite(bounds) if limits.time_varying else self._finite_bounds),
@@ -117,12 +118,12 @@ class UserTerms:
             residuals[i], A, b = (weight, residual), residual.A, residual.b
             n_user_rows += len(b)
             packed += (block, len(b), weight), A.ravel(), b
-        for each in limits.inequalities:
+        for each in self._inequalities:
             G, h = each.at(eom, t)
             if each.row_names:
                 each.labels(len(h))  # raises if their number does not match
             inequalities.append((G, h))
-            packed += (BLOCKS.index(each.block), len(h)), G.ravel(), h
+            packed += (BLOCKS.index(each.block), len(h), each.weight or 0.0), G.ravel(), h
         return TickInputs(
             np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
         )

@@ -1,0 +1,353 @@
+"""Joint limits: bounds on q̈ that keep positions, velocities and accelerations within limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._validation import (
+    Array,
+    Value,
+    as_instance,
+    as_positive,
+    cached_property,
+    checked,
+    numeric_copy,
+    read_only,
+    short_repr,
+)
+from floatbase.errors import InputError
+from floatbase.qp import ConstraintLabel
+from floatbase.robots import Robot, State
+from floatbase.robots._checks import joint_limits as position_limits
+
+# fraction of a motor's acceleration in the standing posture that a joint can surely brake with:
+# gravity, other joints and other postures need the rest
+_BRAKING_FRACTION = 0.5
+# rad/s² or m/s²: a leg that carries the robot brakes its joints no faster
+_MAX_BRAKING = 300.0
+# s: bounds for a longer control period also hold for shorter ones, and the slowest loops run at
+# 250 Hz
+_CONTROL_PERIOD = 4e-3
+_KINDS = ("position", "velocity", "acceleration")
+
+
+def _as_bounds(name: str, value: Any) -> Array:
+    """Return a vector of numbers or infinities, checked."""
+    bounds = numeric_copy(value)
+    if bounds is None or bounds.ndim != 1 or np.any(np.isnan(bounds)):
+        raise InputError(
+            f"{name} must have one number per joint, or inf, but it is {short_repr(value)}."
+        )
+    return read_only(bounds)
+
+
+def _as_magnitudes(name: str, value: Any) -> Array:
+    """Return a vector of positive numbers or inf, checked."""
+    bounds = _as_bounds(name, value)
+    if not np.all(bounds > 0.0):
+        raise InputError(f"{name} must be positive, but its least entry is {bounds.min():g}.")
+    return bounds
+
+
+def as_weight(name: str, value: Any) -> float | None:
+    """Return the weight of a soft constraint, or None for a hard one, checked.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, for messages.
+    value : object
+        The argument.
+
+    Returns
+    -------
+    float or None
+        The weight.
+
+    Raises
+    ------
+    InputError
+        If it is not a positive number.
+    """
+    return None if value is None else as_positive(name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits(Value):
+    """Position, velocity and acceleration limits of the actuated joints.
+
+    `of` makes the limits of a robot, and `dataclasses.replace` changes some of them.
+
+    Parameters
+    ----------
+    lower, upper : array_like, shape (d,)
+        Position limits [rad or m]; -inf and inf for none.
+    velocity : array_like, shape (d,)
+        Largest speeds [rad/s or m/s]; inf for none.
+    acceleration : array_like, shape (d,)
+        Largest accelerations in both directions [rad/s² or m/s²]; inf for none.
+    braking : array_like, shape (d,)
+        Decelerations with which the joints can stop in any state [rad/s² or m/s²]. Limits never
+        demand more.
+    period : float, optional
+        Control period [s]. The limits also hold for shorter periods.
+    weight : float, optional
+        None makes the limits hard. A number makes them soft: their violation times this weight is
+        added to the objective [units of the objective per rad/s² or m/s²].
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit, if a lower limit is above its upper limit, or if a value is not
+        positive.
+
+    Notes
+    -----
+    A position limit is useless in a controller unless the joint can stop before the limit. `bounds`
+    therefore limits q̈ so that, after one control period, the joint is in a state from which it can
+    stop in time with the acceleration `braking`. Such states are called viable [DelPrete2018]_.
+    """
+
+    _example = "floatbase.control.JointLimits.of(robot)"
+    lower: Array = field(metadata=checked(_as_bounds))
+    upper: Array = field(metadata=checked(_as_bounds))
+    velocity: Array = field(metadata=checked(_as_magnitudes))
+    acceleration: Array = field(metadata=checked(_as_magnitudes))
+    braking: Array = field(metadata=checked(_as_magnitudes))
+    period: float = field(default=_CONTROL_PERIOD, metadata=checked(as_positive, "s"))
+    weight: float | None = field(default=None, metadata=checked(as_weight))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        sizes = {
+            name: len(getattr(self, name))
+            for name in ("lower", "upper", "velocity", "acceleration", "braking")
+        }
+        if len(set(sizes.values())) > 1:
+            raise InputError(f"Joint limits need one number per joint, but the sizes are {sizes}.")
+        if np.any(self.lower > self.upper):
+            joint = int(np.argmax(self.lower > self.upper))
+            raise InputError(
+                f"The lower limit of joint {joint}, {self.lower[joint]:g}, is above its upper "
+                f"limit, {self.upper[joint]:g}."
+            )
+        if not np.all(np.isfinite(self.braking)):
+            raise InputError("braking must be finite.")
+
+    @classmethod
+    def of(cls, robot: Robot, **changes: Any) -> JointLimits:
+        """Return the limits in a robot's URDF.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot. Joints without position or velocity limits in the URDF have none.
+        **changes
+            Parameters of the class that differ, such as velocity=... or weight=1e4.
+
+        Returns
+        -------
+        JointLimits
+            The limits. The URDF has no acceleration limits. `braking` is half of the acceleration
+            that each motor gives its joint in the standing posture with the base fixed, and at
+            most 300 rad/s².
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type, shape or value.
+        """
+        limits = _limits_of(as_instance("robot", robot, Robot, 'fb.load("go2")'))
+        unknown = [name for name in changes if name not in cls.__dataclass_fields__]
+        if unknown:
+            raise InputError(
+                f"JointLimits has no parameter {unknown[0]!r}. It has "
+                f"{', '.join(cls.__dataclass_fields__)}."
+            )
+        limits = replace(limits, **changes)
+        limits.check_size(robot)
+        return limits
+
+    def check_size(self, robot: Robot) -> None:
+        """Check that the limits have one number per joint of a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Raises
+        ------
+        InputError
+            If they have not.
+        """
+        if len(self.lower) != robot.d:
+            raise InputError(
+                f"The joint limits are for {len(self.lower)} joints, but {robot.name} has {robot.d}."
+            )
+
+    @cached_property
+    def bounded(self) -> npt.NDArray[np.bool_]:
+        """Whether q̈ has an upper and a lower bound, shape (2, d)."""
+        other = np.isfinite(self.velocity) | np.isfinite(self.acceleration)
+        return np.array([np.isfinite(self.upper) | other, np.isfinite(self.lower) | other])
+
+    def bounds(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
+        """Return the least and the largest joint acceleration that keep the joints viable.
+
+        Parameters
+        ----------
+        q : array_like, shape (d,)
+            Joint positions [rad or m].
+        v : array_like, shape (d,)
+            Joint velocities [rad/s or m/s].
+
+        Returns
+        -------
+        least, largest : ndarray, shape (d,)
+            Bounds of the joint accelerations [rad/s² or m/s²]; -inf and inf for none.
+        """
+        q, v = np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)
+        largest = self._upper_bounds(self.upper - q, v)[0]
+        least = -self._upper_bounds(q - self.lower, -v)[0]
+        middle = 0.5 * (least + largest)  # if they exclude each other, as in a locked joint
+        conflict = least > largest
+        return np.where(conflict, middle, least), np.where(conflict, middle, largest)
+
+    def _upper_bounds(self, gap: Array, v: Array) -> tuple[Array, npt.NDArray[np.intp]]:
+        """Return the largest accelerations towards a limit, (d,), and the index of their kind.
+
+        gap: distance to the limit [rad or m], (d,). v: velocity towards it [rad/s or m/s], (d,).
+        """
+        dt, brake = self.period, np.minimum(self.braking, self.acceleration)
+        stop = -v / dt  # at rest after one period
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # the position after one period, or at the turning point if the joint turns before that
+            reach = 2.0 * (gap - v * dt) / dt**2
+            turning = np.where(gap > 0.0, -(v**2) / (2.0 * gap), -np.inf)
+            position = np.where((v > 0.0) & (reach <= stop), np.minimum(stop, turning), reach)
+            # the position at which the joint stops if it brakes after one period
+            square = brake * (8.0 * gap - 4.0 * v * dt + brake * dt**2)
+            viable = (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt)
+        viable = np.where(square >= 0.0, np.maximum(viable, stop), stop)
+        position = np.where(np.isfinite(gap), np.minimum(position, viable), np.inf)
+        each = np.array([position, (self.velocity - v) / dt, self.acceleration])
+        return np.maximum(each.min(axis=0), -brake), each.argmin(axis=0)
+
+    def labels(self, names: tuple[str, ...], q: Array, v: Array) -> tuple[ConstraintLabel, ...]:
+        """Return the names of the upper bounds, then of the lower bounds.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Names of the joints.
+        q : ndarray, shape (d,)
+            Joint positions [rad or m].
+        v : ndarray, shape (d,)
+            Joint velocities [rad/s or m/s].
+
+        Returns
+        -------
+        tuple of ConstraintLabel
+            Names such as "FL_calf_joint position upper", for bounded joints only. The second word
+            says which limit is the strictest in this state.
+        """
+        upper, lower = self._upper_bounds(self.upper - q, v), self._upper_bounds(q - self.lower, -v)
+        return tuple(
+            ConstraintLabel(
+                f"{names[joint]} {_KINDS[kinds[joint]]} {side}",
+                f"{side} {_KINDS[kinds[joint]]} limit",
+                names[joint],
+            )
+            for side, (_, kinds), bounded in zip(
+                ("upper", "lower"), (upper, lower), self.bounded, strict=True
+            )
+            for joint in np.flatnonzero(bounded)
+        )
+
+    def rows(self, state: State) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
+        """Return G, h and names of the inequalities G q̈ ≤ h at a state.
+
+        Parameters
+        ----------
+        state : State
+            State of a robot with d joints.
+
+        Returns
+        -------
+        G : ndarray, shape (m, nv)
+            Coefficients.
+        h : ndarray, shape (m,)
+            Right-hand side [rad/s² or m/s²].
+        names : tuple of ConstraintLabel
+            Names of the rows.
+        """
+        robot = state.robot
+        q, v = joint_positions(robot, state.q), state.v[robot.nv - robot.d :]
+        least, largest = self.bounds(q, v)
+        upper, lower = self.bounded
+        h = np.concatenate([largest[upper], -least[lower]])
+        return _selection(robot, self), h, self.labels(robot.joint_names, q, v)
+
+
+def joint_positions(robot: Robot, q: Array) -> Array:
+    """Return the positions of the actuated joints, NaN for joints without limits on a circle.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot with d joints.
+    q : ndarray, shape (nq,)
+        Configuration.
+
+    Returns
+    -------
+    ndarray, shape (d,)
+        Positions [rad or m].
+    """
+    index = _position_indices(robot)
+    return np.where(index >= 0, q[index], np.nan)
+
+
+@lru_cache(maxsize=64)
+def _position_indices(robot: Robot) -> npt.NDArray[np.intp]:
+    """Return where each joint's position is in q, -1 if q has its cosine and sine instead."""
+    model = robot.model
+    first = model.njoints - robot.d
+    sizes, starts = np.array(model.nqs)[first:], np.array(model.idx_qs)[first:]
+    return np.where(sizes == 1, starts, -1)
+
+
+@lru_cache(maxsize=64)
+def _selection(robot: Robot, limits: JointLimits) -> Array:
+    """Return G of the bounded joints' upper, then lower bounds, shape (m, nv)."""
+    rows = np.eye(robot.nv)[robot.nv - robot.d :]
+    upper, lower = limits.bounded
+    return read_only(np.vstack([rows[upper], -rows[lower]]))
+
+
+@lru_cache(maxsize=64)
+def _limits_of(robot: Robot) -> JointLimits:
+    """Return the limits in a robot's URDF."""
+    model, d = robot.model, robot.d
+    lower, upper = np.full(robot.nq, -np.inf), np.full(robot.nq, np.inf)
+    _, index, least, largest = position_limits(model)
+    lower[index], upper[index] = least, largest
+    at = _position_indices(robot)
+    velocity = np.array(model.velocityLimit[robot.nv - d :])
+    inertia = pin.crba(model, model.createData(), np.array(robot.posture)).diagonal()
+    return JointLimits(
+        lower=np.where(at >= 0, lower[at], -np.inf),
+        upper=np.where(at >= 0, upper[at], np.inf),
+        velocity=np.where(velocity > 0.0, velocity, np.inf),  # 0: not in the URDF
+        acceleration=np.full(d, np.inf),
+        braking=np.minimum(
+            _BRAKING_FRACTION * robot.torque_limits / inertia[robot.nv - d :], _MAX_BRAKING
+        ),
+    )
