@@ -22,12 +22,11 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.control.command import Command
-from floatbase.control.joint_limits import JointLimits
+from floatbase.control.joint_limits import SOFT_LIMIT_WEIGHT, JointLimits
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
 from floatbase.control.problem import ModifyQP, Problem, dry_run
 from floatbase.control.soft import (
     SOFT_CONTACT_WEIGHT,
-    SOFT_LIMIT_WEIGHT,
     contact_weight_of,
     with_soft_contacts,
 )
@@ -78,7 +77,8 @@ class WholeBodyController:
         User-defined inequality constraints on q̈, τ or λ.
     joint_limits : JointLimits or {"robot"}, optional
         Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
-        `JointLimits.of(robot)`. None switches them off.
+        `JointLimits.of(robot)`, as soft constraints: they hold in every state in which torques and
+        contacts allow it. None switches them off.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation
         times this weight is added to the objective [1/N].

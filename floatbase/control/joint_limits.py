@@ -26,11 +26,19 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits as position_limits
 
+# per rad/s², m/s² or N: multipliers of hard limits stay below 1e3 while the tasks' weights are 10
+SOFT_LIMIT_WEIGHT = 1e4
 # fraction of a motor's acceleration in the standing posture that a joint can surely brake with:
 # gravity, other joints and other postures need the rest
 _BRAKING_FRACTION = 0.5
 # rad/s² or m/s²: a leg that carries the robot brakes its joints no faster
 _MAX_BRAKING = 300.0
+# multiple of `braking` that a bound may demand: without a reserve, a joint that is faster than
+# planned would not stop in time
+_RESERVE = 2.0
+# fraction of a speed limit: torques are constant in a control period, so a joint gets faster than
+# planned (go2's thigh by 0.3 % at 30 rad/s and 4 ms)
+_SPEED_MARGIN = 3e-3
 # s: bounds for a longer control period also hold for shorter ones, and the slowest loops run at
 # 250 Hz
 _CONTROL_PERIOD = 4e-3
@@ -93,13 +101,14 @@ class JointLimits(Value):
     acceleration : array_like, shape (d,)
         Largest accelerations in both directions [rad/s² or m/s²]; inf for none.
     braking : array_like, shape (d,)
-        Decelerations with which the joints can stop in any state [rad/s² or m/s²]. Limits never
-        demand more.
+        Decelerations with which the joints stop [rad/s² or m/s²]. Limits demand at most twice as
+        much, if a joint is faster than planned.
     period : float, optional
         Control period [s]. The limits also hold for shorter periods.
     weight : float, optional
-        None makes the limits hard. A number makes them soft: their violation times this weight is
-        added to the objective [units of the objective per rad/s² or m/s²].
+        Weight of a violation in the objective [units of the objective per rad/s² or m/s²]. The
+        limits hold as long as torques and contacts allow it. None makes the limits hard: if they
+        cannot hold, the QP has no solution.
 
     Raises
     ------
@@ -121,7 +130,7 @@ class JointLimits(Value):
     acceleration: Array = field(metadata=checked(_as_magnitudes))
     braking: Array = field(metadata=checked(_as_magnitudes))
     period: float = field(default=_CONTROL_PERIOD, metadata=checked(as_positive, "s"))
-    weight: float | None = field(default=None, metadata=checked(as_weight))
+    weight: float | None = field(default=SOFT_LIMIT_WEIGHT, metadata=checked(as_weight))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -193,6 +202,19 @@ class JointLimits(Value):
             )
 
     @cached_property
+    def decelerations(self) -> tuple[Array, Array]:
+        """Planned and largest deceleration in front of a position limit, (d,) each [rad/s², m/s²]."""
+        return (
+            np.minimum(self.braking, self.acceleration),
+            np.minimum(_RESERVE * self.braking, self.acceleration),
+        )
+
+    @cached_property
+    def speeds(self) -> Array:
+        """Speeds that the bounds on q̈ use, a little below the limits, (d,) [rad/s or m/s]."""
+        return read_only((1.0 - _SPEED_MARGIN) * self.velocity)
+
+    @cached_property
     def bounded(self) -> npt.NDArray[np.bool_]:
         """Whether q̈ has an upper and a lower bound, shape (2, d)."""
         other = np.isfinite(self.velocity) | np.isfinite(self.acceleration)
@@ -225,7 +247,7 @@ class JointLimits(Value):
 
         gap: distance to the limit [rad or m], (d,). v: velocity towards it [rad/s or m/s], (d,).
         """
-        dt, brake = self.period, np.minimum(self.braking, self.acceleration)
+        dt, (brake, most) = self.period, self.decelerations
         stop = -v / dt  # at rest after one period
         with np.errstate(invalid="ignore", divide="ignore"):
             # the position after one period, or at the turning point if the joint turns before that
@@ -237,8 +259,8 @@ class JointLimits(Value):
             viable = (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt)
         viable = np.where(square >= 0.0, np.maximum(viable, stop), stop)
         position = np.where(np.isfinite(gap), np.minimum(position, viable), np.inf)
-        each = np.array([position, (self.velocity - v) / dt, self.acceleration])
-        return np.maximum(each.min(axis=0), -brake), each.argmin(axis=0)
+        each = np.array([position, (self.speeds - v) / dt, self.acceleration])
+        return np.maximum(each.min(axis=0), -most), each.argmin(axis=0)
 
     def labels(self, names: tuple[str, ...], q: Array, v: Array) -> tuple[ConstraintLabel, ...]:
         """Return the names of the upper bounds, then of the lower bounds.

@@ -21,7 +21,6 @@ from floatbase.objectives import Task
 from floatbase.robots import State
 
 SOFT_CONTACT_WEIGHT = 1e4  # weight of the motion of soft contacts; tasks have a weight of 10
-SOFT_LIMIT_WEIGHT = 1e4  # of soft limits per m/s², rad/s² or N; multipliers of limits are below 1e3
 
 
 @dataclass(frozen=True, eq=False)

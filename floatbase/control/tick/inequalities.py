@@ -49,11 +49,11 @@ class Inequalities(NamedTuple):
 
 
 @jit
-def largest_acceleration(gap, v, speed, acceleration, brake, dt):
+def largest_acceleration(gap, v, speed, acceleration, brake, most, dt):
     """Return the largest joint acceleration towards a limit, as `JointLimits.bounds` does.
 
-    gap: distance to the limit. v: velocity towards it. speed, acceleration: limits. brake: braking
-    acceleration. dt: control period, s.
+    gap: distance to the limit. v: velocity towards it. speed, acceleration: limits. brake, most:
+    planned and largest deceleration. dt: control period, s.
     """
     bound = min(acceleration, (speed - v) / dt)
     if gap < np.inf:
@@ -64,25 +64,25 @@ def largest_acceleration(gap, v, speed, acceleration, brake, dt):
         if square >= 0.0:
             viable = max(stop, (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt))
         bound = min(bound, position, viable)
-    return max(bound, -brake)
+    return max(bound, -most)
 
 
 @jit
 def joint_bounds(q, v, tree, table, dt, least, largest):
     """Write the bounds of the joint accelerations into least and largest, (d,).
 
-    tree: as in `Bodies`. table: (5, d), lower and upper position limits, speeds, accelerations and
-    braking accelerations. dt: control period, s.
+    tree: as in `Bodies`. table: (6, d), lower and upper position limits, speeds, accelerations,
+    planned and largest decelerations. dt: control period, s.
     """
     d = least.size
     for j in range(d):
         joint = tree.shape[0] - d + j
         x, speed = q[tree[joint, 3]], v[tree[joint, 1]]
         largest[j] = largest_acceleration(
-            table[1, j] - x, speed, table[2, j], table[3, j], table[4, j], dt
+            table[1, j] - x, speed, table[2, j], table[3, j], table[4, j], table[5, j], dt
         )
         least[j] = -largest_acceleration(
-            x - table[0, j], -speed, table[2, j], table[3, j], table[4, j], dt
+            x - table[0, j], -speed, table[2, j], table[3, j], table[4, j], table[5, j], dt
         )
         if least[j] > largest[j]:
             least[j] = largest[j] = 0.5 * (least[j] + largest[j])

@@ -175,11 +175,11 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
 
 
 def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array]:
-    """Return the table (5, d) of `inequalities.joint_bounds`, then control period and weight."""
+    """Return the table (6, d) of `inequalities.joint_bounds`, then control period and weight."""
     if limits is None:
-        return np.zeros((5, d)), np.zeros(2)
-    braking = np.minimum(limits.braking, limits.acceleration)
-    table = np.array([limits.lower, limits.upper, limits.velocity, limits.acceleration, braking])
+        return np.zeros((6, d)), np.zeros(2)
+    maxima = limits.speeds, limits.acceleration, *limits.decelerations
+    table = np.array([limits.lower, limits.upper, *maxima])
     return table, np.array([limits.period, limits.weight or 0.0])
 
 

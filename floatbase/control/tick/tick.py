@@ -64,7 +64,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, least, largest, saturate
     tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, sizes[10], n_user_rows)
     cones = take_matrix(float_tables, n_points * n_rows, 5)
     torque_limits = take_vector(float_tables, d)
-    joint_limits, period_and_weight = take_matrix(float_tables, 5, d), take_vector(float_tables, 2)
+    joint_limits, period_and_weight = take_matrix(float_tables, 6, d), take_vector(float_tables, 2)
     limits = Inequalities(
         cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11],
         sizes[13] == 1, sizes[14] == 1, least, largest, period_and_weight[1], saturated,
