@@ -44,7 +44,7 @@ def test_the_solution_is_that_of_a_qp_with_rows_from_pinocchio_and_qhull(name: s
     contacts, standing = judges.stance(robot), robot.standing()
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        margin, horizon = rng.uniform(0.0, 0.03), rng.uniform(0.01, 0.1)
+        horizon = rng.uniform(0.01, 0.1)
         at, v = robot.random_state(seed, 0.03), np.zeros(robot.nv)
         v[:2] = rng.normal(0.0, 0.05, 2)
         state = at.replace(v=v)
@@ -53,14 +53,15 @@ def test_the_solution_is_that_of_a_qp_with_rows_from_pinocchio_and_qhull(name: s
             *fb.standing_tasks(standing)[1:],
             fb.ForceTask(weight=1e-4),
         ]
+        (A, b), edges = position_after(state, contacts, horizon), polygon(state, contacts)
+        depth = -np.max(edges[:, :2] @ b + edges[:, 2])
+        margin = rng.uniform(0.8, 1.0) * max(depth, 0.0)
         inequality = capture_point_inequality(margin, horizon)
         both = judges.pair(robot, contacts, tasks, inequalities=[inequality])
         assert judges.difference(*both, state) < judges.agreement(robot)
 
         qp = fb.WholeBodyController(robot, contacts, tasks).qp(state)
         x = cvxpy.Variable(qp.n)
-        A, b = position_after(state, contacts, horizon)
-        edges = polygon(state, contacts)
         problem = cvxpy.Problem(
             cvxpy.Minimize(0.5 * cvxpy.quad_form(x, cvxpy.psd_wrap(qp.H)) + qp.g @ x),
             [
