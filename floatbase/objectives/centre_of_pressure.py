@@ -41,6 +41,10 @@ class CentreOfPressureTask(TargetTask):
     angular momentum, c̈ = ω² (c - p), with ω = √(g / height). So a fixed target lets the robot fall,
     and tasks for both compete unless their targets satisfy this equation, as those of
     `floatbase.behaviours.LIPM` do.
+
+    The task leaves most of λ open. Add a `ForceTask` with a small weight, in particular with flat
+    feet: otherwise the forces are not unique, and the compiled backend may leave control steps to
+    the slower reference backend.
     """
 
     position: Target
