@@ -42,7 +42,7 @@ class Gains(Value):
     com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
     base: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
     swing: tuple[float, float] = field(default=(900.0, 10.0), metadata=checked(_as_gains))
-    posture: tuple[float, float] = field(default=(100.0, 1e-2), metadata=checked(_as_gains))
+    posture: tuple[float, float] = field(default=(100.0, 1e-3), metadata=checked(_as_gains))
 
     @staticmethod
     def for_contacts(contacts: Contacts) -> Gains:
@@ -60,7 +60,7 @@ class Gains(Value):
         """
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return (
-            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
+            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2)) if flat else Gains()
         )
 
 
