@@ -60,7 +60,9 @@ class Gains(Value):
         """
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return (
-            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2)) if flat else Gains()
+            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2))
+            if flat
+            else Gains()
         )
 
 
