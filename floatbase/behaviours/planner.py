@@ -16,7 +16,7 @@ from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.lipm import LIPM, ZMPSegment
 from floatbase.behaviours.options import flat_foot_names
 from floatbase.behaviours.reference import Reference, SwingState, rotated_by_yaw, yaw_of
-from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY, leg_length
+from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY
 from floatbase.behaviours.swing import Swing
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
@@ -89,8 +89,6 @@ class Planner:
     nominal_feet : dict of str to ndarray, shape (3,)
         Position of each foot's frame in the standing posture, relative to the middle of the feet on
         the ground [m].
-    leg_lengths : dict of str to float
-        Largest distance of each ball foot from the first joint of its leg [m].
     omega : float
         Natural frequency of the pendulum [1/s].
     """
@@ -105,11 +103,6 @@ class Planner:
         )
         self.nominal_feet = {
             name: position - [*centre, 0.0] for name, position in positions.items()
-        }
-        self.leg_lengths = {
-            foot: leg_length(standing_state, foot)
-            for foot in positions
-            if foot not in self.flat_feet
         }
         ground = float(contacts.positions(standing_state)[:, 2].mean())
         self.omega = sqrt(standing_state.robot.gravity / (standing_state.com[2] - ground))

@@ -376,7 +376,7 @@ class Walk:
             self._gait,
             self._standing_state,
             self._planner.nominal_feet,
-            self._planner.leg_lengths,
+            self._planner.flat_feet,
             self._reach,
             np.array([*self._velocity, self._yaw_rate]),
         )

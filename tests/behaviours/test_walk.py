@@ -731,17 +731,6 @@ def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
     assert record.outcome == "completed" and tilt(record) < 2.0
 
 
-@pytest.mark.parametrize("velocity", [(0.0, 0.2), (-0.3, 0.0)])
-def test_a_crawl_stays_upright_within_the_limits_of_its_knees(
-    velocity: tuple[float, float],
-) -> None:
-    """The knees of go2 reached their limits, and the body tilted by 10°."""
-    with warns(SimulationWarning, "go2", 2.0):
-        walk = walk_of("go2", Gait.crawl, velocity)
-    record = run(walk, 6.0)
-    assert record.outcome == "completed" and tilt(record) < 5.0
-
-
 def test_the_posture_task_does_not_slow_a_trot_with_short_legs() -> None:
     """It held the swinging legs of solo12 back, and the robot walked at 0.37 m/s."""
     walk = walk_of("solo12", Gait.trot, (0.5, 0.0))
