@@ -36,7 +36,8 @@ class Gains(Value):
     swing : (float, float), optional
         Stiffness kp [1/s²] and weight [-] of the tasks on swinging feet.
     posture : (float, float), optional
-        Stiffness kp [1/s²] and weight [-] of the posture task.
+        Stiffness kp [1/s²] and weight [-] of the posture task. The swinging legs of a small robot
+        need large joint accelerations, so a large weight disturbs the centre of mass.
     """
 
     com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))

@@ -720,7 +720,7 @@ def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
 def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
     velocity: tuple[float, float],
 ) -> None:
-    """The legs were stretched at lift-off, and the posture task held the swinging legs back."""
+    """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
     robot = hexapod()
     offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
     with warnings.catch_warnings():
@@ -732,6 +732,6 @@ def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
 
 
 def test_the_posture_task_does_not_slow_a_trot_with_short_legs() -> None:
-    """It held the swinging legs of solo12 back, and the robot walked at 0.37 m/s."""
+    """It moved the centre of mass of solo12 away from its plan; the robot walked at 0.38 m/s."""
     walk = walk_of("solo12", Gait.trot, (0.5, 0.0))
     assert np.allclose(speed(run(walk, 4.0), 2.0, 3.5), [0.5, 0.0], atol=0.02)
