@@ -103,8 +103,7 @@ class Gait(Value):
             A robot with four feet.
         swing : float, optional
             Time that a foot spends in the air [s]. An error of the capture point grows by e^{ω
-            swing} meanwhile, with `Walk.omega`, so low or fast robots need shorter swings. For
-            example, solo12 walks at 0.5 m/s with 0.2 s, but at 0.37 m/s with 0.25 s.
+            swing} meanwhile, with `Walk.omega`, so low or fast robots need shorter swings.
         pause : float, optional
             Time on all feet after each swing [s].
         start : float, optional

@@ -36,13 +36,14 @@ class Gains(Value):
     swing : (float, float), optional
         Stiffness kp [1/s²] and weight [-] of the tasks on swinging feet.
     posture : (float, float), optional
-        Stiffness kp [1/s²] and weight [-] of the posture task.
+        Stiffness kp [1/s²] and weight [-] of the posture task. The swinging legs of a small robot
+        need large joint accelerations, so a large weight disturbs the centre of mass.
     """
 
     com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
     base: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
     swing: tuple[float, float] = field(default=(900.0, 10.0), metadata=checked(_as_gains))
-    posture: tuple[float, float] = field(default=(100.0, 1e-2), metadata=checked(_as_gains))
+    posture: tuple[float, float] = field(default=(100.0, 1e-3), metadata=checked(_as_gains))
 
     @staticmethod
     def for_contacts(contacts: Contacts) -> Gains:
@@ -60,7 +61,9 @@ class Gains(Value):
         """
         flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
         return (
-            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0)) if flat else Gains()
+            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2))
+            if flat
+            else Gains()
         )
 
 

@@ -7,6 +7,7 @@ from math import sqrt
 
 import numpy as np
 
+from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array
 from floatbase.behaviours.gait import Gait
 from floatbase.robots import State
@@ -31,8 +32,9 @@ def speed_fractions(
 
     During its stance, a foot moves from half a step in front of its nominal position to half a step
     behind it. Half a step must be at most `reach`. A ball foot must also stay within the length of
-    its leg, while the body shifts to the middle of the standing feet. In the first period, a foot
-    stays in its nominal position until its first lift-off, while the body accelerates.
+    its leg, while the body shifts to the middle of the standing feet. The leg is longest soon after
+    lift-off, because the foot starts slowly. In the first period, a foot stays in its nominal
+    position until its first lift-off, while the body accelerates.
 
     Parameters
     ----------
@@ -54,23 +56,25 @@ def speed_fractions(
         return 1.0, 1.0
     first_fraction, fraction = 1.0, 1.0
     wait, shifts = max(gait.offsets.values()) * gait.period, _weight_shifts(gait, nominal_feet)
+    half_stance = (gait.period - gait.swing) / 2.0
+    longest = half_stance + _swing_lag(gait)
     for foot in gait.feet:
         x, y = nominal_feet[foot][:2]
         velocity = motion[:2] + motion[2] * np.array([-y, x])
-        speed, limit = float(np.linalg.norm(velocity)), reach
+        speed = float(np.linalg.norm(velocity))
         if speed == 0.0:
             continue
+        fraction = min(fraction, reach / (half_stance * speed))
         if foot not in flat_feet:
             direction = velocity / speed
             shift = float(np.abs(shifts @ direction).max())
             leg_limit = max(_leg_reach(state, foot, direction) - shift, 0.0)
-            limit = min(limit, leg_limit)
+            fraction = min(fraction, leg_limit / (longest * speed))
             # at 1 m/s², the distance after `wait` is speed wait - speed² / 2
             if wait**2 > 2.0 * leg_limit:
                 first_fraction = min(
                     first_fraction, (wait - sqrt(wait**2 - 2.0 * leg_limit)) / speed
                 )
-        fraction = min(fraction, 2.0 * limit / ((gait.period - gait.swing) * speed))
     return min(first_fraction, fraction), fraction
 
 
@@ -94,6 +98,16 @@ def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
         if len(standing) > 2:
             shifts.append(np.mean(standing, axis=0) - middle)
     return np.array(shifts)
+
+
+def _swing_lag(gait: Gait) -> float:
+    """Return how long after lift-off the distance from the body to the foot grows, in effect [s].
+
+    Times the speed, this is the distance beyond half a step. The body moves by speed t, and the
+    foot by minimum jerk to the end of a step of length speed period.
+    """
+    phases = np.linspace(0.0, 1.0, 33)
+    return float(max(u * gait.swing - minimum_jerk(u)[0] * gait.period for u in phases))
 
 
 def _leg_reach(state: State, foot: str, direction: Array) -> float:

@@ -17,7 +17,7 @@ from floatbase.errors import FloatbaseError, ViewerError, unknown_name
 from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
-from floatbase.playground.panel import Panel
+from floatbase.playground.panel import WALKING, Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
 from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import SETTING_NAMES, Settings
@@ -31,6 +31,8 @@ from floatbase.viewer.export.recording import push_at
 _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
+_DEFAULT_PUSH = 60.0  # N: go2 moves visibly, and all robots of the catalogue keep standing
+_LARGEST_DEFAULT_PUSH = 0.4  # times the weight, for light robots
 _MAX_HISTORY = 100  # changes that `undo` remembers
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
@@ -112,7 +114,7 @@ class Playground:
     @property
     def _default_push(self) -> float:
         """Initial force of the push [N]."""
-        return 0.1 * self.robot.weight
+        return min(_DEFAULT_PUSH, _LARGEST_DEFAULT_PUSH * self.robot.weight)
 
     def start(self) -> Playground:
         """Show the robot and start the run.
@@ -354,6 +356,8 @@ class Playground:
                 self.view.add_text("challenge", f"{judge.challenge.text}\n{judge.message}")
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
+            if self._panel.has_gaits:
+                self.view.add_text("speed limit", self.session.speed_limit, WALKING)
             self.view.add_text(
                 "code", self.session.code(self.last_push), "Python program", code=True
             )

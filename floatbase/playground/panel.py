@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _MAX_PUSH = 2.5  # times the weight: such a push requires steps
 _PAIRED = "model and reality"  # section of sliders with one column for each
 _STANCE = "stance"
-_WALKING = "walking"
+WALKING = "walking"
 _QP = "quadratic program"
 
 
@@ -59,9 +59,9 @@ _STANCE_SLIDERS = tuple(
 )
 _NOD_SLIDER = _Slider("nodding [rad]", "nod", None, 0.0, 0.35, 0.01, _STANCE)
 _STEP_SLIDERS = (
-    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, _WALKING),
-    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, _WALKING),
-    _Slider("turn left [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, _WALKING),
+    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, WALKING),
+    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, WALKING),
+    _Slider("turn left [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, WALKING),
 )
 _QP_SLIDERS = (
     _Slider("facets", "facets", None, 3, 16, 1, _QP),
@@ -116,10 +116,10 @@ class Panel:
             view.add_checkbox(f"stand on {foot.frame}", changed, stands, _STANCE)
         self._add_sliders(_STANCE_SLIDERS)
         self._add_slider(_NOD_SLIDER, play.set_nodding)
-        if self._gait_names:
+        if self.has_gaits:
             choices = ["stand", "step when pushed", *self._gait_names]
             number = self._gait_number(settings)
-            view.add_dropdown("gait", self._set_gait, choices, number, _WALKING)
+            view.add_dropdown("gait", self._set_gait, choices, number, WALKING)
             self._add_sliders(_STEP_SLIDERS)
         self._add_sliders(_QP_SLIDERS)
         self._add_terms()
@@ -184,6 +184,11 @@ class Panel:
         self._playground.force = force
         if force:
             self._playground.push(force)
+
+    @property
+    def has_gaits(self) -> bool:
+        """Whether the panel has controls for walking."""
+        return self._playground.robot.is_floating and bool(self._gait_names)
 
     @property
     def _gait_names(self) -> list[str]:

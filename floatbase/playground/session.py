@@ -85,6 +85,18 @@ class Session:
         )
         return inner if isinstance(inner, Walk) else None
 
+    @property
+    def speed_limit(self) -> str:
+        """Sentence with the velocity at which the robot walks, if it is limited; otherwise ""."""
+        walk = self.walk
+        if self.settings.gait is None or walk is None or walk.speed_fraction == 1.0:
+            return ""
+        x, y, yaw_rate = walk.speed_fraction * np.array(self.settings.velocity)
+        return (
+            f"The legs are too short for this speed. It is limited to {walk.speed_fraction:.0%}: "
+            f"{x:.2f} m/s forwards, {y:.2f} m/s to the left, {yaw_rate:.2f} rad/s."
+        )
+
     def code(self, push: Push | None = None) -> str:
         """Write a program that makes and runs the same robot for 3 s, from its standing posture.
 

@@ -30,6 +30,7 @@ from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.state import State
 from floatbase.robots.urdf import (
     check_urdf,
     parse_urdf,
@@ -44,6 +45,10 @@ PLATE_SIZE = (
 )  # width and thickness, m, of the plate on which `with_floating_base` places a robot
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
+_BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
+# ratio of a leg's smallest to its largest singular value at which it is singular: about sin θ / 5
+# for two equal links that are θ from straight, so this is 3°
+_MIN_SINGULAR_VALUE = 0.01
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
 
@@ -212,7 +217,8 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture.
+        If the motors of a fixed-base robot are too weak to hold its posture, or if no posture is
+        given and a leg of a floating-base robot is straight or otherwise singular.
     """
     urdf, directories = (
         as_string("path", str(path) if isinstance(path, Path) else path),
@@ -247,6 +253,8 @@ def load_urdf(
         feet=_as_feet(feet, foot_radius),
     )
     _warn_if_motors_are_weak(robot)
+    if posture is None:
+        _warn_if_legs_are_singular(robot)
     return robot
 
 
@@ -370,6 +378,36 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         message = (
             f"{robot.name} will sink: its motors are too weak to hold its posture against "
             f"gravity (N·m or N): {', '.join(weak)}."
+        )
+        warnings.warn(message, RobotWarning, stacklevel=3)
+
+
+def _warn_if_legs_are_singular(robot: Robot) -> None:
+    """Warn if a foot of a floating-base robot moves in fewer directions than with a bent leg.
+
+    The warning points at the code that called the loading function.
+    """
+    if not robot.is_floating:
+        return
+    bend = np.r_[np.zeros(6), np.full(robot.d, _BEND)]
+    posture = np.array(robot.posture)
+    present, bent = (State(robot, q) for q in (posture, pin.integrate(robot.model, posture, bend)))
+    singular = []
+    for foot in robot.feet:
+        rows = 6 if foot.is_flat else 3
+        values, bent_values = (
+            np.linalg.svd(state.frame_jacobian(foot.frame)[:rows, 6:], compute_uv=False)
+            for state in (present, bent)
+        )
+        rank = int((bent_values > _MIN_SINGULAR_VALUE * bent_values[:1].sum()).sum())
+        if (values[:rank] < _MIN_SINGULAR_VALUE * values[:1].sum()).any():
+            singular.append(foot.frame)
+    if singular:
+        message = (
+            f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
+            f"Then the legs of {', '.join(singular)} are singular, for example straight, and "
+            f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
+            f"load_urdf: {robot.d} joint positions."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 

@@ -12,6 +12,7 @@ import os
 import pickle
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -713,3 +714,24 @@ def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
     assert record.outcome == "completed" and tilt(record) < 2.0
     assert np.ptp(record.com[:, 2]) < 0.02
     assert np.allclose(speed(record, 1.39, 2.59), velocity, atol=0.02)
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.3), (0.5, 0.2)])
+def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
+    velocity: tuple[float, float],
+) -> None:
+    """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
+    robot = hexapod()
+    offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)
+        gait = Gait(offsets, period=1.0, swing=0.4, start=0.2)
+        walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, velocity, 0.5)
+    record = run(walk, 4.2)
+    assert record.outcome == "completed" and tilt(record) < 2.0
+
+
+def test_the_posture_task_does_not_slow_a_trot_with_short_legs() -> None:
+    """It moved the centre of mass of solo12 away from its plan; the robot walked at 0.38 m/s."""
+    walk = walk_of("solo12", Gait.trot, (0.5, 0.0))
+    assert np.allclose(speed(run(walk, 4.0), 2.0, 3.5), [0.5, 0.0], atol=0.02)

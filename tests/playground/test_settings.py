@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -313,3 +314,27 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
         )
     finally:
         playground.close()
+
+
+def test_a_speed_that_the_legs_cannot_reach_is_shown() -> None:
+    session = Session(GO2, Settings(gait="trot", velocity=(0.2, 0.0, 0.0)))
+    assert session.walk is not None and session.speed_limit == ""
+    assert not session.change(gait="crawl", velocity=(0.5, 0.0, 0.0)) and not session.refusal
+    assert session.walk.speed_fraction < 1.0
+    assert f"{0.5 * session.walk.speed_fraction:.2f} m/s" in session.speed_limit
+    session.change(gait=None)
+    assert session.speed_limit == ""
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12", "talos"])
+def test_a_robot_survives_the_default_push(name: str) -> None:
+    robot = judges.load(name)
+    with closing(Playground(robot)) as playground:
+        force = playground.force
+    assert force == pytest.approx(60.0 if name != "solo12" else 0.4 * robot.weight)
+    session = Session(robot)
+    push = fb.Push([0.0, force, 0.0], start=0.1)
+    record = fb.rollout(session.sim, session.controller, 1.0, [push], PERIOD)
+    assert record.outcome == "completed"
+    moved = np.linalg.norm(record.com - record.com[0], axis=1).max()
+    assert moved > 2e-3  # visible
