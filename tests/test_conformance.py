@@ -189,8 +189,8 @@ LEFT_OUT = {
         "Push.active_fraction", "conflicting_constraints", "constraint_and_jacobian",
         "raibert_foothold",
         *(f"{kind}Task.{method}" for method in ("shapes_for", "targets_at")
-            for kind in ("AngularMomentum", "CoM", "Force", "Frame", "Orientation", "Posture",
-                "Torque")),
+            for kind in ("AngularMomentum", "Axis", "CentreOfPressure", "CoM", "Force", "Frame",
+                "Orientation", "Posture", "RelativePose", "Torque")),
         "QP.objective",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
         "Limits.normal_forces",

@@ -22,7 +22,13 @@ from floatbase.dynamics import (
 )
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, wrench_set
 from floatbase.lessons.lessonC import table_top
-from floatbase.objectives import AngularMomentumTask, torques_from_forces
+from floatbase.objectives import (
+    AngularMomentumTask,
+    AxisTask,
+    CentreOfPressureTask,
+    RelativePoseTask,
+    torques_from_forces,
+)
 from floatbase.qp import active_set
 from floatbase.simulation import PushRecovery
 
@@ -64,6 +70,9 @@ def values() -> dict[str, Any]:
         "OrientationTask": fb.OrientationTask(),
         "PostureTask": fb.PostureTask(state.q), "ForceTask": fb.ForceTask(np.ones(12)),
         "TorqueTask": fb.TorqueTask(np.ones(12)), "AngularMomentumTask": AngularMomentumTask(),
+        "AxisTask": AxisTask("base", UP, UP),
+        "CentreOfPressureTask": CentreOfPressureTask(np.zeros(3)),
+        "RelativePoseTask": RelativePoseTask("FL_foot", "base", np.eye(4)),
         "TorquesFromForces": torques_from_forces(eom), "Limits": control.limits,
         "Problem": control.problem,
         "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),

@@ -1,6 +1,7 @@
 """Whole-body control as a quadratic program."""
 
 from floatbase.control.analytic import AnalyticController
+from floatbase.control.capture_point import capture_point_inequality
 from floatbase.control.command import Command
 from floatbase.control.controller import WholeBodyController
 from floatbase.control.limits import Limits, LinearInequality
@@ -14,4 +15,5 @@ __all__ = [
     "Problem",
     "WholeBodyController",
     "build_qp",
+    "capture_point_inequality",
 ]

@@ -5,6 +5,8 @@ Section 3 of the course text.
 
 from floatbase.objectives._task import Task
 from floatbase.objectives.angular_momentum import AngularMomentumTask
+from floatbase.objectives.axis import AxisTask
+from floatbase.objectives.centre_of_pressure import CentreOfPressureTask
 from floatbase.objectives.centroidal import (
     TorquesFromForces,
     centroidal_inertia,
@@ -35,11 +37,12 @@ from floatbase.objectives.pullback import (
     partial_minimum,
 )
 from floatbase.objectives.regularisation import ForceTask, TorqueTask
+from floatbase.objectives.relative_pose import RelativePoseTask
 
 # fmt: off
 __all__ = [
-    "AngularMomentumTask", "CoMTask", "ForceTask", "FrameTask", "OrientationTask", "PostureTask",
-    "Task", "TorqueTask", "TorquesFromForces",
+    "AngularMomentumTask", "AxisTask", "CentreOfPressureTask", "CoMTask", "ForceTask", "FrameTask",
+    "OrientationTask", "PostureTask", "RelativePoseTask", "Task", "TorqueTask", "TorquesFromForces",
     "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
     "com_wrench_map",
     "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",

@@ -1,0 +1,98 @@
+"""Inequality that keeps the capture point inside the support polygon."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from floatbase._geometry import convex_hull
+from floatbase._validation import Array, as_positive
+from floatbase.control.limits import LinearInequality
+from floatbase.dynamics import EquationsOfMotion
+from floatbase.errors import InputError
+
+_MIN_EDGE = 1e-6  # m: rounding decides the direction of shorter edges
+
+
+def capture_point_inequality(
+    margin: float = 0.0, horizon: float = 0.1, name: str = "capture point"
+) -> LinearInequality:
+    """Make inequalities that keep the capture point inside the support polygon.
+
+    The capture point ξ = c + ċ / ω is where the robot can come to rest, with ω = √(g / height of
+    the centre of mass above the contact points). With a constant acceleration c̈, which is affine in
+    q̈, the capture point after the horizon T is ξ(T) = c + T ċ + T² c̈ / 2 + (ċ + T c̈) / ω. The
+    inequalities require ξ(T) to be inside the support polygon, the convex hull of the contact
+    points, at a distance of at least `margin` from each edge. The ground is level.
+
+    Parameters
+    ----------
+    margin : float, optional
+        Distance from the edges of the support polygon [m].
+    horizon : float, optional
+        Horizon T [s]. With a shorter one, the capture point may approach an edge faster.
+    name : str, optional
+        Name in messages.
+
+    Returns
+    -------
+    LinearInequality
+        One row on q̈ for each edge of the support polygon, in m/s², for the `inequalities` of a
+        controller. Evaluating the rows raises `InputError` if the polygon has no interior, as with
+        two point feet, or if the centre of mass is not above the contact points.
+
+    Notes
+    -----
+    The constraint is from [Ramos2014]_, and the capture point from [Pratt2006]_. The inequalities
+    keep tasks from moving the robot to where it must step or fall. A disturbance can still move the
+    capture point to where no contact forces bring it back within the horizon. Then the problem
+    is infeasible.
+
+    Examples
+    --------
+    >>> from floatbase.control import capture_point_inequality
+    >>> robot = fb.load("go2")
+    >>> contacts = fb.Contacts.points(robot)
+    >>> inside = capture_point_inequality(margin=0.02)
+    >>> controller = fb.WholeBodyController(
+    ...     robot, contacts, fb.standing_tasks(robot.standing()), inequalities=[inside]
+    ... )
+    """
+    margin = as_positive("margin", margin, "m", allow_zero=True)
+    horizon = as_positive("horizon", horizon, "s")
+    return LinearInequality(name, "qdd", partial(_coefficients, margin, horizon))
+
+
+def _coefficients(
+    margin: float, horizon: float, eom: EquationsOfMotion, t: float
+) -> tuple[Array, Array]:
+    """Return G and h of the inequalities [m/s²]."""
+    state, points = eom.state, eom.contacts.positions(eom.state)
+    normals, offsets = _edges(points[:, :2])
+    height = as_positive(
+        "height of the centre of mass above the contact points",
+        state.com[2] - points[:, 2].mean(),
+        "m",
+    )
+    omega = np.sqrt(eom.robot.gravity / height)
+    # ξ(T) = still + gain c̈
+    still = state.com[:2] + (horizon + 1.0 / omega) * state.com_velocity[:2]
+    gain = 0.5 * horizon**2 + horizon / omega
+    allowed = (offsets - margin - normals @ still) / gain
+    return normals @ state.com_jacobian[:2], allowed - normals @ state.com_drift[:2]
+
+
+def _edges(points: Array) -> tuple[Array, Array]:
+    """Return n and d of the half-planes n · x ≤ d whose intersection is the convex hull."""
+    corners = convex_hull(points) if len(points) else points
+    edges = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(edges, axis=1)
+    long = lengths > _MIN_EDGE
+    if np.sum(long) < 3:
+        raise InputError(
+            f"The support polygon of {len(points)} contact points has no interior. The capture "
+            f"point needs at least 3 contact points that are not on one line."
+        )
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])[long] / lengths[long, None]
+    return normals, np.sum(normals * corners[long], axis=1)

@@ -1,0 +1,235 @@
+"""Tasks for relative poses, axes and the centre of pressure: by finite differences and in physics.
+
+The finite differences use only positions from Pinocchio's forward kinematics.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import judges
+import numpy as np
+import pinocchio as pin
+from messages import raises, refused
+
+import floatbase as fb
+from floatbase.errors import InputError, UnknownNameError
+from floatbase.friction import centre_of_pressure
+from floatbase.objectives import AxisTask, CentreOfPressureTask, RelativePoseTask
+
+name = judges.every_robot
+UP = np.array([0.0, 0.0, 1.0])
+STEP = 1e-5  # s
+HANDS = ("gripper_left_base_link", "gripper_right_base_link")  # of Talos
+
+
+def world_pose(state: fb.State, frame: str) -> np.ndarray:
+    """Return the homogeneous matrix of a frame."""
+    model, data = state.robot.model, state.robot.model.createData()
+    pin.framesForwardKinematics(model, data, state.q)
+    return np.array(data.oMf[state.robot.frame_id(frame)].homogeneous)
+
+
+def relative_pose(frame: str, reference: str, state: fb.State) -> np.ndarray:
+    return np.linalg.inv(world_pose(state, reference)) @ world_pose(state, frame)
+
+
+def test_the_relative_pose_residual_is_the_relative_acceleration_less_the_desired_one(
+    name: str,
+) -> None:
+    for seed, state in enumerate(judges.states(name, 4)):
+        rng = np.random.default_rng(seed)
+        robot, eom = state.robot, fb.equations_of_motion(state, judges.stance(state.robot))
+        frame, reference = robot.frames[-1], str(rng.choice(robot.frames[:-1]))
+        pose = partial(relative_pose, frame, reference)
+        qdd, error = rng.normal(size=eom.nv), 0.5 * rng.normal(size=6)
+        velocity, feed = rng.normal(size=(2, 6))
+        target = np.eye(4)
+        target[:3, 3] = pose(state)[:3, 3] - error[:3]
+        target[:3, :3] = judges.rotation(-error[3:]) @ pose(state)[:3, :3]
+        ahead, behind = (pose(judges.along(state, state.v, t))[:3, :3] for t in (STEP, -STEP))
+        rate = np.concatenate(
+            [
+                judges.derivative(lambda s, f=pose: f(s)[:3, 3], state, state.v),
+                judges.turn_between(ahead, behind) / (2.0 * STEP),
+            ]
+        )
+        actual = np.concatenate(
+            [
+                judges.acceleration_of(lambda s, f=pose: f(s)[:3, 3], state, qdd),
+                judges.turning_acceleration_of(lambda s, f=pose: f(s)[:3, :3], state, qdd),
+            ]
+        )
+        expected = actual - (feed - 7.0 * error - 3.0 * (rate - velocity))
+        all_three = (pin.SE3(target), velocity, feed)
+        for given in (all_three, (lambda t, given=all_three: given,)):
+            task = RelativePoseTask(frame, reference, *given, kp=7.0, kd=3.0)
+            assert np.allclose(task.residual(eom)(qdd), expected, atol=5e-5)
+
+
+def test_the_axis_residual_is_its_acceleration_on_the_sphere_less_the_desired_one(
+    name: str,
+) -> None:
+    for seed, state in enumerate(judges.states(name, 4)):
+        rng = np.random.default_rng(seed)
+        eom = fb.equations_of_motion(state, judges.stance(state.robot))
+        frame = state.robot.frames[-1]
+        axis, direction, omega, alpha = rng.normal(size=(4, 3))
+        qdd = rng.normal(size=eom.nv)
+
+        def pointing(s: fb.State, frame: str = frame, axis: np.ndarray = axis) -> np.ndarray:
+            return np.asarray(world_pose(s, frame)[:3, :3] @ axis / np.linalg.norm(axis))
+
+        n, d = pointing(state), direction / np.linalg.norm(direction)
+        rate = judges.derivative(pointing, state, state.v)
+        acceleration = judges.acceleration_of(pointing, state, qdd)
+        d_rate = np.cross(omega, d)
+        d_acceleration = np.cross(alpha, d) + np.cross(omega, d_rate)
+        normal = np.cross(d, n) / np.linalg.norm(np.cross(d, n))
+        desired = (
+            np.cross(d, d_acceleration)
+            - 7.0 * np.arccos(d @ n) * normal
+            - 3.0 * (np.cross(n, rate) - np.cross(d, d_rate))
+        )
+        expected = np.cross(n, acceleration) - (desired - n * (n @ desired))
+        for given in (
+            (direction, omega, alpha),
+            (lambda t, all_three=(direction, omega, alpha): all_three,),
+        ):
+            residual = AxisTask(frame, axis, *given, kp=7.0, kd=3.0).residual(eom)
+            assert np.allclose(residual(qdd), expected, atol=5e-5)
+            assert np.allclose(n @ residual.A, 0.0, atol=1e-12)  # rotation about it is free
+
+
+def test_an_axis_opposite_to_its_direction_turns_by_half_a_turn_and_one_along_it_not_at_all() -> (
+    None
+):
+    state = judges.load("go2").standing()
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    n = state.frame_pose("base").rotation @ UP
+    for direction, angle in ((n, 0.0), (-n, np.pi)):
+        b = AxisTask("base", UP, direction, kp=1.0).residual(eom).b
+        assert np.isclose(np.linalg.norm(b), angle, atol=1e-7) and abs(b @ n) < 1e-12
+
+
+def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_the_forces() -> None:
+    for robot_name in ("go2", "talos"):
+        robot = judges.load(robot_name)
+        state, contacts = robot.standing(), judges.stance(robot)
+        eom = fb.equations_of_motion(state, contacts)
+        rng = np.random.default_rng(0)
+        forces = np.column_stack(
+            [rng.normal(0.0, 20.0, (eom.k // 3, 2)), rng.uniform(1.0, 200.0, eom.k // 3)]
+        )
+        centre = centre_of_pressure(state, contacts, forces)
+        shift = np.array([0.03, -0.02, 0.0])
+        total = forces[:, 2].sum()
+        for target, expected in (
+            (centre, [0.0, 0.0]),
+            (centre - shift, [shift[1] * total, -shift[0] * total]),
+        ):
+            for given in (target, lambda t, target=target: target):
+                residual = CentreOfPressureTask(given).residual(eom)
+                assert np.allclose(residual(forces.ravel()), expected, atol=1e-9 * total)
+                assert not np.any(residual.b)
+
+
+def test_both_backends_agree_on_them() -> None:
+    for robot_name, pair in (("go2", ("FL_hip", "RR_thigh")), ("talos", HANDS)):
+        robot = judges.load(robot_name)
+        at, contacts = robot.standing(), judges.stance(robot)
+        pose = relative_pose(*pair, at)
+        tasks = [
+            *fb.standing_tasks(at),
+            RelativePoseTask(*pair, lambda t, pose=pose: (pose, np.full(6, 0.1 * t), np.ones(6))),
+            AxisTask("base", UP, [0.0, 0.1, 1.0]),
+            CentreOfPressureTask(at.com * [1.0, 1.0, 0.0] + [0.01, 0.0, 0.0]),
+            fb.ForceTask(weight=1e-4),
+        ]
+        both = judges.pair(robot, contacts, tasks)
+        for i, state in enumerate(judges.near_and_far(robot_name, 2)):
+            assert judges.difference(*both, state, 0.1 * i) < judges.agreement(robot)
+
+
+def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves() -> None:
+    robot = judges.load("talos")
+    at = robot.standing()
+    goal = at.frame_pose(HANDS[1]).actInv(at.frame_pose(HANDS[0])).homogeneous
+    goal[:3, 3] += [0.0, 0.05, 0.03]
+    goal[:3, :3] = judges.rotation([0.2, 0.0, 0.0]) @ goal[:3, :3]
+    tasks = [
+        fb.CoMTask(lambda t: at.com + [0.0, 0.02 * np.sin(3.0 * t), 0.0]),
+        *fb.standing_tasks(at)[1:],
+        RelativePoseTask(*HANDS, goal),
+    ]
+    controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
+    run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=2e-3)
+    assert run.outcome == "completed"
+    left = np.linalg.inv(goal) @ relative_pose(*HANDS, run.final)
+    assert np.linalg.norm(left[:3, 3]) < 2e-3
+    assert np.linalg.norm(judges.turn_between(left[:3, :3], np.eye(3))) < 0.01
+
+
+def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_others() -> None:
+    robot = judges.load("go2")
+    at = robot.standing()
+    yawed = judges.rotation([0.0, 0.0, 0.15])
+    direction = np.array([0.1, 0.0, 1.0]) / np.linalg.norm([0.1, 0.0, 1.0])
+    # the light orientation task decides only the heading
+    tasks = [
+        fb.CoMTask(at.com),
+        AxisTask("base", UP, direction, weight=100.0),
+        fb.OrientationTask("base", yawed, weight=0.1),
+        fb.PostureTask(at.q),
+    ]
+    controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
+    R = fb.rollout(fb.Simulation(robot), controller, 2.0, control_period=2e-3).final.frame_pose(
+        "base"
+    )
+    assert np.linalg.norm(np.cross(R.rotation @ UP, direction)) < 5e-3
+    assert abs(np.arctan2(R.rotation[1, 0], R.rotation[0, 0]) - 0.15) < 0.02
+
+
+def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet() -> None:
+    robot, amplitude, rate = judges.load("talos"), 0.02, 12.0  # m, rad/s
+    at, contacts = robot.standing(), judges.stance(robot)
+    ground = at.com * [1.0, 1.0, 0.0] + [0.0, 0.0, contacts.positions(at)[:, 2].mean()]
+
+    def target(t: float) -> np.ndarray:
+        return np.asarray(ground + [0.0, amplitude * np.sin(rate * t), 0.0])
+
+    def error(*more: object) -> float:
+        tasks = [*fb.standing_tasks(at), fb.ForceTask(weight=1e-4), *more]
+        controller = fb.WholeBodyController(robot, contacts, tasks, backend="compiled")
+        run = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=2e-3)
+        assert run.outcome == "completed"
+        found = [
+            centre_of_pressure(at.replace(q=q), contacts, forces)[1] - target(t)[1]
+            for t, q, forces in zip(run.time, run.q, run.measured, strict=True)
+            if t > 0.3
+        ]
+        return float(np.sqrt(np.mean(np.square(found))))
+
+    without = error()
+    assert without > 0.5 * amplitude
+    assert error(CentreOfPressureTask(target, weight=1.0)) < 0.3 * without
+
+
+def test_wrong_arguments_are_reported() -> None:
+    eye = np.eye(4)
+    refused(lambda: RelativePoseTask("base", "base", eye), InputError, "base")
+    refused(lambda: RelativePoseTask("base", 1.0, eye), InputError, "reference", 1)
+    refused(lambda: RelativePoseTask("FL_foot", "base", 2.0 * eye), InputError, "pose")
+    refused(lambda: RelativePoseTask("FL_foot", "base", np.diag([1, 1, -1, 1])), InputError)
+    refused(lambda: RelativePoseTask("FL_foot", "base", eye, np.zeros(3)), InputError, "velocity")
+    refused(lambda: AxisTask("base", np.zeros(3), UP), InputError, "axis")
+    refused(lambda: AxisTask("base", UP, np.zeros(3)), InputError, "direction")
+    refused(lambda: CentreOfPressureTask([0.0, 0.0]), InputError, "position")
+    robot = judges.load("go2")
+    for task in (
+        RelativePoseTask("FL_foot", "tail", eye),
+        RelativePoseTask("tail", "base", eye),
+        AxisTask("tail", UP, UP),
+    ):
+        with raises(UnknownNameError, "tail"):
+            fb.WholeBodyController(robot, judges.stance(robot), [task])
