@@ -308,7 +308,7 @@ def test_a_full_disk_leaves_the_file_of_answers_that_was_handed_in_before(learne
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert "InputError" in run.stderr
-    assert path.read_bytes() == kept and list(learner.glob("*answers*")) == [path]
+    assert path.read_bytes() == kept and list(Path().glob("*answers*")) == [path]
 
 
 @pytest.mark.parametrize(
