@@ -60,9 +60,11 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises,
         "predictions": predicted,
     }  # fmt: skip
+    from floatbase.lessons.publish.workspace import write_whole  # it imports this package
+
     try:
         path = _own_path(Path(folder), name.strip())
-        path.write_text(json.dumps(written, indent=1), encoding="utf-8")
+        write_whole(path, json.dumps(written, indent=1).encode())
     except OSError as error:
         raise InputError(
             f"{error.filename or folder} cannot be written: {error.strerror}. Choose another "

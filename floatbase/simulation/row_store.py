@@ -41,10 +41,15 @@ def read_sweep(path: str | Path) -> DataFrame:
         If the file cannot be read or was not written by a sweep.
     """
     try:
+        if Path(path).exists() and not Path(path).is_file():  # reading a device may never end
+            raise _wrong_file_error(path, "that no sweep has written")
         content = Path(path).read_bytes()
-    except OSError as error:
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", error)
         raise InputError(
-            f"{path} cannot be read: {error.strerror}. Give the path of a sweep's file."
+            f"{path} cannot be read: {reason}. Give the path of a sweep's file."
         ) from None
     return as_frame(_read_rows(path, content))
 
@@ -89,6 +94,8 @@ class RowStore:
         if not isinstance(path, str | os.PathLike):
             raise InputError(f'file must be a path, such as "rows.jsonl", not {short_repr(path)}.')
         try:
+            if os.path.exists(path) and not os.path.isfile(path):
+                raise _wrong_file_error(path, "that no sweep has written")
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._resume(path, _header(name, points))
@@ -97,11 +104,13 @@ class RowStore:
             raise InputError(
                 f"Another sweep is writing to {path}. Wait until it ends, or give another file."
             ) from None
-        except OSError as error:
+        except InputError:
             self.close()
-            raise InputError(
-                f"{path} cannot be written to: {error.strerror}. Give another file."
-            ) from None
+            raise
+        except (OSError, ValueError) as error:  # ValueError: a null character in the path
+            self.close()
+            reason = getattr(error, "strerror", error)
+            raise InputError(f"{path} cannot be written to: {reason}. Give another file.") from None
         except BaseException:
             self.close()
             raise
@@ -202,7 +211,7 @@ def _read_header(path: str | Path, content: bytes) -> Row:
         found = json.loads(content.split(b"\n", 1)[0])
         if set(found) == set(_header("", [])):
             return dict(found)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, RecursionError):
         pass
     raise _wrong_file_error(path, "that no sweep has written")
 
@@ -215,7 +224,7 @@ def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
         try:
             row = json.loads(line)
             rows[int(row.pop("point"))] = row
-        except (ValueError, TypeError, KeyError, AttributeError):
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise InputError(
                 f"Line {number} of {path} is not a row of a sweep: {line[:80]!r}. Remove the line, "
                 "and run the sweep again."

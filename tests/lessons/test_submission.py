@@ -21,6 +21,7 @@ import floatbase as fb
 from floatbase.errors import InputError
 from floatbase.lessons import all_exercises, check, hand_in, predict, progress
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, write_solutions
+from floatbase.lessons.publish.__main__ import main
 
 
 @pytest.fixture(autouse=True)
@@ -280,3 +281,52 @@ def test_solutions_that_a_teacher_has_annotated_are_kept(learner: Path) -> None:
     assert message.endswith(f"{lesson.stem}.solved.new.ipynb")
     assert path.read_text() == annotated
     assert (learner / f"{lesson.stem}.solved.new.ipynb").read_text() != annotated
+
+
+def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
+    """`grade --table *.json`, without the name of the table, must not cost a learner's answers."""
+    check("00.1", 3.0)
+    answers, table = hand_in("Ada"), learner / "marks.csv"
+    submissions, kept = [grades.grade_file(answers)], answers.read_bytes()
+    with pytest.raises(InputError):
+        grades.write_table(submissions, answers)
+    assert answers.read_bytes() == kept
+    for _ in range(2):
+        grades.write_table(submissions, table)
+    assert len(table.read_text().splitlines()) > len(all_exercises())
+
+
+def test_a_full_disk_leaves_the_file_of_answers_that_was_handed_in_before(learner: Path) -> None:
+    check("00.1", 3.0)
+    path = hand_in("Ada")
+    kept = path.read_bytes()
+    program = (
+        "import resource, signal; from floatbase.lessons import hand_in\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))\n"
+        "hand_in('Ada')"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "InputError" in run.stderr
+    assert path.read_bytes() == kept and list(Path().glob("*answers*")) == [path]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "nowhere.ipynb"],
+        ["run", "text"],
+        ["run", "."],
+        ["solutions", "--to", "text"],
+        ["grade", "text", "--before", "0001-01-01T00:00"],
+        ["grade", "text", "--before", "9999-12-31T23:59"],
+    ],
+)
+def test_the_command_line_ends_with_a_message_and_no_traceback(
+    learner: Path, arguments: list[str]
+) -> None:
+    (learner / "text").write_text("no notebook")
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert (learner / "text").read_text() == "no notebook"

@@ -236,6 +236,12 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         with raises(InputError, "rows.jsonl"):
             fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False)
         assert path.read_text() == content
+    os.mkfifo(tmp_path / "pipe")  # reading it would never end
+    for odd in (str(tmp_path / "pipe"), str(tmp_path), "/dev/zero", "a\0b"):
+        with raises(InputError, odd):
+            fb.sweep(square, {"x": [1]}, file=odd, progress=False)
+        with raises(InputError, odd):
+            read_sweep(odd)
     with raises(InputError, "nowhere/rows.jsonl"):
         fb.sweep(square, {"x": [1]}, file=tmp_path / "nowhere" / "rows.jsonl", progress=False)
     with raises(InputError, "lambda"):

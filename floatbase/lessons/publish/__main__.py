@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     graded.add_argument(
         "--before",
-        type=datetime.fromisoformat,
+        type=_local_time,
         metavar="TIME",
         help="leave out files written after TIME, such as 2026-05-31T18:00",
     )
@@ -109,6 +109,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 print(line)
     except InputError as error:
         parser.exit(2, f"{error}\n")
+    except OSError as error:
+        parser.exit(2, f"{error.filename} cannot be read or written: {error.strerror}.\n")
+
+
+def _local_time(text: str) -> datetime:
+    """Read a time in ISO format, local unless it says otherwise."""
+    try:
+        return datetime.fromisoformat(text).astimezone()
+    except OverflowError as error:
+        raise ValueError(text) from error
 
 
 def _run(lessons: Sequence[Path]) -> None:
@@ -143,9 +153,7 @@ def _grade(
 ) -> int:
     from floatbase.lessons.publish import grades
 
-    submissions, unread = grades.grade_files(
-        files, latest=latest, before=before.astimezone() if before else None
-    )
+    submissions, unread = grades.grade_files(files, latest=latest, before=before)
     print(grades.overview(submissions))
     if code:
         print(grades.code_to_read(submissions))

@@ -208,7 +208,7 @@ def _time_of(submission: Submission) -> datetime | None:
     """Return when a file was written, or None if it does not say so."""
     try:
         return datetime.fromisoformat(submission.time).astimezone()
-    except ValueError:
+    except (ValueError, OverflowError):  # also local times before year 1 or after 9999
         return None
 
 
@@ -268,7 +268,7 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written.
+        If the file cannot be written, or if there is one that is no such table.
     """
     rows = [
         (one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback)
@@ -276,12 +276,24 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
         for m in one.results
     ]
     try:
+        if path.is_file() and path.stat().st_size and not _is_table(path):
+            raise InputError(
+                f"{path} was not written by an earlier grading, so it is not replaced. Give "
+                f"another file: --table CSV."
+            )
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(_COLUMNS)
             writer.writerows([_csv_safe(part) for part in row] for row in rows)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}.") from None
+
+
+def _is_table(path: Path) -> bool:
+    """Return whether a file begins like one of `write_table`."""
+    header = ",".join(_COLUMNS).encode()
+    with path.open("rb") as file:
+        return file.read(len(header)) == header
 
 
 def _csv_safe(value: object) -> object:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.workspace import (
     NOTEBOOKS,
@@ -20,10 +21,13 @@ from floatbase.lessons.publish.workspace import (
 
 
 def read_notebook(path: Path) -> Any:
-    """Read a notebook."""
+    """Read a notebook. Raises `InputError` if the file is not a notebook."""
     import nbformat
 
-    return nbformat.read(path, as_version=4)
+    try:
+        return nbformat.read(path, as_version=4)
+    except (nbformat.reader.NotJSONError, nbformat.ValidationError, UnicodeDecodeError):
+        raise InputError(f"{path} is not a notebook.") from None
 
 
 def with_solutions(notebook: Any) -> Any:

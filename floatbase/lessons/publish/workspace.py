@@ -114,12 +114,12 @@ def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
             break
         target = next(beside)
         message = f"{copy.name}: your copy is kept; the new text is in {target.name}"
-    _write(target, text)
+    write_whole(target, text)
     record[copy.name] = present
     return [message]
 
 
-def _write(path: Path, text: bytes) -> None:
+def write_whole(path: Path, text: bytes) -> None:
     """Write a whole file or nothing, so that a full disk leaves the former file."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -140,7 +140,7 @@ def read_record(folder: Path) -> dict[str, str]:
 
 def write_record(folder: Path, record: dict[str, str]) -> None:
     """Write a folder's record of digests."""
-    _write(folder / _RECORD_FILE, json.dumps(record, indent=1).encode())
+    write_whole(folder / _RECORD_FILE, json.dumps(record, indent=1).encode())
 
 
 def _course_text(source: Path) -> bytes:
