@@ -337,7 +337,7 @@ class WholeBodyController:
 
     @cached_property
     def _softer_controller(self) -> WholeBodyController | None:
-        """The same controller with soft limits; with soft contacts as well if limits are soft.
+        """A controller with soft limits or, if limits are soft, with soft contacts as well.
 
         None if both are soft.
         """

@@ -198,12 +198,13 @@ class JointLimits(Value):
         """
         if len(self.lower) != robot.d:
             raise InputError(
-                f"The joint limits are for {len(self.lower)} joints, but {robot.name} has {robot.d}."
+                f"The joint limits are for {len(self.lower)} joints, but {robot.name} has "
+                f"{robot.d}."
             )
 
     @cached_property
     def decelerations(self) -> tuple[Array, Array]:
-        """Planned and largest deceleration in front of a position limit, (d,) each [rad/s², m/s²]."""
+        """Planned and largest deceleration in front of a limit, (d,) each [rad/s² or m/s²]."""
         return (
             np.minimum(self.braking, self.acceleration),
             np.minimum(_RESERVE * self.braking, self.acceleration),
@@ -252,8 +253,8 @@ class JointLimits(Value):
         with np.errstate(invalid="ignore", divide="ignore"):
             # the position after one period, or at the turning point if the joint turns before that
             reach = 2.0 * (gap - v * dt) / dt**2
-            turning = np.where(gap > 0.0, -(v**2) / (2.0 * gap), -np.inf)
-            position = np.where((v > 0.0) & (reach <= stop), np.minimum(stop, turning), reach)
+            turns = (v > 0.0) & (gap > 0.0) & (reach <= stop)
+            position = np.where(turns, np.minimum(stop, -(v**2) / (2.0 * gap)), reach)
             # the position at which the joint stops if it brakes after one period
             square = brake * (8.0 * gap - 4.0 * v * dt + brake * dt**2)
             viable = (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt)

@@ -2,9 +2,10 @@
 
 Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequalities, and brings one
 violated inequality after another to its bound. An inequality that is never violated is only
-evaluated. The multiplier of a soft inequality is at most its weight. An inequality that reaches its
-weight leaves the active set, and its weight becomes part of the gradient of the cost. Newton's method then recovers the last digits. Symbols: nb entries of β, H the Hessian, q
-the number of active inequalities, mu their multipliers.
+evaluated. The multiplier of a soft inequality is at most its weight. At its weight, the inequality
+leaves the active set, and its penalty becomes part of the cost. Newton's method recovers the last
+digits. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu their
+multipliers.
 """
 
 from __future__ import annotations
@@ -211,9 +212,7 @@ def saturate(number, row, weight, limits: Inequalities, soft_gradient):
 @jit
 def saturate_active(active: ActiveSet, at, limits: Inequalities):
     """Do `saturate` for one of the active inequalities, which the caller drops."""
-    saturate(
-        active.indices[at], active.rows[at], active.weights[at], limits, active.soft_gradient
-    )
+    saturate(active.indices[at], active.rows[at], active.weights[at], limits, active.soft_gradient)
 
 
 @jit

@@ -58,8 +58,8 @@ def largest_acceleration(gap, v, speed, acceleration, brake, most, dt):
     bound = min(acceleration, (speed - v) / dt)
     if gap < np.inf:
         stop, position = -v / dt, 2.0 * (gap - v * dt) / dt**2
-        if v > 0.0 and position <= stop:
-            position = min(stop, -(v**2) / (2.0 * gap)) if gap > 0.0 else -np.inf
+        if v > 0.0 and gap > 0.0 and position <= stop:
+            position = min(stop, -(v**2) / (2.0 * gap))
         viable, square = stop, brake * (8.0 * gap - 4.0 * v * dt + brake * dt**2)
         if square >= 0.0:
             viable = max(stop, (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt))

@@ -1,0 +1,325 @@
+"""Joint limits: viable bounds on q̈, both backends, an independent QP, and stops in MuJoCo."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cvxpy as cp
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+from messages import raises
+
+import floatbase as fb
+from floatbase.control import JointLimits, LinearInequality
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.robots import Robot, State
+
+PERIODS = (1e-3, 2e-3, 4e-3)
+# of a joint's range: the torques are constant in a control period, the equations are not
+OVERSHOOT = 1e-3
+
+
+def limits_of(n: int, rng: np.random.Generator, **changes: object) -> JointLimits:
+    """Return limits of ±1 rad and 5 rad/s, with random braking accelerations."""
+    values: dict[str, object] = {
+        "lower": -np.ones(n), "upper": np.ones(n), "velocity": np.full(n, 5.0),
+        "acceleration": np.full(n, np.inf), "braking": rng.uniform(5.0, 500.0, n),
+    }  # fmt: skip
+    return JointLimits(**(values | changes))
+
+
+@pytest.mark.parametrize("dt", PERIODS)
+def test_accelerations_within_the_bounds_keep_a_joint_inside_for_ever(dt: float) -> None:
+    rng = np.random.default_rng(0)
+    limits = limits_of(300, rng)
+    q, v, side = rng.uniform(-1.0, 1.0, 300), np.zeros(300), np.ones(300)
+    for i in range(2000):
+        if i % 200 == 0:
+            side = rng.choice([-1.0, 1.0], 300)
+        least, largest = limits.bounds(q, v)
+        assert np.all(least <= largest)
+        qdd = np.clip(1e4 * side * rng.uniform(size=300), least, largest)
+        q, v = q + v * dt + 0.5 * qdd * dt**2, v + qdd * dt
+        assert np.max(np.abs(q)) < 1.0 + 1e-9 and np.max(np.abs(v)) < 5.0 + 1e-9
+
+
+def test_the_bounds_forbid_no_motion_that_could_still_stop() -> None:
+    """At the bound, a joint that brakes from the next period on stops just at its limit."""
+    rng = np.random.default_rng(1)
+    limits = replace(limits_of(1000, rng), velocity=np.full(1000, np.inf))
+    q, v, dt = rng.uniform(-1.0, 1.0, 1000), rng.uniform(0.0, 5.0, 1000), limits.period
+    largest = limits.bounds(q, v)[1]
+    after = q + v * dt + 0.5 * largest * dt**2, v + largest * dt
+    stop = after[0] + np.maximum(after[1], 0.0) ** 2 / (2.0 * limits.braking)
+    viable = largest > -limits.braking
+    assert np.sum(viable) > 300 and np.allclose(stop[viable], 1.0, atol=1e-9)
+
+
+def test_a_joint_beyond_its_limit_returns_and_one_at_its_limit_may_rest() -> None:
+    limits = limits_of(3, np.random.default_rng(2))
+    least, largest = limits.bounds([1.0, -1.0, 1.1], [0.0, 0.0, 0.0])
+    assert largest[0] == least[1] == 0.0
+    assert largest[2] < -limits.braking[2]
+    locked = replace(limits, lower=np.ones(3), upper=np.ones(3))
+    least, largest = locked.bounds(np.ones(3), np.array([0.0, 1.0, -1.0]))
+    assert np.all(least <= largest) and largest[0] == 0.0
+
+
+def near_limits(robot: Robot, n: int, seed: int = 0) -> list[State]:
+    """Return states in which some joints move towards limits that are near."""
+    rng, limits, standing = np.random.default_rng(seed), JointLimits.of(robot), robot.standing()
+    first, states = robot.nv - robot.d, []
+    for _ in range(n):
+        q = np.array(standing.q)
+        v = 0.05 * rng.choice([1.0, 10.0]) * rng.normal(size=robot.nv)
+        for j in rng.choice(np.flatnonzero(np.isfinite(limits.upper)), 3):
+            side, gap = rng.choice([-1.0, 1.0]), 0.02 * abs(rng.normal())
+            limit = limits.upper[j] if side > 0.0 else limits.lower[j]
+            q[robot.nq - robot.d + j] = limit - side * gap
+            v[first + j] = side * 2.0 * abs(rng.normal())
+        states.append(State(robot, q, v))
+    return states
+
+
+@pytest.mark.parametrize("name", ["go2", "talos", "solo12", "hyq", "anymal_kinova"])
+@pytest.mark.parametrize("weight", [None, 30.0, 1e4])
+def test_both_backends_agree_near_limits(name: str, weight: float | None) -> None:
+    robot = judges.load(name)
+    limits = JointLimits.of(robot, weight=weight)
+    compiled, reference = judges.pair(robot, judges.stance(robot), joint_limits=limits)
+    n_active, n_violated = 0, 0
+    for state in near_limits(robot, 8):
+        # bounds of 1000 rad/s² beside tasks of 1 rad/s² cost digits
+        assert judges.difference(compiled, reference, state) < 1e-6 * robot.torque_limits.max()
+        try:
+            command, expected = (each(state.q, state.v) for each in (compiled, reference))
+        except InfeasibleError:
+            continue
+        joints = [
+            row for row in command.active if row.kind.endswith(("position limit", "city limit"))
+        ]
+        n_active += bool(joints)
+        assert command.violations == pytest.approx(expected.violations, rel=1e-4, abs=1e-6)
+        assert set(command.violations) <= set(joints)
+        n_violated += bool(command.violations)
+        residuals = command.solution.residuals
+        assert max(residuals.inequality, residuals.dual) < 1e-6
+    assert n_active > 0
+    assert weight is not None or n_violated == 0
+
+
+def accelerations_within(limits: JointLimits, q: float, v: float, j: int) -> tuple[float, float]:
+    """Return bounds of one joint's acceleration, found by bisection on what happens afterwards."""
+    dt, brake = limits.period, limits.braking[j]
+
+    def stays(qdd: float, side: float) -> bool:
+        """Whether the joint stays below its limit on this side if it brakes after one period."""
+        limit = limits.upper[j] if side > 0.0 else -limits.lower[j]
+        x, speed, a = side * q, side * v, side * qdd
+        during = x + speed * dt + 0.5 * a * dt**2
+        if a < 0.0 < speed < -a * dt and x < limit:  # turns within the period
+            during = max(during, x - speed**2 / (2.0 * a))
+        after = speed + a * dt
+        margin = max(after, 0.0) ** 2 / (2.0 * brake)
+        return bool(max(during, x + speed * dt + 0.5 * a * dt**2 + margin) <= limit)
+
+    bounds = []
+    for side in (-1.0, 1.0):
+        worst, best = 1e5 * side, -2.0 * brake * side
+        if stays(best, side):
+            for _ in range(80):
+                middle = 0.5 * (worst + best)
+                worst, best = (worst, middle) if stays(middle, side) else (middle, best)
+        speed = (side * limits.speeds[j] - v) / dt
+        most = -2.0 * brake * side  # no bound demands more
+        bounds.append(min(max(best, speed), most) if side < 0.0 else max(min(best, speed), most))
+    return bounds[0], bounds[1]
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_torques_against_a_qp_written_from_pinocchio_quantities(name: str) -> None:
+    robot = judges.load(name)
+    contacts, standing = judges.stance(robot), robot.standing()
+    limits = JointLimits.of(robot, weight=None)
+    tasks = [fb.PostureTask(standing.q, kp=100.0, kd=20.0), fb.ForceTask(weight=1e-3)]
+    tasks.append(fb.TorqueTask(weight=1e-3))
+    controller = fb.WholeBodyController(robot, contacts, tasks, joint_limits=limits)
+    model, data, d, n_active = robot.model, robot.model.createData(), robot.d, 0
+    for state in near_limits(robot, 6, seed=3):
+        eom = fb.equations_of_motion(state, contacts)  # A, b, J of the contacts
+        M = pin.crba(model, data, np.array(state.q))
+        M = np.triu(M) + np.triu(M, 1).T
+        h = pin.nonLinearEffects(model, data, np.array(state.q), np.array(state.v))
+        qdd, tau, forces = cp.Variable(robot.nv), cp.Variable(d), cp.Variable(contacts.k)
+        error = pin.difference(model, np.array(state.q), np.array(standing.q))[6:]
+        wanted = 100.0 * error - 20.0 * state.v[6:]
+        cost = 0.5 * tasks[0].weight * cp.sum_squares(qdd[6:] - wanted)
+        cost += 0.5e-3 * (cp.sum_squares(forces) + cp.sum_squares(tau))
+        rows = [M[:6] @ qdd + h[:6] == eom.J.T[:6] @ forces]
+        rows += [M[6:] @ qdd + h[6:] == tau + eom.J.T[6:] @ forces, eom.A @ qdd == eom.b]
+        mu = 0.7 / np.sqrt(2.0)
+        for i in range(contacts.n_points):
+            x, y, z = (forces[3 * i + axis] for axis in range(3))
+            rows += [cp.abs(x) <= mu * z, cp.abs(y) <= mu * z]
+        rows += [cp.abs(tau) <= robot.torque_limits]
+        for j in range(d):
+            if np.isfinite(limits.upper[j]):
+                at = robot.nq - d + j
+                least, largest = accelerations_within(limits, state.q[at], state.v[6 + j], j)
+                rows += [qdd[6 + j] >= least, qdd[6 + j] <= largest]
+        problem = cp.Problem(cp.Minimize(cost), rows)
+        tight = {f"tol_{kind}": 1e-11 for kind in ("gap_abs", "gap_rel", "feas")}
+        problem.solve(solver=cp.CLARABEL, **tight)
+        try:
+            command = controller(state.q, state.v)
+        except InfeasibleError:
+            assert problem.status.startswith("infeasible")
+            continue
+        assert problem.status.startswith("optimal")
+        n_active += any(row.kind.endswith("position limit") for row in command.active)
+        assert np.max(np.abs(command.tau - tau.value)) < 1e-4 * robot.torque_limits.max()
+    assert n_active > 0
+
+
+def driven(robot: Robot, joint: int, side: float, period: float, **options: object) -> fb.Rollout:
+    """Return a run in which a joint of a bolted robot is driven at its stop as fast as it can."""
+    limits, target = JointLimits.of(robot), np.array(robot.posture)
+    span = limits.upper[joint] - limits.lower[joint]
+    target[joint] = (limits.upper if side > 0.0 else limits.lower)[joint] + side * span
+    tasks = [fb.PostureTask(target, kp=400.0, kd=40.0)]
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), tasks, **options)
+    return fb.rollout(fb.Simulation(robot), controller, 0.8, control_period=period)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints"),
+    [("go2", (0, 1, 2)), ("solo12", (1, 5)), ("talos", (3, 9, 15, 21))],
+)
+def test_no_joint_passes_its_limit_in_mujoco(name: str, joints: tuple[int, ...]) -> None:
+    floating = judges.load(name)
+    robot = fb.load_urdf(
+        floating.urdf, name=name, floating=False, package_dirs=floating.package_dirs,
+        posture=floating.posture[7:], torque_limits=floating.torque_limits,
+    )  # fmt: skip
+    limits = JointLimits.of(robot)
+    span, fastest = limits.upper - limits.lower, 0.0
+    for i, joint in enumerate(joints):
+        for side in (1.0, -1.0):
+            run = driven(robot, joint, side, PERIODS[i % 3])
+            assert run.outcome == "completed"
+            beyond = np.maximum(run.q - limits.upper, limits.lower - run.q)[:, joint]
+            assert np.max(beyond) < OVERSHOOT * span[joint]
+            speed = np.max(np.abs(run.v[:, joint]))
+            assert speed < (1.0 + 2.0 * OVERSHOOT) * limits.velocity[joint]
+            fastest = max(fastest, float(np.max(np.abs(run.v[:, joint]))))
+    assert fastest > 1.0
+    run = driven(robot, joints[-1], 1.0, 1e-3, joint_limits=None)
+    beyond = np.max(run.q[:, joints[-1]]) - limits.upper[joints[-1]]
+    speed = np.max(np.abs(run.v[:, joints[-1]]))
+    assert beyond > OVERSHOOT * span[joints[-1]] or speed > limits.velocity[joints[-1]]
+
+
+def test_active_limits_are_named_for_joint_kind_and_side() -> None:
+    robot = judges.load("go2")
+    joint = robot.joint_names.index("FL_calf_joint")
+    limits = JointLimits.of(robot, weight=None)
+    free = fb.Contacts.none()
+    for kind, q, v, changes in (
+        ("position", limits.upper[joint] - 1e-4, 0.0, {}),
+        ("velocity", -1.5, limits.velocity[joint], {}),
+        ("acceleration", -1.5, 0.0, {"acceleration": np.full(12, 20.0)}),
+    ):
+        state = robot.standing()
+        configuration, speeds = np.array(state.q), np.zeros(robot.nv)
+        configuration[7 + joint], speeds[6 + joint] = q, v
+        target = np.array(configuration)
+        target[7 + joint] += 1.0
+        task = fb.PostureTask(target, kp=900.0, kd=0.0)
+        controller = fb.WholeBodyController(
+            robot, free, [task], joint_limits=replace(limits, **changes)
+        )
+        row = next(
+            r for r in controller(configuration, speeds).active if r.owner == "FL_calf_joint"
+        )
+        assert row == f"FL_calf_joint {kind} upper" and row.kind == f"upper {kind} limit"
+
+
+# soft ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_what_cannot_hold_is_violated_and_named(backend: str) -> None:
+    """An impossible inequality, a squeezed force and a joint beyond its limit, all at once."""
+    robot = judges.load("go2")
+    standing = robot.standing()
+    q = np.array(standing.q)
+    at = 7 + robot.joint_names.index("FL_calf_joint")
+    q[at] = JointLimits.of(robot).upper[at - 7] + 0.01
+    rise = LinearInequality("rise", "qdd", (-np.eye(robot.nv)[2:3], [-200.0]))
+    options = {"inequalities": [rise], "min_normal_force": 400.0, "backend": backend}
+    tasks = fb.standing_tasks(standing)
+    hard = fb.WholeBodyController(
+        robot, judges.stance(robot), tasks, joint_limits=JointLimits.of(robot, weight=None),
+        **options,
+    )  # fmt: skip
+    with pytest.raises(InfeasibleError):
+        hard(q, standing.v)
+    soft = fb.WholeBodyController(
+        robot, judges.stance(robot), tasks, on_infeasible="soften", **options
+    )
+    command = soft(q, standing.v)
+    assert command.softened and "rise" in command.violations
+    assert any("normal force" in name for name in command.violations)
+    assert any("FL_calf_joint" in name for name in (*command.violations, *command.active))
+    assert np.all(np.abs(command.tau) <= robot.torque_limits + 1e-6)
+    eom = fb.equations_of_motion(State(robot, q), judges.stance(robot))
+    assert np.allclose(eom.A @ command.qdd, eom.b, atol=1e-6)  # the contacts still hold
+
+
+def test_a_soft_force_bound_holds_while_it_can() -> None:
+    robot = judges.load("go2")
+    standing, contacts = robot.standing(), judges.stance(robot)
+    bounds = {"FL_foot": lambda t: 10.0 + 500.0 * t}
+    for controller in judges.pair(
+        robot, contacts, max_normal_force={"FR_foot": 5.0}, min_normal_force=bounds,
+        normal_force_weight=1e3,
+    ):  # fmt: skip
+        for t, holds in ((0.0, True), (1.0, False)):
+            command = controller(standing.q, standing.v, t)
+            force = command.force("FL_foot")[2]
+            assert (force >= 10.0 + 500.0 * t - 1e-6) == holds
+            assert bool(command.violations) == (not holds)
+            if not holds:
+                name = next(name for name in command.violations if "FL_foot" in name)
+                assert command.violations[name] == pytest.approx(510.0 - force, abs=1e-6)
+
+
+def test_limits_are_the_robots_by_default_and_can_be_off() -> None:
+    robot = judges.load("go2")
+    default = judges.controller_of("go2")
+    assert np.array_equal(default.limits.joint_limits.upper, robot.model.upperPositionLimit[7:])
+    kinds = {name.kind for name in default.qp(robot.standing()).inequality_names}
+    assert "upper position limit" in kinds
+    off = judges.controller_of("go2", joint_limits=None)
+    assert off.limits.joint_limits is None
+    assert not {name.kind for name in off.qp(robot.standing()).inequality_names} & {
+        "upper position limit", "lower velocity limit"
+    }  # fmt: skip
+
+
+def test_joint_limits_that_do_not_fit_are_refused() -> None:
+    robot, limits = judges.load("go2"), limits_of(3, np.random.default_rng(0))
+    with raises(InputError, "joint limits", "3", "12"):
+        judges.controller_of("go2", joint_limits=limits)
+    with raises(InputError, "joint_limits"):
+        judges.controller_of("go2", joint_limits="all")
+    with raises(InputError, "speed"):
+        JointLimits.of(robot, speed=3.0)
+    for changes in (
+        {"lower": 2.0 * np.ones(3)}, {"velocity": [1.0, 0.0, 1.0]}, {"braking": [np.inf] * 3},
+        {"upper": np.ones(2)}, {"upper": [np.nan] * 3}, {"period": 0.0}, {"weight": -1.0},
+    ):  # fmt: skip
+        with pytest.raises(InputError):
+            replace(limits, **changes)
