@@ -337,7 +337,7 @@ class WholeBodyController:
 
     @cached_property
     def _softer_controller(self) -> WholeBodyController | None:
-        """A controller with soft limits or, if limits are soft, with soft contacts as well.
+        """Build the controller with soft limits or, if limits are soft, with soft contacts.
 
         None if both are soft.
         """

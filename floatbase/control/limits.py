@@ -490,12 +490,12 @@ def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality:
     for i in range(contacts.n_points):
         at = contacts.point_force_indices[3 * i : 3 * i + 3]
         G[i, at] = contacts.normals[i]
-    G = read_only(np.vstack([-G, G[bounded]]))
+    rows = read_only(np.vstack([-G, G[bounded]]))
 
     def coefficients(eom: EquationsOfMotion, t: float) -> Coefficients:
         """Return the rows and the bounds at time t."""
         least, largest = limits.normal_forces(contacts, t)
-        return G, np.concatenate([-least, largest[bounded]])
+        return rows, np.concatenate([-least, largest[bounded]])
 
     points = contacts.point_names
     names = [f"smallest {point}" for point in points]
