@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, cast, get_args
 
 import numpy.typing as npt
 
@@ -34,7 +34,7 @@ from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsu
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
-from floatbase.qp import QP, Solution, check_solver, solve
+from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 
@@ -55,10 +55,13 @@ class WholeBodyController:
         The robot to control.
     contacts : Contacts
         Contacts of the robot with the ground.
-    tasks : sequence of Task
+    tasks : sequence of Task, or sequence of sequences of Task
         Tasks such as `fb.CoMTask`, or user-defined objects of the form of
-        `floatbase.objectives.Task`. If no task acts on forces, or none on torques, a `ForceTask()`
-        or a `TorqueTask()` of small weight is added, so that the optimum is unique.
+        `floatbase.objectives.Task`. Their weights decide between them. A list of lists sets strict
+        priorities instead: the first list has the highest priority, and each list is fulfilled as
+        well as the lists before it allow. Only the reference backend supports priorities. If no
+        task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small weight
+        is added, so that the optimum is unique.
     facets : int, optional
         Number of facets of the friction polyhedra; see `floatbase.friction.FrictionPolyhedron`.
     inner_approximation : bool, optional
@@ -150,7 +153,7 @@ class WholeBodyController:
         self,
         robot: Robot,
         contacts: Contacts,
-        tasks: Sequence[Task],
+        tasks: Sequence[Task] | Sequence[Sequence[Task]],
         *,
         facets: int = 4,
         inner_approximation: bool = True,
@@ -181,12 +184,16 @@ class WholeBodyController:
             _joint_limits(robot, joint_limits),
             normal_force_weight,
         )
-        problem = Problem(robot, contacts, tasks, limits, modify_qp)
+        # `Problem` takes levels apart
+        problem = Problem(robot, contacts, cast("Sequence[Task]", tasks), limits, modify_qp)
         if contact_weight is not None:
             problem = _softened(problem, contact_weight)
         limits.check_names(contacts.names, _foot_frames(robot))
         with dry_run():  # unknown names and wrong shapes raise here, not in the loop
-            problem.qp(robot.standing())
+            if problem.level_sizes:
+                problem.check()  # the QP of a level needs solutions
+            else:
+                problem.qp(robot.standing())
         check_solver(solver)
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
@@ -209,6 +216,8 @@ class WholeBodyController:
             reason = "it was requested"
         elif problem.modify_qp is not None:
             reason = "modify_qp changes the QP"
+        elif problem.level_sizes:
+            reason = "the tasks have strict priorities"
         else:
             reason = unsupported_reason(problem, solver)
         compiled = None if reason else CompiledTick(problem)
@@ -296,7 +305,7 @@ class WholeBodyController:
         Returns
         -------
         QP
-            The QP in x = (q̈, τ, λ).
+            The QP in x = (q̈, τ, λ); with priority levels, that of the last level.
         """
         return self._problem.qp(state, t)
 
@@ -360,7 +369,7 @@ class WholeBodyController:
         )
         if command is not None:
             return command
-        solution = solve(self.qp(State(self.robot, q, v), t), self.solver)
+        solution = self._problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
         return Command(tau, qdd, forces, self.contacts, "reference", solution, self._softened)
 
@@ -403,7 +412,7 @@ class WholeBodyController:
         self,
         *,
         contacts: Contacts | None = None,
-        tasks: Sequence[Task] | None = None,
+        tasks: Sequence[Task] | Sequence[Sequence[Task]] | None = None,
         limits: Limits | None = None,
     ) -> WholeBodyController:
         """Return a controller with other contacts, tasks or limits and otherwise equal settings.
@@ -415,8 +424,8 @@ class WholeBodyController:
         ----------
         contacts : Contacts, optional
             New contacts.
-        tasks : sequence of Task, optional
-            New tasks.
+        tasks : sequence of Task, or sequence of sequences of Task, optional
+            New tasks, or levels of tasks.
         limits : Limits, optional
             New limits.
 
@@ -428,7 +437,8 @@ class WholeBodyController:
         problem = replace(
             self._problem,
             contacts=self.contacts if contacts is None else contacts,
-            tasks=self.tasks if tasks is None else tasks,
+            tasks=self.tasks if tasks is None else cast("Sequence[Task]", tasks),
+            level_sizes=self._problem.level_sizes if tasks is None else (),
             limits=self.limits if limits is None else limits,
         )
         if (weight := contact_weight_of(self.tasks)) is not None:
@@ -478,7 +488,11 @@ def _joint_limits(robot: Robot, given: object) -> JointLimits | None:
 def _softened(problem: Problem, weight: float) -> Problem:
     """Return the problem with soft contacts."""
     contacts, tasks = with_soft_contacts(problem.contacts, problem.tasks, weight)
-    return replace(problem, contacts=contacts, tasks=tasks)
+    if not problem.level_sizes:
+        return replace(problem, contacts=contacts, tasks=tasks)
+    *others, motion = tasks  # the contacts come first
+    sizes = (problem.level_sizes[0] + len(tasks) - len(problem.tasks), *problem.level_sizes[1:])
+    return replace(problem, contacts=contacts, tasks=(motion, *others), level_sizes=sizes)
 
 
 def _foot_frames(robot: Robot) -> list[str]:

@@ -21,6 +21,7 @@ from floatbase._validation import (
 )
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
+from floatbase.control.priorities import solve_levels, split_levels
 from floatbase.dynamics import (
     CONSTRAINT_NOISE,
     Block,
@@ -31,7 +32,7 @@ from floatbase.dynamics import (
 )
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
 from floatbase.objectives import ForceTask, Task, TorqueTask
-from floatbase.qp import QP, ConstraintLabel
+from floatbase.qp import QP, ConstraintLabel, Solution, solve
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 
@@ -52,13 +53,16 @@ class Problem(Value):
         The robot to control.
     contacts : Contacts
         Contacts of the robot with the ground.
-    tasks : sequence of Task
-        Tasks. A `ForceTask()` or a `TorqueTask()` of small weight is added if no task acts on
-        forces, or none on torques.
+    tasks : sequence of Task, or sequence of sequences of Task
+        Tasks, or levels of tasks with strict priorities, the highest first. A `ForceTask()` or a
+        `TorqueTask()` of small weight is added, to the last level, if no task acts on forces, or
+        none on torques. The attribute is the list of all tasks.
     limits : Limits
         Inequality constraints.
     modify_qp : callable, optional
         Function (qp, eom) -> QP, applied to the assembled QP. None leaves it unchanged.
+    level_sizes : sequence of int, optional
+        Number of tasks in each priority level. It follows from `tasks` if these are levels.
 
     Raises
     ------
@@ -75,12 +79,20 @@ class Problem(Value):
     tasks: Sequence[Task]
     limits: Limits = field(metadata=checked(as_instance, Limits))
     modify_qp: ModifyQP | None = None
+    level_sizes: Sequence[int] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
-        object.__setattr__(self, "tasks", _with_regularisation(self.tasks))
+        tasks, sizes = _with_regularisation(self.tasks)
+        sizes = sizes or list(self.level_sizes)
+        if sizes:
+            sizes[-1] += len(tasks) - sum(sizes)
+            if self.modify_qp is not None:
+                raise InputError("modify_qp cannot change a problem with priority levels.")
+        object.__setattr__(self, "tasks", tasks)
+        object.__setattr__(self, "level_sizes", tuple(sizes))
         as_torque_limits(self.robot.d, self.limits.torque_limits)
         if self.limits.joint_limits is not None:
             self.limits.joint_limits.check_size(self.robot)
@@ -101,7 +113,8 @@ class Problem(Value):
         Returns
         -------
         QP
-            The QP in x = (q̈, τ, λ).
+            The QP in x = (q̈, τ, λ). With priority levels it is the QP of the last level, with the
+            optima of the other levels as equality constraints.
 
         Raises
         ------
@@ -110,13 +123,12 @@ class Problem(Value):
         UnknownNameError
             If a frame does not exist.
         InfeasibleError
-            If the motion constraints of the contacts are inconsistent.
+            If the motion constraints of the contacts are inconsistent, or if the first of several
+            levels has no solution.
         """
-        if isinstance(state, State) and state.robot != self.robot:
-            raise InputError(
-                f"state belongs to a different robot, {state.robot!r}. The robot of the problem is "
-                f"{self.robot!r}. Give a state of that robot."
-            )
+        if self.level_sizes:
+            return self.solve_levels(state, t)[-1].qp
+        self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
         qp = build_qp(eom, self.tasks, self.limits, t)
         if self.modify_qp is None:
@@ -128,6 +140,56 @@ class Problem(Value):
                 f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
             )
         return modified
+
+    def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
+        """Solve the QPs of all priority levels at a state and a time.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+        t : float, optional
+            Time [s].
+        solver : str, optional
+            QP solver, one of `floatbase.qp.solvers()`.
+
+        Returns
+        -------
+        list of Solution
+            Solution of each level; the last one is the answer. Without levels, the list has one
+            element.
+
+        Raises
+        ------
+        InputError
+            If the state belongs to a different robot, or if shapes do not fit.
+        InfeasibleError
+            If there is no solution.
+        """
+        if not self.level_sizes:
+            return [solve(self.qp(state, t), solver)]
+        self._check_robot(state)
+        eom = equations_of_motion(state, self.contacts, t)
+        ends = np.cumsum(self.level_sizes)
+        levels = [
+            self.tasks[end - size : end] for end, size in zip(ends, self.level_sizes, strict=True)
+        ]
+        costs = [
+            [(task.block, task.weight, residual_of(task, eom, t)) for task in level]
+            for level in levels
+        ]
+        inequalities = [each.at(eom, t) for each in self.limits.all_inequalities(self.contacts)]
+        bounds = self.limits.hard_normal_forces(self.contacts, t)
+        qps = [assemble_qp(eom, terms, self.limits, bounds, inequalities) for terms in costs]
+        return solve_levels(qps, levels, costs, solver)
+
+    def _check_robot(self, state: State) -> None:
+        """Raise `InputError` if a state belongs to a different robot."""
+        if isinstance(state, State) and state.robot != self.robot:
+            raise InputError(
+                f"state belongs to a different robot, {state.robot!r}. The robot of the problem is "
+                f"{self.robot!r}. Give a state of that robot."
+            )
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:
         """Check names and shapes as `qp` does, at the standing state and t = 0, without a QP.
@@ -312,17 +374,18 @@ def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
     return equations_of_motion(robot.standing(), contacts)
 
 
-def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
-    """Return the tasks as a tuple, with small regularization tasks where they are missing.
+def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
+    """Return the tasks with small regularization tasks where they are missing, and level sizes.
 
-    A `ForceTask` or `TorqueTask` is added if no task acts on forces, or none on torques.
+    A `ForceTask` or `TorqueTask` is added if no task acts on forces, or none on torques. There are
+    no level sizes if the tasks are not in levels.
     """
     if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
         raise InputError(
             f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not "
             f"{short_repr(tasks)}."
         )
-    tasks = tuple(tasks)
+    tasks, sizes = split_levels(tasks)
     for task in tasks:
         lacks = [part for part in _TASK_ATTRIBUTES if not hasattr(task, part)]
         if 0 < len(lacks) < len(_TASK_ATTRIBUTES):
@@ -345,7 +408,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[Task, ...]:
         for kind in (ForceTask, TorqueTask)
         if not any(task.block == kind.block for task in tasks)
     ]
-    return tasks + tuple(cast("list[Task]", missing))
+    return tuple(tasks + cast("list[Task]", missing)), sizes
 
 
 def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -58,6 +59,9 @@ class Solution(Value):
         Name of the solver that found the solution.
     iterations : int
         Number of iterations that the solver reports; 0 if it reports none.
+    earlier_violations : mapping of str to float, optional
+        Violations of soft inequalities in a QP of higher priority, whose h this problem has relaxed
+        accordingly [units of h].
     """
 
     qp: QP
@@ -65,6 +69,7 @@ class Solution(Value):
     inequality_multipliers: Array
     solver: str
     iterations: int = 0
+    earlier_violations: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("x", "inequality_multipliers"):
@@ -128,8 +133,11 @@ class Solution(Value):
         excess = (qp.G @ self.x - qp.h)[qp.soft]
         violated = excess > size * violation_tolerance(qp.h[qp.soft] / size, self.x)
         return {
-            qp.inequality_names[i]: float(amount)
-            for i, amount in zip(qp.soft[violated], excess[violated], strict=True)
+            **self.earlier_violations,
+            **{
+                qp.inequality_names[i]: float(amount)
+                for i, amount in zip(qp.soft[violated], excess[violated], strict=True)
+            },
         }
 
     @property

@@ -1,0 +1,144 @@
+"""Strict priorities: one QP for each level of tasks, in what the levels before leave free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from floatbase._validation import Array
+from floatbase.affine import Affine
+from floatbase.dynamics import Block
+from floatbase.errors import InputError
+from floatbase.objectives import Task
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
+
+
+def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
+    """Return tasks as one list, and the number of tasks in each level.
+
+    Parameters
+    ----------
+    tasks : sequence of Task, or sequence of sequences of Task
+        Tasks, or levels of tasks with the highest priority first.
+
+    Returns
+    -------
+    tasks : list of Task
+        All tasks, level after level.
+    sizes : list of int
+        Number of tasks in each level. Empty if there are no levels.
+
+    Raises
+    ------
+    InputError
+        If some elements are levels and others are not, or if a level is empty.
+    """
+    are_levels = [isinstance(each, list | tuple) for each in tasks]
+    if not any(are_levels):
+        return list(tasks), []  # type: ignore[arg-type]
+    if not all(are_levels):
+        raise InputError(
+            "tasks mixes tasks and lists of tasks. Give a list of tasks, or a list of lists, one "
+            "for each priority level."
+        )
+    levels: list[Sequence[Task]] = list(tasks)  # type: ignore[arg-type]
+    if not all(len(level) for level in levels):
+        raise InputError("tasks has an empty priority level. Each level needs a task.")
+    return [task for level in levels for task in level], [len(level) for level in levels]
+
+
+def with_fixed_residuals(
+    qp: QP, solution: Solution, tasks: Sequence[Task], costs: Sequence[tuple[Block, float, Affine]]
+) -> tuple[Array, Array, list[ConstraintLabel]]:
+    """Return equality constraints that keep the residuals of some tasks at their optimum.
+
+    Parameters
+    ----------
+    qp : QP
+        A QP in x = (q̈, τ, λ).
+    solution : Solution
+        The optimum of the tasks.
+    tasks : sequence of Task
+        The tasks.
+    costs : sequence of tuple
+        Block, weight and residual of each task.
+
+    Returns
+    -------
+    A : ndarray, shape (m, n)
+        Coefficients.
+    b : ndarray, shape (m,)
+        Right-hand side.
+    names : list of ConstraintLabel
+        Names of the rows.
+    """
+    rows, right, names = [np.zeros((0, qp.n))], [np.zeros(0)], []
+    for task, (block, weight, residual) in zip(tasks, costs, strict=True):
+        if weight == 0.0:
+            continue
+        part = np.zeros((len(residual.b), qp.n))
+        part[:, qp.blocks[block]] = residual.A
+        rows.append(part)
+        right.append(residual.A @ solution[block])
+        names += [
+            ConstraintLabel(f"task {task.name} {i}", "task", task.name, i)
+            for i in range(len(residual.b))
+        ]
+    return np.vstack(rows), np.concatenate(right), names
+
+
+def solve_levels(
+    qps: Sequence[QP],
+    levels: Sequence[Sequence[Task]],
+    costs: Sequence[Sequence[tuple[Block, float, Affine]]],
+    solver: str,
+) -> list[Solution]:
+    """Solve the QP of each priority level, subject to the optima of the levels before.
+
+    The optimum of a level has the same residuals wherever it is attained, because the cost is
+    strictly convex in them. The next level therefore keeps the residuals, not the variables. Soft
+    inequalities are violated only as much as in the first level.
+
+    Parameters
+    ----------
+    qps : sequence of QP
+        QP of each level, with the objective of its own tasks and the same constraints.
+    levels : sequence of sequence of Task
+        Tasks of each level.
+    costs : sequence of sequence of tuple
+        Block, weight and residual of each of these tasks.
+    solver : str
+        QP solver.
+
+    Returns
+    -------
+    list of Solution
+        Solution of each level. The last one fulfils all tasks as well as their priorities allow.
+
+    Raises
+    ------
+    InfeasibleError
+        If the first QP has no solution.
+
+    Notes
+    -----
+    Sequences of QPs with this property are described in [Escande2014]_ and [Herzog2016]_.
+    """
+    solutions: list[Solution] = []
+    A, b, names = qps[0].A, qps[0].b, qps[0].equality_names
+    h, penalties = qps[0].h, qps[0].penalties
+    for qp, tasks, terms in zip(qps, levels, costs, strict=True):
+        level = replace(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
+        solution = solve(level, solver)
+        if solutions:
+            earlier = solutions[-1].violations
+            solution = replace(solution, earlier_violations=earlier)
+        solutions.append(solution)
+        # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
+        # this level is a feasible point of the next
+        h, penalties = np.maximum(h, qp.G @ solution.x + FEASIBILITY_TOLERANCE * qp.row_norms), None
+        rows, right, labels = with_fixed_residuals(qp, solution, tasks, terms)
+        A, b, names = np.vstack([A, rows]), np.append(b, right), (*names, *labels)
+    return solutions

@@ -1,0 +1,139 @@
+"""Strict priorities against null-space projections, QPs in cvxpy, and large weights."""
+
+from __future__ import annotations
+
+import cvxpy as cp
+import judges
+import numpy as np
+import pytest
+from messages import raises
+
+import floatbase as fb
+from floatbase.control import JointLimits
+from floatbase.errors import InfeasibleError, InputError
+from floatbase.robots import Robot, State
+
+
+def levels_of(robot: Robot, state: State) -> list[list[object]]:
+    """Return three levels: base orientation and height, a far centre of mass, and posture."""
+    com = state.com + [0.3, 0.1, -0.05]
+    return [
+        [fb.OrientationTask("base", np.eye(3), kp=100.0)],
+        [fb.CoMTask(com, kp=100.0)],
+        [fb.PostureTask(state.q, kp=50.0), fb.ForceTask(weight=1e-4), fb.TorqueTask(weight=1e-4)],
+    ]
+
+
+def test_without_inequalities_levels_are_null_space_projections() -> None:
+    """q̈ = J₁⁺ e₁ + (J₂ N₁)⁺ (e₂ - J₂ J₁⁺ e₁) + …, with N₁ = 1 - J₁⁺ J₁."""
+    robot = judges.load("ur5")
+    frame, rng = robot.frames[-1], np.random.default_rng(0)
+    for _ in range(5):
+        state = State(robot, robot.standing().q + 0.1 * rng.normal(size=6), rng.normal(size=6))
+        tasks = [
+            [fb.FrameTask(frame, rng.normal(size=3), kp=10.0)],
+            [fb.PostureTask(robot.standing().q, kp=10.0), fb.TorqueTask(weight=1e-9)],
+        ]
+        controller = fb.WholeBodyController(
+            robot, fb.Contacts.none(), tasks, torque_limits=np.inf, joint_limits=None
+        )
+        eom = fb.equations_of_motion(state, fb.Contacts.none())
+        qdd, N = np.zeros(6), np.eye(6)
+        for level in tasks:
+            A, b = level[0].residual(eom)
+            qdd = qdd + np.linalg.pinv(A @ N, rcond=1e-8) @ (-b - A @ qdd)
+            N = N - np.linalg.pinv(A @ N, rcond=1e-8) @ (A @ N)
+        command = controller(state.q, state.v)
+        assert np.allclose(command.qdd, qdd, atol=1e-5 * (1.0 + np.max(np.abs(qdd))))
+
+
+@pytest.mark.parametrize("name", ["go2", "talos", "solo12", "hyq", "anymal_kinova"])
+def test_each_level_is_optimal_among_the_optima_of_the_levels_before(name: str) -> None:
+    robot = judges.load(name)
+    contacts, standing = judges.stance(robot), robot.standing()
+    limits = JointLimits.of(robot, weight=None)
+    levels = levels_of(robot, standing)
+    controller = fb.WholeBodyController(robot, contacts, levels, joint_limits=limits)
+    weighted = fb.WholeBodyController(
+        robot, contacts, [task for level in levels for task in level], joint_limits=limits
+    )
+    solved, active = 0, 0
+    for state in judges.states(name, 3, 0.05):
+        qp, eom = weighted.qp(state), fb.equations_of_motion(state, contacts)
+        try:
+            solutions = controller.problem.solve_levels(state)
+        except InfeasibleError:
+            continue
+        x = cp.Variable(qp.n)
+        rows = [qp.A @ x == qp.b, qp.G @ x <= qp.h]
+        for level, solution in zip(levels, solutions, strict=True):
+            cost, found = 0.0, 0.0
+            for task in level:
+                A, b = task.residual(eom)
+                y = x[qp.blocks[task.block]]
+                cost += 0.5 * task.weight * cp.sum_squares(A @ y + b)
+                found += 0.5 * task.weight * np.sum((A @ solution[task.block] + b) ** 2)
+            cp.Problem(cp.Minimize(cost), rows).solve(solver=cp.CLARABEL)
+            assert found <= cost.value + 1e-5 * (1.0 + cost.value)
+            for task in level:  # the next level keeps these residuals
+                A = task.residual(eom).A
+                rows.append(A @ x[qp.blocks[task.block]] == A @ solution[task.block])
+        last = solutions[-1]
+        assert np.allclose(qp.A @ last.x, qp.b, atol=1e-6)
+        assert np.all(qp.G @ last.x <= qp.h + 1e-6)
+        first = levels[0][0].residual(eom)
+        assert np.allclose(first.A @ last["qdd"], first.A @ solutions[0]["qdd"], atol=1e-6)
+        solved, active = solved + 1, active + bool(last.active)
+    assert solved > 0 and active > 0
+
+
+def test_large_weights_approach_strict_priorities() -> None:
+    robot = judges.load("go2")
+    contacts, state = judges.stance(robot), robot.standing()
+    com = fb.CoMTask(state.com + [0.3, 0.0, 0.0], kp=100.0)
+    turn = fb.OrientationTask("base", np.eye(3), kp=100.0)
+    strict = fb.WholeBodyController(robot, contacts, [[turn], [com]])(state.q, state.v)
+    gaps = []
+    for ratio in (1.0, 1e2, 1e4):
+        heavy = fb.OrientationTask("base", np.eye(3), kp=100.0, weight=10.0 * ratio)
+        command = fb.WholeBodyController(robot, contacts, [heavy, com])(state.q, state.v)
+        gaps.append(np.linalg.norm(command.qdd - strict.qdd))
+    assert gaps[0] > 10.0 * gaps[1] > 100.0 * gaps[2]
+
+
+def test_levels_are_answered_by_the_reference_backend() -> None:
+    robot = judges.load("go2")
+    contacts, state = judges.stance(robot), robot.standing()
+    levels = levels_of(robot, state)
+    controller = fb.WholeBodyController(robot, contacts, levels)
+    assert controller.backend == "reference" and "priorit" in controller.backend_reason
+    assert controller.problem.level_sizes == (1, 1, 3)
+    command = controller(state.q, state.v)
+    assert np.array_equal(command.solution.qp.b, controller.qp(state).b)
+    flat = controller.replace(tasks=fb.standing_tasks(state))
+    assert flat.backend == "compiled" and flat.problem.level_sizes == ()
+    lifted = controller.replace(contacts=contacts.only(*contacts.names[1:]))
+    assert lifted.problem.level_sizes == (1, 1, 3)
+    lifted(state.q, state.v)
+    with raises(InputError, "backend"):
+        fb.WholeBodyController(robot, contacts, levels, backend="compiled")
+    for wrong in ([levels[0], levels[1][0]], [[], levels[0]]):
+        with raises(InputError, "level"):
+            fb.WholeBodyController(robot, contacts, wrong)
+    with raises(InputError, "modify_qp"):
+        fb.WholeBodyController(robot, contacts, levels, modify_qp=lambda qp, eom: qp)
+
+
+def test_levels_with_soft_contacts_and_soft_limits() -> None:
+    robot = judges.load("go2")
+    contacts, state = judges.stance(robot), robot.standing()
+    controller = fb.WholeBodyController(
+        robot, contacts, levels_of(robot, state), min_normal_force=500.0, on_infeasible="soften"
+    )
+    command = controller(state.q, state.v)
+    assert command.softened and command.violations
+    soft = fb.WholeBodyController(robot, contacts, levels_of(robot, state), contact_weight=1e4)
+    assert soft.problem.level_sizes == (2, 1, 3)
+    eom = fb.equations_of_motion(state, contacts)
+    qdd = soft(state.q, state.v).qdd
+    assert np.allclose(eom.A @ qdd, eom.b, atol=0.1)
