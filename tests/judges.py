@@ -340,9 +340,10 @@ def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:
 
 
 def is_feasible(qp: QP, rows: list[int]) -> bool:
-    """Whether a point satisfies the equalities and these inequality rows, by a linear program on
-    the whole problem.
+    """Whether a point satisfies the equalities and the hard ones of these inequality rows, by a
+    linear program on the whole problem.
     """
+    rows = [row for row in rows if row not in set(qp.soft)]
     found = linprog(
         np.zeros(qp.n), qp.G[rows], qp.h[rows], qp.A, qp.b, bounds=(None, None), method="highs"
     )

@@ -138,6 +138,7 @@ def right() -> dict[str, Any]:
         "v_joints": ZERO,
         "scale": np.ones(12),
         "LiveSimulation.set_time_scale.scale": 1.0,
+        "JointLimits.bounds.q": ZERO, "JointLimits.bounds.v": ZERO,
         "max_lever_angle": ZERO, "Cylinders.geometry.q": ZERO, "q": state.q,
         "v": state.v, "dv":
         np.zeros(18),
@@ -193,7 +194,9 @@ LEFT_OUT = {
                 "Orientation", "Posture", "RelativePose", "Torque")),
         "QP.objective",
         "LinearInequality.labels", "LinearInequality.at", "Limits.check_names",
-        "Limits.normal_forces",
+        "Limits.normal_forces", "Limits.hard_normal_forces", "Limits.all_inequalities",
+        "Limits.softened", "JointLimits.labels", "JointLimits.rows", "JointLimits.check_size",
+        "Problem.solve_levels",
         "Limits.bounded_points", "Problem.check",
         "recording.swing_feet_at", "Cylinders.force", "Cylinders.line_pressures",
         "Cylinders.advance", "Cylinders.orifice_flow",

@@ -11,7 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
 from floatbase.behaviours import LIPM, Gains, Gait, Swing
-from floatbase.control import AnalyticController, LinearInequality
+from floatbase.control import AnalyticController, JointLimits, LinearInequality
 from floatbase.dynamics import (
     RollingWheel,
     bias_forces,
@@ -88,6 +88,7 @@ def values() -> dict[str, Any]:
         ),
         "bias forces": bias_forces(state), "contact space": contact_space(eom),
         "drive": moving_frame("base", np.zeros_like),
+        "JointLimits": JointLimits.of(robot),
         "LinearInequality": LinearInequality("acceleration", "qdd", (np.eye(18), np.ones(18))),
         "PushRecovery": PushRecovery(
             np.arange(4.0), np.full(4, 30.0), 5.0, 0.1, "base", state, contacts

@@ -22,11 +22,12 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.control.command import Command
-from floatbase.control.joint_limits import SOFT_LIMIT_WEIGHT, JointLimits
+from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
 from floatbase.control.problem import ModifyQP, Problem, dry_run
 from floatbase.control.soft import (
     SOFT_CONTACT_WEIGHT,
+    SOFT_LIMIT_WEIGHT,
     contact_weight_of,
     with_soft_contacts,
 )

@@ -13,6 +13,7 @@ import pinocchio as pin
 from floatbase._validation import (
     Array,
     Value,
+    as_array,
     as_instance,
     as_positive,
     cached_property,
@@ -26,8 +27,9 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s², m/s² or N: multipliers of hard limits stay below 1e3 while the tasks' weights are 10
-SOFT_LIMIT_WEIGHT = 1e4
+# per rad/s² or m/s²: ten times the weight of a task, which a limit withstands. With much more, a
+# leg that carries the robot makes it fall rather than touch a joint's stop
+_WEIGHT = 100.0
 # fraction of a motor's acceleration in the standing posture that a joint can surely brake with:
 # gravity, other joints and other postures need the rest
 _BRAKING_FRACTION = 0.5
@@ -130,7 +132,7 @@ class JointLimits(Value):
     acceleration: Array = field(metadata=checked(_as_magnitudes))
     braking: Array = field(metadata=checked(_as_magnitudes))
     period: float = field(default=_CONTROL_PERIOD, metadata=checked(as_positive, "s"))
-    weight: float | None = field(default=SOFT_LIMIT_WEIGHT, metadata=checked(as_weight))
+    weight: float | None = field(default=_WEIGHT, metadata=checked(as_weight))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -205,10 +207,9 @@ class JointLimits(Value):
     @cached_property
     def decelerations(self) -> tuple[Array, Array]:
         """Planned and largest deceleration in front of a limit, (d,) each [rad/s² or m/s²]."""
-        return (
-            np.minimum(self.braking, self.acceleration),
-            np.minimum(_RESERVE * self.braking, self.acceleration),
-        )
+        planned = np.minimum(self.braking, self.acceleration)
+        largest = np.minimum(_RESERVE * self.braking, self.acceleration)
+        return read_only(planned), read_only(largest)
 
     @cached_property
     def speeds(self) -> Array:
@@ -219,7 +220,9 @@ class JointLimits(Value):
     def bounded(self) -> npt.NDArray[np.bool_]:
         """Whether q̈ has an upper and a lower bound, shape (2, d)."""
         other = np.isfinite(self.velocity) | np.isfinite(self.acceleration)
-        return np.array([np.isfinite(self.upper) | other, np.isfinite(self.lower) | other])
+        found = np.array([np.isfinite(self.upper) | other, np.isfinite(self.lower) | other])
+        found.setflags(write=False)
+        return found
 
     def bounds(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
         """Return the least and the largest joint acceleration that keep the joints viable.
@@ -236,12 +239,13 @@ class JointLimits(Value):
         least, largest : ndarray, shape (d,)
             Bounds of the joint accelerations [rad/s² or m/s²]; -inf and inf for none.
         """
-        q, v = np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)
+        size = self.lower.shape
+        q, v = as_array("q", q, size), as_array("v", v, size)
         largest = self._upper_bounds(self.upper - q, v)[0]
         least = -self._upper_bounds(q - self.lower, -v)[0]
-        middle = 0.5 * (least + largest)  # if they exclude each other, as in a locked joint
-        conflict = least > largest
-        return np.where(conflict, middle, least), np.where(conflict, middle, largest)
+        conflict = least > largest  # as in a locked joint
+        least[conflict] = largest[conflict] = 0.5 * (least[conflict] + largest[conflict])
+        return least, largest
 
     def _upper_bounds(self, gap: Array, v: Array) -> tuple[Array, npt.NDArray[np.intp]]:
         """Return the largest accelerations towards a limit, (d,), and the index of their kind.
@@ -320,7 +324,7 @@ class JointLimits(Value):
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:
-    """Return the positions of the actuated joints, NaN for joints without limits on a circle.
+    """Return the positions of the actuated joints, 0 for joints that turn without limits.
 
     Parameters
     ----------
@@ -335,7 +339,7 @@ def joint_positions(robot: Robot, q: Array) -> Array:
         Positions [rad or m].
     """
     index = _position_indices(robot)
-    return np.where(index >= 0, q[index], np.nan)
+    return np.where(index >= 0, q[index], 0.0)
 
 
 @lru_cache(maxsize=64)

@@ -21,6 +21,7 @@ from floatbase.objectives import Task
 from floatbase.robots import State
 
 SOFT_CONTACT_WEIGHT = 1e4  # weight of the motion of soft contacts; tasks have a weight of 10
+SOFT_LIMIT_WEIGHT = 1e4  # of limits that are made soft, per N, N·m, rad/s² or m/s²
 
 
 @dataclass(frozen=True, eq=False)

@@ -182,8 +182,10 @@ def active_set(
     Notes
     -----
     [FBR]_, App. C. [NocedalWright2006]_
+
+    Soft inequalities are treated as hard. To let them be violated, pass `qp.with_slacks()`.
     """
-    qp = as_instance("qp", qp, QP).with_slacks
+    qp = replace(as_instance("qp", qp, QP), penalties=None)
     space, problem = qp.equality_space, qp.reduced
     rows = _independent_rows(
         problem, [_index(qp, name) for name in as_strings("working_set", working_set)]

@@ -163,13 +163,18 @@ class QP(Value):
     @cached_property
     def soft(self) -> npt.NDArray[np.int_]:
         """Row numbers of the soft inequalities, shape (s,)."""
-        return np.flatnonzero(np.isfinite(np.inf if self.penalties is None else self.penalties))
+        found = np.flatnonzero(np.isfinite(np.inf if self.penalties is None else self.penalties))
+        found.setflags(write=False)
+        return found
 
-    @cached_property
     def with_slacks(self) -> QP:
-        """Equivalent problem with hard inequalities only.
+        """Return the equivalent problem with hard inequalities only.
 
-        Its variables are x and the violations of the soft inequalities, in the block "violations".
+        Returns
+        -------
+        QP
+            Problem whose variables are x and, in the block "violations", the violations of the soft
+            inequalities.
         """
         n, s, soft = self.n, len(self.soft), self.soft
         if not s:

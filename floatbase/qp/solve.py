@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
 
 from floatbase._validation import Array, as_instance
-from floatbase.errors import SolverError, require, unknown_name
+from floatbase.errors import InfeasibleError, SolverError, require, unknown_name
 from floatbase.qp.active_set import active_set
 from floatbase.qp.conflicts import (
     FEASIBILITY_TOLERANCE,
@@ -70,9 +71,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     """
     check_solver(solver)
     if len(as_instance("qp", qp, QP).soft):
-        found = solve(qp.with_slacks, solver)
-        multipliers = found.inequality_multipliers[: len(qp.G)]
-        return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
+        return _solve_soft(qp, solver)
     solution = _BACK_ENDS[solver](qp)
     if solution is not None:
         return solution
@@ -82,6 +81,23 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     if conflict:
         raise infeasible(qp.inequality_names[i] for i in conflict)
     return _active_set(qp)
+
+
+def _solve_soft(qp: QP, solver: str) -> Solution:
+    """Solve a problem with soft inequalities.
+
+    The penalties are exact: if the problem with hard inequalities only has a solution whose
+    multipliers are below the penalties, it is the solution. This needs no variables for violations,
+    which cost accuracy.
+    """
+    assert qp.penalties is not None
+    with suppress(InfeasibleError):
+        hard = solve(replace(qp, penalties=None), solver)
+        if np.all(hard.inequality_multipliers <= qp.penalties):
+            return replace(hard, qp=qp)
+    found = solve(qp.with_slacks(), solver)
+    multipliers = found.inequality_multipliers[: len(qp.G)]
+    return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
 
 
 def solvers() -> tuple[str, ...]:

@@ -108,7 +108,9 @@ def test_adhesion_lets_the_ground_pull() -> None:
     for adhesion_force in (0.0, GO2.weight):
         sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=adhesion_force))
         tasks, mismatch = fb.standing_tasks(GO2.standing()), ModelMismatch(cones=False)
-        controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2), tasks, modify_qp=mismatch)
+        controller = fb.WholeBodyController(
+            GO2, fb.Contacts.feet(GO2), tasks, modify_qp=mismatch, joint_limits=None
+        )
         record = fb.rollout(
             sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3
         )

@@ -23,7 +23,7 @@ PUSH = (
 
 @cache
 def controller() -> fb.WholeBodyController:
-    return judges.controller_of("go2")
+    return judges.controller_of("go2", joint_limits=None)
 
 
 @dataclass

@@ -162,4 +162,6 @@ def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.
     state = standing_go2_eom().state
     com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)
     tasks = [com, fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
-    return fb.WholeBodyController(state.robot, fb.Contacts.points(state.robot, mu=MU), tasks)
+    return fb.WholeBodyController(
+        state.robot, fb.Contacts.points(state.robot, mu=MU), tasks, joint_limits=None
+    )

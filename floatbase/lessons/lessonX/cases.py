@@ -99,6 +99,7 @@ class TwistController:
             facets=FACETS,
             modify_qp=None if mismatch.is_exact else mismatch,
             on_infeasible="soften",
+            joint_limits=None,  # the record shows what the faults do, down to the joints' stops
         )
 
     def __call__(self, q: Array, v: Array, t: float) -> Command:
