@@ -15,6 +15,7 @@ from floatbase._validation import (
     Value,
     as_callable,
     as_instance,
+    as_integer,
     as_positive,
     checked,
     short_repr,
@@ -86,7 +87,10 @@ class Problem(Value):
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
         tasks, sizes = _with_regularisation(self.tasks)
-        sizes = sizes or list(self.level_sizes)
+        sizes = sizes or [
+            as_integer("each of level_sizes", size, 1, len(tasks))
+            for size in as_instance("level_sizes", self.level_sizes, Sequence, "(1, 2)")
+        ]
         if sizes:
             sizes[-1] += len(tasks) - sum(sizes)
             if self.modify_qp is not None:
