@@ -112,14 +112,15 @@ class Problem:
         return JointLimits.of(self.robot, acceleration=most, braking=most, weight=None)
 
     def is_viable(self, q: np.ndarray, v: np.ndarray) -> bool:
-        """Whether all joints are within their limits and can stop there."""
+        """Whether all joints are within their limits, and can stop there."""
         limits = self.joint_limits
         if limits is None:
             return True
         q, v = q[-self.robot.d :], v[-self.robot.d :]
         gap = np.where(v > 0.0, limits.upper - q, q - limits.lower)
         inside = (limits.lower <= q) & (q <= limits.upper)
-        return bool(np.all(inside & (v**2 <= 2.0 * limits.braking * gap)))
+        slow = np.abs(v) <= limits.speeds
+        return bool(np.all(inside & slow & (v**2 <= 2.0 * limits.braking * gap)))
 
     def controller(self, way: str) -> fb.WholeBodyController:
         """floatbase's answer to it.

@@ -425,7 +425,13 @@ def main() -> None:
     text = report(rows, used, lacking)
     (HERE / "peers.md").write_text(text, encoding="utf-8")
     if rows:
-        plot([row for row in rows if row.is_same and row.way == "compiled" and row.peer not in LIMITED])
+        plot(
+            [
+                row
+                for row in rows
+                if row.is_same and row.way == "compiled" and row.peer not in LIMITED
+            ]
+        )
     print(text)
     raise SystemExit(1 if lacking else 0)
 
