@@ -24,13 +24,12 @@ import peer_problems
 from peer_environments import MissingError, python_of, versions
 from peer_problems import LIMITED, ROBOTS, SPREADS
 from peer_wire import Process
-from tick import machine
+from tick import JOINT_LIMITS, machine
 
 HERE = Path(__file__).parent
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
-JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
 SIDES = {
     "tsid": "peer_tsid.py",
