@@ -18,12 +18,14 @@ out:
 - placo's flat feet also have a force at each corner: points without weight carry the forces, and
   the frame of the foot does not move. placo's own flat foot carries a wrench without a limit on
   the moment about the normal, which is an easier problem and is measured separately.
+- Joint limits are off; TSID and floatbase are compared with joint limits separately.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count, islice
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,7 @@ import pinocchio as pin
 from tick import OwnCoM
 
 import floatbase as fb
+from floatbase.control import JointLimits
 
 ROBOTS = ("go2", "solo12", "talos")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
@@ -41,6 +44,9 @@ WAYS = ("compiled", "own", "reference")
 # compared
 POSTURE = 0.1
 HESSIAN = 1e-8  # DEFAULT_HESSIAN_REGULARIZATION of TSID
+# TSID with joint limits: largest acceleration, with which joints also brake [rad/s²]; inf for that
+# of `JointLimits.of`. The tasks demand more than 20 in most states that are not easy.
+LIMITED = {"tsid limits": np.inf, "tsid tight limits": 20.0}
 
 
 @dataclass(frozen=True)
@@ -78,7 +84,8 @@ class Problem:
     @property
     def regularisation(self) -> Regularisation:
         """Weights of forces and torques."""
-        return REGULARISATION[self.peer, "flat" if self.is_flat else "points"]
+        peer = "tsid" if self.peer in LIMITED else self.peer
+        return REGULARISATION[peer, "flat" if self.is_flat else "points"]
 
     @property
     def contacts(self) -> fb.Contacts:
@@ -96,6 +103,25 @@ class Problem:
             fb.TorqueTask(weight=weights.torque),
         )
 
+    @property
+    def joint_limits(self) -> JointLimits | None:
+        """Hard joint limits without reserve, as in TSID, or none."""
+        if self.peer not in LIMITED:
+            return None
+        most = np.minimum(JointLimits.of(self.robot).braking, LIMITED[self.peer])
+        return JointLimits.of(self.robot, acceleration=most, braking=most, weight=None)
+
+    def is_viable(self, q: np.ndarray, v: np.ndarray) -> bool:
+        """Whether all joints are within their limits, and can stop there."""
+        limits = self.joint_limits
+        if limits is None:
+            return True
+        q, v = q[-self.robot.d :], v[-self.robot.d :]
+        gap = np.where(v > 0.0, limits.upper - q, q - limits.lower)
+        inside = (limits.lower <= q) & (q <= limits.upper)
+        slow = np.abs(v) <= limits.speeds
+        return bool(np.all(inside & slow & (v**2 <= 2.0 * limits.braking * gap)))
+
     def controller(self, way: str) -> fb.WholeBodyController:
         """floatbase's answer to it.
 
@@ -105,16 +131,23 @@ class Problem:
         tasks = [OwnCoM(com.position) if way == "own" else com, *others]
         backend = "compiled" if way == "own" else way
         return fb.WholeBodyController(
-            self.robot, self.contacts, tasks, facets=4, inner_approximation=False, backend=backend
+            self.robot,
+            self.contacts,
+            tasks,
+            facets=4,
+            inner_approximation=False,
+            joint_limits=self.joint_limits,
+            backend=backend,
         )
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""
-        found = [self.robot.random_state(seed, SPREADS[label]) for seed in range(n)]
-        return [
+        drawn = (self.robot.random_state(seed, SPREADS[label]) for seed in count())
+        pairs = (
             (level_soles(self.robot, s.q) if self.is_flat else np.array(s.q), np.array(s.v))
-            for s in found
-        ]
+            for s in drawn
+        )
+        return list(islice((pair for pair in pairs if self.is_viable(*pair)), n))
 
     @property
     def description(self) -> dict[str, Any]:
@@ -127,6 +160,7 @@ class Problem:
             "joints": list(robot.joint_names),
             "armature": robot.model.armature[6:].tolist(),
             "torque_limits": robot.torque_limits.tolist(),
+            "joint_limits": _plain_limits(self.joint_limits),
             "base": robot.base,
             "com": _told(com, com.position),
             "orientation": _told(base, base.rotation),
@@ -148,6 +182,19 @@ class Problem:
 
 def _plain(array: Any) -> Any:
     return None if array is None else np.asarray(array).tolist()
+
+
+def _plain_limits(limits: JointLimits | None) -> dict[str, Any] | None:
+    """Joint limits in numbers, with the speeds that floatbase's bounds use."""
+    if limits is None:
+        return None
+    return {
+        "lower": limits.lower.tolist(),
+        "upper": limits.upper.tolist(),
+        "velocity": limits.speeds.tolist(),
+        "acceleration": limits.acceleration.tolist(),
+        "period": limits.period,
+    }
 
 
 def _told(task: Any, target: Any) -> dict[str, Any]:

@@ -33,6 +33,8 @@ def build(description: dict) -> Contender:
         for contact in description["contacts"]
     ]
     kept += [*_add_tasks(formulation, robot, description), robot]
+    if description["joint_limits"]:
+        kept.append(_add_joint_limits(formulation, robot, description["joint_limits"]))
     solver = tsid.SolverHQuadProgFast("solver")
     solver.resize(formulation.nVar, formulation.nEq, formulation.nIn)
 
@@ -101,6 +103,17 @@ def _add_tasks(formulation, robot, description: dict) -> list:
     bounds.setBounds(-limits, limits)
     formulation.addActuationTask(bounds, 1.0, HARD, 0.0)
     return [com, base, posture, bounds]
+
+
+def _add_joint_limits(formulation, robot, limits: dict):
+    # TSID doubles the time step of the constructor
+    bounds = tsid.TaskJointPosVelAccBounds("joint limits", robot, 0.5 * limits["period"], False)
+    bounds.setPositionBounds(np.array(limits["lower"]), np.array(limits["upper"]))
+    bounds.setVelocityBounds(np.array(limits["velocity"]))
+    bounds.setAccelerationBounds(np.array(limits["acceleration"]))
+    bounds.setImposeBounds(True, True, True, True)
+    formulation.addMotionTask(bounds, 1.0, HARD, 0.0)
+    return bounds
 
 
 if __name__ == "__main__":

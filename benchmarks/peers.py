@@ -22,21 +22,27 @@ from pathlib import Path
 import numpy as np
 import peer_problems
 from peer_environments import MissingError, python_of, versions
-from peer_problems import ROBOTS, SPREADS
+from peer_problems import LIMITED, ROBOTS, SPREADS
 from peer_wire import Process
-from tick import machine
+from tick import JOINT_LIMITS, machine
 
 HERE = Path(__file__).parent
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
-SIDES = {"tsid": "peer_tsid.py", "placo": "peer_placo.py", PLANAR: "peer_placo.py"}
+SIDES = {
+    "tsid": "peer_tsid.py",
+    **dict.fromkeys(LIMITED, "peer_tsid.py"),
+    "placo": "peer_placo.py",
+    PLANAR: "peer_placo.py",
+}
 RUNS = {  # our way, whom it is measured beside, robots
     "tsid": (
         ("compiled", "tsid", ROBOTS),
         ("own", "tsid", ROBOTS),
         ("reference", "tsid", ("go2",)),
+        *(("compiled", limited, ROBOTS) for limited in LIMITED),
     ),
     "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
 }
@@ -266,6 +272,21 @@ thing; they show the cost of a task in Python. The problem is the one above, but
 for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every control step,
 while TSID uses its `TaskComEquality`."""
 
+LIMITS = """\
+The problem is the one above with hard joint limits: `TaskJointPosVelAccBounds` in TSID,
+`JointLimits(weight=None)` in floatbase. Both bound the joint accelerations by positions,
+velocities, accelerations and viability after a period of 4 ms. "tsid limits" uses the accelerations
+with which `JointLimits.of(robot)` brakes, "tsid tight limits" at most 20 rad/s². What differs
+between the libraries is made equal or left out:
+
+- TSID limits accelerations to the value with which joints brake. floatbase has a second value, a
+  reserve of twice the braking acceleration, which the acceleration limit switches off here.
+- floatbase keeps speeds 0.3 % below their limits; TSID gets these lower limits.
+- TSID doubles the time step of its constructor, so it gets half the period.
+- Hard limits: TSID has no soft inequalities.
+- States from which a joint cannot stop in time are left out. There, TSID replaces one of two
+  contradicting bounds by the other, and floatbase demands the largest deceleration."""
+
 SAMENESS = """\
 Torques are compared before times. They count as equal if they differ by at most a millionth of the
 strongest motor's limit. The remaining difference is rounding in the peers' solver, because
@@ -275,7 +296,7 @@ fifth state)."""
 
 def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
     """The text of peers.md."""
-    equal = [row for row in rows if row.peer != PLANAR]
+    equal = [row for row in rows if row.peer != PLANAR and row.peer not in LIMITED]
     other = [row for row in equal if not row.is_same]
     compiled, own, reference = (
         [row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS
@@ -322,10 +343,36 @@ def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str])
     ]
     if own:
         lines += ["## A user-defined task", "", OWN, "", *time_table(own, "own task"), ""]
+    limited = [row for row in rows if row.peer in LIMITED]
+    if limited:
+        lines += ["## Joint limits", "", LIMITS, "", *limits_section(limited), ""]
     planar = [row for row in rows if row.peer == PLANAR]
     if planar:
         lines += ["## An easier problem", "", *planar_section(planar), ""]
     return "\n".join(lines)
+
+
+def limits_section(rows: Sequence[Row]) -> Iterator[str]:
+    """TSID with joint limits: torques, how many states have active limits, and ratios."""
+    yield (
+        "| robot | peer | states | compared | active limits | no answer: floatbase, peer | "
+        "largest difference | ratio | 10 to 90 % of blocks |"
+    )
+    yield "|---" * 9 + "|"
+    for row in rows:
+        problem = peer_problems.problem(row.robot, row.peer)
+        controller = problem.controller("compiled")
+        active = sum(
+            any(name.kind.endswith(JOINT_LIMITS) for name in controller(q, v).active)
+            for q, v in problem.states(row.label, row.states)
+        )
+        ratio = f"**{row.ratio:.2f}**" if row.is_same else "torques differ"
+        low, high = np.percentile(row.ratios, [10, 90])
+        yield (
+            f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {active} | "
+            f"{' and '.join(map(str, row.unanswered))} | {row.difference:.1e} N·m | {ratio} | "
+            f"{low:.2f} to {high:.2f} |"
+        )
 
 
 def planar_section(rows: Sequence[Row]) -> Iterator[str]:
@@ -377,7 +424,13 @@ def main() -> None:
     text = report(rows, used, lacking)
     (HERE / "peers.md").write_text(text, encoding="utf-8")
     if rows:
-        plot([row for row in rows if row.is_same and row.way == "compiled"])
+        plot(
+            [
+                row
+                for row in rows
+                if row.is_same and row.way == "compiled" and row.peer not in LIMITED
+            ]
+        )
     print(text)
     raise SystemExit(1 if lacking else 0)
 

@@ -3,6 +3,8 @@
     python benchmarks/tick.py                    times, growth -> benchmarks/tick.md, tick.png
     python benchmarks/tick.py --agreement 2000   compares the backends on that many random states
                                                  for each robot and stance
+    python benchmarks/tick.py --joint-limits     control steps with inactive joint limits
+                                                 relative to control steps without joint limits
 
 Both backends run alternately on the same states. The ratios are reliable; the microseconds depend
 on the machine.
@@ -24,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 import floatbase as fb
-from floatbase.control import LinearInequality
+from floatbase.control import JointLimits, LinearInequality
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint
 from floatbase.errors import InfeasibleError
 
@@ -32,6 +34,7 @@ HERE = Path(__file__).parent
 ROBOTS = ("go2", "solo12", "talos")
 BACKENDS = ("compiled", "reference")
 SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
+JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
 
 
 def two_points(robot: fb.Robot) -> fb.Contacts:
@@ -179,6 +182,33 @@ def own(n: int) -> Iterator[str]:
                 + " | ".join(f"{median:.1f} µs" for median in medians)
                 + " |"
             )
+
+
+# joint limits -------------------------------------------------------------------------------------
+
+
+def joint_limits(n: int, rounds: int = 40) -> Iterator[str]:
+    """Measure the cost of joint limits in states in which none is active."""
+    yield "| robot | states | without, median | hard, ratio | soft, ratio |"
+    yield "|---" * 5 + "|"
+    for name in ROBOTS:
+        robot = fb.load(name)
+        off, hard, soft = (
+            controller(robot, joint_limits=limits)
+            for limits in (None, JointLimits.of(robot, weight=None), "robot")
+        )
+        at = [
+            (q, v)
+            for q, v in states(robot, n, SPREADS["easy"])
+            if not any(row.kind.endswith(JOINT_LIMITS) for row in hard(q, v).active)
+        ]
+        times = np.reshape(interleaved((off, hard, soft), at, rounds), (3, rounds, -1))
+        medians = np.median(times, axis=2)
+        ratios = np.median(medians[1:] / medians[0], axis=1)
+        yield (
+            f"| {name} | {len(at)} | {np.median(times[0]):.1f} µs | {ratios[0]:.3f} | "
+            f"{ratios[1]:.3f} |"
+        )
 
 
 # growth -------------------------------------------------------------------------------------------
@@ -331,9 +361,19 @@ def main() -> None:
     ask.add_argument(
         "--long", type=int, default=0, help="run so many ticks, and measure nothing else"
     )
+    ask.add_argument(
+        "--joint-limits", action="store_true", help="measure the cost of joint limits, nothing else"
+    )
     options = ask.parse_args()
-    if options.agreement or options.long:
-        for line in agreement(options.agreement) if options.agreement else long_run(options.long):
+    only = None
+    if options.agreement:
+        only = agreement(options.agreement)
+    elif options.long:
+        only = long_run(options.long)
+    elif options.joint_limits:
+        only = joint_limits(options.states)
+    if only:
+        for line in only:
             print(line, flush=True)
         return
     curves = growth(options.states // 4)

@@ -36,6 +36,18 @@ def test_the_friction_rows_are_those_of_the_peers():
     assert np.allclose(rows, expected, atol=1e-12)
 
 
+def test_joints_can_stop_within_limits_that_peers_share():
+    for peer in peer_problems.LIMITED:
+        problem = peer_problems.problem("talos", peer)
+        limits, d = problem.joint_limits, problem.robot.d
+        for q, v in problem.states("saturated", 5):
+            stop = q[-d:] + v[-d:] * np.abs(v[-d:]) / (2.0 * limits.braking)
+            assert np.all((limits.lower <= stop) & (stop <= limits.upper))
+            assert np.all(np.abs(v[-d:]) < limits.velocity)
+            least, largest = limits.bounds(q[-d:], v[-d:])
+            assert np.all((least < largest) & (np.abs(largest) <= limits.acceleration))
+
+
 @pytest.mark.front_end
 def test_a_process_gives_the_torques_of_its_controller():
     problem = peer_problems.problem("go2", "tsid")
