@@ -253,7 +253,10 @@ def controller(
         made = Stand(robot, contacts, _by_feet(GAITS, robot)[name](robot, swing=swing), **options)
     else:
         stance = contacts.without(*settings.lifted_feet) if settings.lifted_feet else contacts
-        made = WholeBodyController(robot, stance, _tasks(settings, state), **options)
+        # without joint limits, a switched-off term shows its effect down to the joints' stops
+        made = WholeBodyController(
+            robot, stance, _tasks(settings, state), joint_limits=None, **options
+        )
     return BaseMotors(made, sim, assumed) if "zeros" in settings.actual_off else made
 
 

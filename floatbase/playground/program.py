@@ -140,6 +140,7 @@ def _controller(settings: Settings, robot: Robot) -> list[str]:
         ]
     else:
         lines += _standing(settings)
+        options += ", joint_limits=None"
         lines.append(f"controller = fb.WholeBodyController(robot, contacts, tasks{options})")
     if "zeros" in settings.actual_off:
         arguments = "controller, sim" + ("" if assumed is None else ", mismatch")

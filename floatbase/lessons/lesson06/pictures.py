@@ -164,7 +164,9 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
     contacts = fb.Contacts.points(robot, normals=slope_normal(believed))
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start), facets=facets)
+    controller = fb.WholeBodyController(
+        robot, contacts, fb.standing_tasks(start), facets=facets, joint_limits=None
+    )
     planned = controller(start.q, start.v).forces
     front, rear = friction_ratios(planned, n)[[0, 2]]
     picture = view.painter.picture(

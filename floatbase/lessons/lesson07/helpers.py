@@ -94,7 +94,10 @@ def make_controller() -> fb.WholeBodyController:
     """Return the controller of the push-recovery map: motion, forces and torques in one QP."""
     state = standing_go2_eom().state
     return fb.WholeBodyController(
-        state.robot, fb.Contacts.points(state.robot, mu=MU), fb.standing_tasks(state)
+        state.robot,
+        fb.Contacts.points(state.robot, mu=MU),
+        fb.standing_tasks(state),
+        joint_limits=None,
     )
 
 
@@ -140,7 +143,7 @@ def leaning_controller(mu: float) -> fb.WholeBodyController:
     wish = fb.CoMTask(state.com, acceleration=[6.0, 0.0, 0.0])
     contacts = fb.Contacts.points(state.robot, mu=mu)
     return fb.WholeBodyController(
-        state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8
+        state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8, joint_limits=None
     )
 
 

@@ -43,7 +43,9 @@ def rows_on_three_feet() -> int:
     state = standing_go2_eom().state
     contacts = fb.Contacts.points(state.robot, mu=MU).without("FL_foot")
     return len(
-        fb.WholeBodyController(state.robot, contacts, fb.standing_tasks(state), facets=6)
+        fb.WholeBodyController(
+            state.robot, contacts, fb.standing_tasks(state), facets=6, joint_limits=None
+        )
         .qp(state)
         .G
     )

@@ -27,7 +27,9 @@ def _run_standing(sim: fb.Simulation, kp: float) -> Rollout:
     state = sim.state
     _, level, posture = fb.standing_tasks(state)
     tasks = [fb.CoMTask(state.com, kp=kp), level, posture]
-    controller = fb.WholeBodyController(sim.robot, Contacts.feet(sim.robot, MU), tasks)
+    controller = fb.WholeBodyController(
+        sim.robot, Contacts.feet(sim.robot, MU), tasks, joint_limits=None
+    )
     return fb.rollout(sim, controller, _SETTLING_TIME, control_period=PERIOD)
 
 
@@ -83,8 +85,13 @@ def time_on_two_feet(shift: npt.ArrayLike) -> float:
     _, level, posture = fb.standing_tasks(state)
     tasks = [fb.CoMTask(state.com + np.asarray(shift)), level, posture]
     fb.rollout(
-        sim, fb.WholeBodyController(robot, contacts, tasks), _LEAN_TIME, control_period=PERIOD
+        sim,
+        fb.WholeBodyController(robot, contacts, tasks, joint_limits=None),
+        _LEAN_TIME,
+        control_period=PERIOD,
     )
     up = [fb.FrameTask(name, state.point(name) + [0.0, 0.0, _LIFT_HEIGHT]) for name in lifted]
-    controller = fb.WholeBodyController(robot, contacts.without(*lifted), [*tasks, *up])
+    controller = fb.WholeBodyController(
+        robot, contacts.without(*lifted), [*tasks, *up], joint_limits=None
+    )
     return float(fb.rollout(sim, controller, 3.0, control_period=PERIOD).time[-1]) - _LEAN_TIME
