@@ -121,11 +121,13 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
     UnknownNameError
         The exception, to be raised by the caller.
     """
+    from floatbase._validation import short_repr  # it imports this module
+
     known = sorted(known)
-    query = str(name).strip().lower()
+    query = name.strip().lower() if isinstance(name, str) else ""
     matches = get_close_matches(query, {k.lower() for k in known}, n=5)
     close = [k for match in matches for k in known if k.lower() == match][:5] or [
-        k for k in known if query in k.lower()
+        k for k in known if query and query in k.lower()
     ][:5]
     parts = ["Similar names: " + ", ".join(close)] if close else []
     if not close or len(known) <= 6:
@@ -133,5 +135,5 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
             "Available names: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
         )
     return UnknownNameError(
-        f"Unknown {kind} {name!r}. {'. '.join(parts)}." + (f" {hint}" if hint else "")
+        f"Unknown {kind} {short_repr(name)}. {'. '.join(parts)}." + (f" {hint}" if hint else "")
     )

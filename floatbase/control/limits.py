@@ -94,7 +94,8 @@ class LinearInequality(Value):
         super().__post_init__()
         if self.block not in BLOCKS:
             raise InputError(
-                f'block of {self._label()} is {self.block!r}. It must be "qdd", "tau" or "forces".'
+                f"block of {self._label()} is {short_repr(self.block)}. It must be "
+                f'"qdd", "tau" or "forces".'
             )
         if callable(self.coefficients) and not isinstance(self.coefficients, type):
             as_callable(f"coefficients of {self.name}", self.coefficients, "coefficients(eom, t)")

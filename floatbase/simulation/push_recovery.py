@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_positive,
     cached_property,
     read_only,
+    short_repr,
     signature_error,
 )
 from floatbase.dynamics import Contacts
@@ -208,7 +209,8 @@ def push_recovery(
         or directions < _MIN_DIRECTIONS
     ):
         raise InputError(
-            f"directions is {directions!r}; it must be a whole number ≥ {_MIN_DIRECTIONS}."
+            f"directions is {short_repr(directions)}; it must be a whole number ≥ "
+            f"{_MIN_DIRECTIONS}."
         )
     make = _factory_for(controller)
     sim, example = make()
@@ -253,7 +255,8 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     needs = "a controller with a robot, or a function without parameters that returns one"
     if not callable(controller):
         raise InputError(
-            f"push_recovery needs {needs} or a pair (simulation, controller), not {controller!r}."
+            f"push_recovery needs {needs} or a pair (simulation, controller), not "
+            f"{short_repr(controller)}."
         )
     if not hasattr(controller, "robot"):
         if fault := signature_error(controller):
@@ -280,7 +283,7 @@ def _simulation_and_controller(make: Callable[[], Any]) -> tuple[Simulation, Any
     if not callable(made) or not hasattr(made, "robot"):
         raise InputError(
             f"The function must return a controller with a robot, or a pair (simulation, "
-            f"controller), not {made!r}."
+            f"controller), not {short_repr(made)}."
         )
     return Simulation(made.robot), made
 

@@ -311,7 +311,7 @@ def _desired_torques(sim: Simulation, command: Any) -> Array:
         raise InputError(
             f"A controller must return an object with an attribute tau, shape ({sim.robot.d},) "
             f"[N·m], such as a Command or types.SimpleNamespace(tau=…). This one returned "
-            f"{command!r}."
+            f"{short_repr(command)}."
         )
     return _as_torques(sim, "The controller's torques", command.tau)
 
