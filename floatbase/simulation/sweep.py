@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from floatbase._validation import short_repr, signature_error
+from floatbase._validation import as_bool, as_integer, short_repr, signature_error
 from floatbase.errors import InputError, SimulationError, require
 from floatbase.simulation.row_store import (
     RESERVED_NAMES,
@@ -29,6 +29,7 @@ from floatbase.simulation.row_store import (
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+_MAX_WORKERS = 1024  # a typing error, not the number of cores of a computer, is larger
 _WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
 _POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
 _MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep
@@ -136,7 +137,7 @@ def sweep(
             initial=len(done),
             desc=name,
             unit="point",
-            disable=not progress,
+            disable=not as_bool("progress", progress),
         )
         with bar, closing(_completed_points(executor, job, points, pending)) as answers:
             for i, answer in answers:
@@ -233,12 +234,7 @@ def _worker_count(workers: Any) -> int:
     """Return the number of processes, checked."""
     if workers is None:
         return int(require("loky", "sweep").cpu_count())
-    if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
-        raise InputError(
-            f"workers is {short_repr(workers)}; it must be a whole number of processes ≥ 1, or "
-            f"None for one process on each core."
-        )
-    return int(workers)
+    return as_integer("workers", workers, 1, _MAX_WORKERS, "None is one process on each core")
 
 
 def _make_job(function: Any, setup: Any) -> _Job:
