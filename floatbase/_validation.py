@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import FrozenInstanceError, fields
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -14,7 +13,8 @@ from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 import numpy as np
 import numpy.typing as npt
 
-from floatbase.errors import InputError
+from floatbase.errors import MAX_REPR, InputError
+from floatbase.errors import short_repr as short_repr  # with the checks, for other modules
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
@@ -23,7 +23,6 @@ _FLOAT64 = np.dtype(np.float64)
 MAX_MAGNITUDE = 1e30
 _MIN_POSITIVE = 1.0 / MAX_MAGNITUDE  # a smaller positive number has a quotient that is too large
 _ZERO_NORM = 1e-9  # a shorter vector is zero up to rounding and has no direction
-_MAX_REPR = 60  # characters of a value that a message shows
 
 
 class cached_property(functools.cached_property[T]):
@@ -179,9 +178,9 @@ def as_strings(name: str, value: Any) -> tuple[str, ...]:
         and all(isinstance(entry, str) for entry in value)
     ):
         return tuple(as_string(f"an entry of {name}", entry) for entry in value)
-    example = short_repr(value if isinstance(value, str) else "…")
+    example = value if isinstance(value, str) and len(value) <= MAX_REPR else "…"
     raise InputError(
-        f"{name} must be a list of strings, such as [{example}], not {short_repr(value)}."
+        f'{name} must be a list of strings, such as ["{example}"], not {short_repr(value)}.'
     )
 
 
@@ -382,23 +381,6 @@ def as_positive(
         else "greater than 0"
     )
     raise InputError(f"{name} is {result:g}, but it must be {bound}{f' [{unit}]' if unit else ''}.")
-
-
-def short_repr(value: object) -> str:
-    """Return a short representation of a value for error messages, or only its type."""
-    if isinstance(value, type):
-        return f"the class {value.__name__}"
-    if isinstance(value, np.ndarray) and value.ndim:
-        return f"an array of shape {value.shape} and dtype {value.dtype}"
-    if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
-        return f"an integer of magnitude above {MAX_MAGNITUDE:g}"
-    if value is None or isinstance(
-        value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray
-    ):
-        with suppress(Exception):  # of an entry, such as an integer of more than 4300 digits
-            text = " ".join(repr(value).split())
-            return text if len(text) <= _MAX_REPR else f"{text[:_MAX_REPR]}…"
-    return f"a value of type {type(value).__name__}"
 
 
 def unit_vector(name: str, value: Any) -> Array:

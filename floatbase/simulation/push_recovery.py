@@ -15,6 +15,7 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
+    as_integer,
     as_positive,
     cached_property,
     read_only,
@@ -31,6 +32,7 @@ from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.sweep import sweep
 
+_MAX_DIRECTIONS = 3600  # a tenth of a degree; with more, the computation takes days
 _MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
 _FACETS = 16  # facets of the polyhedra inside the friction cones: 2 % of a cone is lost
 # times the robot's weight: if a larger push is survived, it is not the ground that resists it
@@ -203,15 +205,7 @@ def push_recovery(
         If the robot falls without a push, or if the next push to try exceeds a hundred times the
         robot's weight.
     """
-    if (
-        isinstance(directions, bool)
-        or not isinstance(directions, int | np.integer)
-        or directions < _MIN_DIRECTIONS
-    ):
-        raise InputError(
-            f"directions is {short_repr(directions)}; it must be a whole number ≥ "
-            f"{_MIN_DIRECTIONS}."
-        )
+    directions = as_integer("directions", directions, _MIN_DIRECTIONS, _MAX_DIRECTIONS)
     make = _factory_for(controller)
     sim, example = make()
     robot, contacts = sim.robot, getattr(example, "contacts", None)

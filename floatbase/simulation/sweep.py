@@ -161,7 +161,7 @@ def _grid_points(grid: Any) -> list[Row]:
     if isinstance(grid, Mapping):
         axes = {}
         for name, values in grid.items():
-            if isinstance(values, str) or not isinstance(values, Iterable):
+            if isinstance(values, str) or not _is_iterable(values):
                 raise InputError(
                     f"The grid's {name!r} must be a list of values, not {short_repr(values)}. For "
                     f"a single value, use [{short_repr(values)}]."
@@ -177,7 +177,7 @@ def _grid_points(grid: Any) -> list[Row]:
             if axes
             else []
         )
-    elif isinstance(grid, Iterable) and not isinstance(grid, str):
+    elif _is_iterable(grid) and not isinstance(grid, str):
         points = list(grid)
         for point in points:
             if not isinstance(point, Mapping):
@@ -200,6 +200,11 @@ def _grid_points(grid: Any) -> list[Row]:
                 f"{' and '.join(RESERVED_NAMES)} are reserved."
             )
     return points
+
+
+def _is_iterable(value: Any) -> bool:
+    """Return whether a value can be iterated, unlike an array of shape ()."""
+    return isinstance(value, Iterable) and getattr(value, "shape", None) != ()
 
 
 def _function_name(function: Any, file: Any) -> str:
