@@ -103,7 +103,7 @@ class LinearInequality(Value):
             object.__setattr__(self, "coefficients", self._checked(self.coefficients, None))
 
     def _label(self) -> str:
-        return f"inequality {self.name!r}"
+        return f"inequality {short_repr(self.name)}"
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """Return G and h at a state and a time, checked.
