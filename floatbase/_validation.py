@@ -13,15 +13,16 @@ from typing import Any, Self, TypeAlias, TypeGuard, TypeVar, overload
 import numpy as np
 import numpy.typing as npt
 
-from floatbase.errors import InputError
+from floatbase.errors import MAX_REPR, InputError
+from floatbase.errors import short_repr as short_repr  # with the checks, for other modules
 
 Array: TypeAlias = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 _FLOAT64 = np.dtype(np.float64)
 # no quantity of a robot in SI units comes near it, and a product of ten such numbers is finite
 MAX_MAGNITUDE = 1e30
+_MIN_POSITIVE = 1.0 / MAX_MAGNITUDE  # a smaller positive number has a quotient that is too large
 _ZERO_NORM = 1e-9  # a shorter vector is zero up to rounding and has no direction
-_MAX_REPR = 60  # characters of a value that a message shows
 
 
 class cached_property(functools.cached_property[T]):
@@ -150,10 +151,23 @@ def as_instance(name: str, value: object, cls: type[T], example: str = "") -> T:
 
 
 def as_string(name: str, value: object) -> str:
-    """Return `value` after checking that it is a string."""
-    if isinstance(value, str):
-        return value
-    raise InputError(f"{name} must be a string, not {short_repr(value)}.")
+    """Return `value` after checking that it is a string that files and pages can hold."""
+    if not isinstance(value, str):
+        raise InputError(f"{name} must be a string, not {short_repr(value)}.")
+    if not _is_storable(value):
+        raise InputError(
+            f"{name} is {short_repr(value)}, but it must not contain null characters or unpaired "
+            f"surrogates."
+        )
+    return value
+
+
+def _is_storable(text: str) -> bool:
+    """Return whether a string has a UTF-8 encoding without null characters."""
+    try:
+        return b"\0" not in text.encode()
+    except UnicodeEncodeError:  # unpaired surrogates
+        return False
 
 
 def as_strings(name: str, value: Any) -> tuple[str, ...]:
@@ -163,8 +177,8 @@ def as_strings(name: str, value: Any) -> tuple[str, ...]:
         and not isinstance(value, str)
         and all(isinstance(entry, str) for entry in value)
     ):
-        return tuple(value)
-    example = value if isinstance(value, str) else "…"
+        return tuple(as_string(f"an entry of {name}", entry) for entry in value)
+    example = value if isinstance(value, str) and len(value) <= MAX_REPR else "…"
     raise InputError(
         f'{name} must be a list of strings, such as ["{example}"], not {short_repr(value)}.'
     )
@@ -250,7 +264,7 @@ def _is_read_only(value: Any) -> TypeGuard[Array]:
 def numeric_copy(value: Any) -> Array | None:
     """Return a float64 copy of real numbers, and None for anything else.
 
-    Complex or masked numbers, strings, booleans, dates and objects give None.
+    Complex or masked numbers, strings, bytes, booleans, dates and objects give None.
     """
     if type(value) is np.ndarray and value.dtype is _FLOAT64:
         return value.copy("K")  # the most frequent case, and in the control loop
@@ -258,7 +272,7 @@ def numeric_copy(value: Any) -> Array | None:
         array = np.array(value)
     except Exception:  # ragged rows, or a class whose conversion fails
         return None
-    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
+    if array.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray | bytearray):
         return None
     return array.astype(np.float64, copy=False)
 
@@ -355,28 +369,18 @@ def as_positive(
     With `allow_zero`, zero is accepted too.
     """
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
-    if 0.0 < result <= maximum or (result == 0.0 and allow_zero):
+    if _MIN_POSITIVE <= result <= maximum or (0.0 <= result < _MIN_POSITIVE and allow_zero):
         return result
     bound = (
-        f"at most {maximum:g}" if result > 0.0 else "at least 0" if allow_zero else "greater than 0"
+        f"at most {maximum:g}"
+        if result > maximum
+        else "at least 0"
+        if allow_zero
+        else f"at least {_MIN_POSITIVE:g}"
+        if result > 0.0
+        else "greater than 0"
     )
     raise InputError(f"{name} is {result:g}, but it must be {bound}{f' [{unit}]' if unit else ''}.")
-
-
-def short_repr(value: object) -> str:
-    """Return a short representation of a value for error messages, or only its type."""
-    if isinstance(value, type):
-        return f"the class {value.__name__}"
-    if isinstance(value, np.ndarray) and value.ndim:
-        return f"an array of shape {value.shape} and dtype {value.dtype}"
-    if isinstance(value, int) and abs(value) > MAX_MAGNITUDE:
-        return f"an integer of magnitude above {MAX_MAGNITUDE:g}"
-    if value is None or isinstance(
-        value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray
-    ):
-        text = " ".join(repr(value).split())
-        return text if len(text) <= _MAX_REPR else f"{text[:_MAX_REPR]}…"
-    return f"a value of type {type(value).__name__}"
 
 
 def unit_vector(name: str, value: Any) -> Array:

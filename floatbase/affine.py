@@ -192,7 +192,7 @@ class Affine(Value):
         """Return the map of one named block."""
         if not isinstance(block, str) or block not in self.blocks:
             raise InputError(
-                f"This map has no block {block!r}. Its blocks are {list(self.blocks)}."
+                f"This map has no block {short_repr(block)}. Its blocks are {list(self.blocks)}."
             )
         rows = self.blocks[block]
         return Affine(self.A[rows], self.b[rows])

@@ -6,9 +6,15 @@ Each message says what is wrong, what is expected, and what to do.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
+
+import numpy as np
+
+MAX_REPR = 60  # characters of a value that a message shows
+_MAX_INTEGER = 10**30  # Python refuses to write an integer of more than 4300 digits
 
 
 class FloatbaseError(Exception):
@@ -102,6 +108,34 @@ def require(module: str, extra: str) -> ModuleType:
         ) from None
 
 
+def short_repr(value: object) -> str:
+    """Return a short representation of a value for error messages, or only its type.
+
+    Parameters
+    ----------
+    value : object
+        Value to represent.
+
+    Returns
+    -------
+    str
+        At most `MAX_REPR` characters and an ellipsis.
+    """
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, np.ndarray) and value.ndim:
+        return f"an array of shape {value.shape} and dtype {value.dtype}"
+    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
+        return f"an integer of magnitude above {float(_MAX_INTEGER):g}"
+    if value is None or isinstance(
+        value, str | bytes | int | float | complex | np.generic | list | tuple | np.ndarray
+    ):
+        with suppress(Exception):  # of an entry that cannot be represented
+            text = " ".join(repr(value).split())
+            return text if len(text) <= MAX_REPR else f"{text[:MAX_REPR]}…"
+    return f"a value of type {type(value).__name__}"
+
+
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:
     """Make an `UnknownNameError` that lists similar names, and all names if there are few.
 
@@ -122,10 +156,10 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
         The exception, to be raised by the caller.
     """
     known = sorted(known)
-    query = str(name).strip().lower()
+    query = name.strip().lower() if isinstance(name, str) else ""
     matches = get_close_matches(query, {k.lower() for k in known}, n=5)
     close = [k for match in matches for k in known if k.lower() == match][:5] or [
-        k for k in known if query in k.lower()
+        k for k in known if query and query in k.lower()
     ][:5]
     parts = ["Similar names: " + ", ".join(close)] if close else []
     if not close or len(known) <= 6:
@@ -133,5 +167,5 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
             "Available names: " + ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
         )
     return UnknownNameError(
-        f"Unknown {kind} {name!r}. {'. '.join(parts)}." + (f" {hint}" if hint else "")
+        f"Unknown {kind} {short_repr(name)}. {'. '.join(parts)}." + (f" {hint}" if hint else "")
     )

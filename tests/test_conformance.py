@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import judges
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from values import UP, controller, record, values
@@ -410,3 +411,25 @@ def test_wrong_arguments_are_told(
         if (found := answer(partial(called, callee, rights_of(callee) | {p.name: wrong})))
     }
     assert {call: found for call, found in faults.items() if call not in ACCEPTED} == {}
+
+
+SAMPLES = 300
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_sample_of_calls_with_any_wrong_argument_raises_no_other_error(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(seed)  # other calls with --seed
+    calls = [(callee, p.name) for callee in callees() for p in callee.parameters]
+    faults = {}
+    for i, label in zip(
+        rng.integers(len(calls), size=SAMPLES), rng.choice(list(WRONG), SAMPLES), strict=True
+    ):
+        callee, name = calls[i]
+        found = answer(partial(called, callee, rights_of(callee) | {name: WRONG[label]}))
+        if found not in (None, "accepted"):
+            faults[f"{callee.name}({name}={label})"] = found
+        plt.close("all")
+    assert faults == {}

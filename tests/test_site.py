@@ -246,6 +246,15 @@ def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path: Path) -> 
     with pytest.raises(InputError, match="CNAME"):
         replace_site(built, folder)
     assert (folder / "CNAME").read_text() == "x.org"
+    (built / "CNAME").unlink()
+    for target in ("kept.html", "missing.html"):
+        (tmp_path / "kept.html").write_text("kept")
+        (folder / "index.html").unlink()
+        (folder / "index.html").symlink_to(tmp_path / target)
+        with pytest.raises(InputError, match="index.html"):
+            replace_site(built, folder)
+    assert (tmp_path / "kept.html").read_text() == "kept"
+    assert not (tmp_path / "missing.html").exists()
 
 
 class NoPictures:

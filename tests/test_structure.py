@@ -18,7 +18,16 @@ PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
 LAYERS = (
-    ("conventions", "errors", "_validation", "_assets", "_geometry", "affine", "linear_algebra"),
+    (
+        "conventions",
+        "errors",
+        "_validation",
+        "_assets",
+        "_files",
+        "_geometry",
+        "affine",
+        "linear_algebra",
+    ),
     ("qp",),
     ("robots",),
     ("dynamics",),

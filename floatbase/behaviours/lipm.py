@@ -54,6 +54,9 @@ class LIPM(Value):
 
     Notes
     -----
+    Before the first segment, the motion is that at its beginning. After the last segment, the
+    ZMP does not move, and the centre of mass approaches it.
+
     The model is the three-dimensional linear inverted pendulum mode of [Kajita2001]_. The
     plan follows the DCM, as in [Englsberger2015]_; for the ZMP see [Vukobratovic2004]_.
 

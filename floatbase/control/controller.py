@@ -124,6 +124,11 @@ class WholeBodyController:
     -----
     [FBR]_, eqs. (26), (27). A call raises `InfeasibleError` with the conflicting constraints.
 
+    If the contacts are redundant or nearly so, as in eq. (5) for solo8 on four feet, a measured
+    velocity can contradict them. The controller then answers without an error, but its q̈ violates
+    some rows of eq. (5), by several m/s² for solo8 at joint velocities of 3 rad/s. The residual of
+    eq. (5), A q̈ - b, shows how much. See `build_qp`.
+
     The first compiled controller on a machine compiles for about a minute, unless the installation
     did so (`python -m floatbase compile`). Later processes load the code from disk, and their
     answers are identical to the bit. Answers of the process that compiled may differ by rounding.

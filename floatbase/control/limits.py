@@ -99,7 +99,8 @@ class LinearInequality(Value):
         super().__post_init__()
         if self.block not in BLOCKS:
             raise InputError(
-                f'block of {self._label()} is {self.block!r}. It must be "qdd", "tau" or "forces".'
+                f"block of {self._label()} is {short_repr(self.block)}. It must be "
+                f'"qdd", "tau" or "forces".'
             )
         if callable(self.coefficients) and not isinstance(self.coefficients, type):
             as_callable(f"coefficients of {self.name}", self.coefficients, "coefficients(eom, t)")
@@ -107,7 +108,7 @@ class LinearInequality(Value):
             object.__setattr__(self, "coefficients", self._checked(self.coefficients, None))
 
     def _label(self) -> str:
-        return f"inequality {self.name!r}"
+        return f"inequality {short_repr(self.name)}"
 
     def at(self, eom: EquationsOfMotion, t: float = 0.0) -> tuple[Array, Array]:
         """Return G and h at a state and a time, checked.

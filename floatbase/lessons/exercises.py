@@ -186,6 +186,6 @@ def _progress_mark(tried: dict[str, int] | None) -> str:
 
 def _find_exercise(name: str) -> Exercise:
     known = all_exercises()
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise unknown_name("exercise", name, known)
     return known[name]

@@ -85,7 +85,7 @@ def compare(name: str, value: Any) -> None:
         If `value` is not a number, an array of numbers or a string.
     """
     as_string("name of a prediction", name)
-    result: Any = value if isinstance(value, str) else _stored_result(value)
+    result: Any = as_string("value", value) if isinstance(value, str) else _stored_result(value)
     stored = progress.predictions().get(name, {})
     known = stored | _unsaved.get(name, {})
     unit = _units.get(name, known.get("unit", ""))

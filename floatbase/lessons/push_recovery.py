@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from floatbase._validation import as_string
+from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.simulation import PushRecovery, Simulation, push_recovery
 from floatbase.viewer import Picture
@@ -55,7 +55,7 @@ def measured_push_recovery(lesson: str) -> PushRecovery:
     kept = _stored_pushes()
     if as_string("lesson", lesson) not in kept:
         raise InputError(
-            f"Lesson {lesson!r} has no push-recovery map. The maps are {', '.join(kept)}."
+            f"Lesson {short_repr(lesson)} has no push-recovery map. The maps are {', '.join(kept)}."
         )
     controller = controller_factory(lesson)()
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
@@ -131,7 +131,7 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
         )
     except (ModuleNotFoundError, AttributeError) as error:
         raise InputError(
-            f"Lesson {lesson!r} has no controller to push. Lessons 05 to 09 have one."
+            f"Lesson {short_repr(lesson)} has no controller to push. Lessons 05 to 09 have one."
         ) from error
     return make
 

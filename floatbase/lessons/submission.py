@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from datetime import datetime
 from pathlib import Path
 
 import floatbase as fb
+from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
@@ -60,15 +60,18 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises,
         "predictions": predicted,
     }  # fmt: skip
-    from floatbase.lessons.publish.workspace import write_whole  # it imports this package
-
     try:
         path = _own_path(Path(folder), name.strip())
-        write_whole(path, json.dumps(written, indent=1).encode())
-    except OSError as error:
+        try:
+            write_whole(path, json.dumps(written, indent=1).encode())
+        except OSError:
+            if not path.stat().st_size:  # it was only reserved
+                path.unlink()
+            raise
+    except (OSError, ValueError) as error:  # ValueError: a path that no file can have
         raise InputError(
-            f"{error.filename or folder} cannot be written: {error.strerror}. Choose another "
-            f"folder: hand_in(…, folder=…)."
+            f"{getattr(error, 'filename', None) or short_repr(folder)} cannot be written: "
+            f"{getattr(error, 'strerror', error)}. Choose another folder: hand_in(…, folder=…)."
         ) from None
     known = all_exercises()  # an older course may have had others
     solved = [key for key, entry in tried.items() if entry["right"] and key in known]
@@ -83,13 +86,21 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
 
 
 def _own_path(folder: Path, name: str) -> Path:
-    """Return the path of a learner's file: the first one that is free or holds this name."""
+    """Return the path of a learner's file: the first one that is free or holds this name.
+
+    A free one is created, empty, so that a learner who hands in at the same time gets another one.
+    """
     stem = "answers-" + "_".join(re.findall(r"\w+", name))
     path, number = folder / f"{stem}.json", 1
-    while os.path.lexists(path) and _name_inside(path) != name:
-        number += 1
-        path = folder / f"{stem}-{number}.json"
-    return path
+    while True:
+        try:
+            path.open("x").close()
+        except FileExistsError:
+            if _name_inside(path) != name:
+                number += 1
+                path = folder / f"{stem}-{number}.json"
+                continue
+        return path
 
 
 def _name_inside(path: Path) -> str | None:

@@ -117,8 +117,9 @@ class TargetTask(Value):
 
     def __post_init__(self) -> None:
         """Check gains and weight, and copy constant targets; the default of kd is 2 √kp."""
+        for field in ("frame", "reference"):  # first, because the name may contain them
+            as_string(f"{field} of a task", getattr(self, field, ""))
         as_string("name of a task", self.name)
-        as_string("frame of a task", getattr(self, "frame", ""))
         fields: dict[str, object] = {
             "weight": as_positive(f"weight of {self.name}", self.weight, allow_zero=True)
         }

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_string, cross, frozen
+from floatbase._validation import Array, cross, frozen
 from floatbase.errors import InputError
 from floatbase.objectives._task import Shapes, Target
 from floatbase.objectives.motion_tasks import MotionTask, nearest_rotation
@@ -79,9 +79,9 @@ class RelativePoseTask(MotionTask):
     target_shapes: ClassVar[Shapes] = {"pose": (4, 4), "velocity": (6,), "acceleration": (6,)}
 
     def __post_init__(self) -> None:
-        """Check the reference as well."""
+        """Check that the two frames differ."""
         super().__post_init__()
-        if as_string(f"reference of {self.name}", self.reference) == self.frame:
+        if self.reference == self.frame:
             raise InputError(
                 f"frame and reference of a RelativePoseTask are both {self.frame!r}, but the pose "
                 f"of a frame relative to itself is constant."

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._geometry import minimum_jerk
-from floatbase._validation import Array, T
+from floatbase._validation import Array, T, as_array, as_number
 from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Stand, Walk, pitch_and_yaw
 from floatbase.control import WholeBodyController
@@ -302,7 +302,8 @@ def nodding_rotation(
         velocity, shape (3,) [rad/s], and the angular acceleration, shape (3,) [rad/s²], all in the
         world frame.
     """
-    home = np.asarray(rotation, dtype=float)
+    home = as_array("rotation", rotation, (3, 3))
+    size, begin = as_number("size", size, "rad"), as_number("begin", begin, "s")
 
     def angles(t: float) -> Array:
         """Return pitch and yaw at time t."""

@@ -342,7 +342,7 @@ class Playground:
         UnknownNameError
             If there is no such term.
         """
-        if term not in list(self.shown_terms):
+        if not isinstance(term, str) or term not in self.shown_terms:
             raise unknown_name("term", term, self.shown_terms)
         self.shown_terms[term] = as_bool("shown", shown)
         if self.run.status != "running":
@@ -495,7 +495,7 @@ def mean_force_error(record: fb.Rollout) -> float:
     float
         Length of the difference, summed over the contact points and averaged over time [N].
     """
-    if not len(record) or not record.planned.size:
+    if not len(as_instance("record", record, fb.Rollout)) or not record.planned.size:
         return 0.0
     off = np.linalg.norm(
         (record.planned - record.measured).reshape(len(record), -1, 3), axis=2

@@ -6,6 +6,8 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from floatbase._validation import as_number
+
 
 class RealTimeFactor:
     """Ratio of simulated time to real time over the last seconds.
@@ -35,7 +37,7 @@ class RealTimeFactor:
         float or None
             Real-time factor [-]; None during the first half second after a start or a pause.
         """
-        now = self._clock()
+        simulated, now = as_number("simulated", simulated, "s"), self._clock()
         if self._seen and (simulated < self._seen[-1][1] or now - self._seen[-1][0] > self._over):
             self._seen.clear()
         self._seen.append((now, simulated))

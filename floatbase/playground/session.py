@@ -15,11 +15,11 @@ from floatbase._geometry import rotation_z
 from floatbase._validation import as_instance
 from floatbase.behaviours import Walk
 from floatbase.dynamics import Contacts
-from floatbase.errors import SimulationWarning
+from floatbase.errors import SimulationWarning, unknown_name
 from floatbase.playground import build
 from floatbase.playground.perturbed import BaseMotors, PerturbedSimulation
 from floatbase.playground.program import program
-from floatbase.playground.settings import Settings
+from floatbase.playground.settings import SETTING_NAMES, Settings
 from floatbase.robots import Robot, State
 from floatbase.simulation import Actuators, Controller, Push
 
@@ -110,6 +110,8 @@ class Session:
         str
             Source code of the program.
         """
+        if push is not None:
+            as_instance("push", push, Push)
         return program(self.settings, self.robot, PERIOD, push)
 
     def observe(self, record: fb.Rollout) -> None:
@@ -120,7 +122,7 @@ class Session:
         record : Rollout
             Record of the slice.
         """
-        self.last = record
+        self.last = as_instance("record", record, fb.Rollout)
 
     def change(self, **changes: Any) -> bool:
         """Change settings.
@@ -139,6 +141,9 @@ class Session:
         """
         before = self.settings
         try:
+            for name in changes:
+                if name not in SETTING_NAMES:
+                    raise unknown_name("setting", name, SETTING_NAMES)
             settings = replace(before, **changes)
             moved = settings.slope[1] != before.slope[1]
             if moved:

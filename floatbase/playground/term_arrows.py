@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import floatbase as fb
-from floatbase._validation import Array
+from floatbase._validation import Array, as_instance, as_positive, as_string, as_strings
 from floatbase.dynamics import Contacts, equations_of_motion
 from floatbase.viewer import Picture, markers, prefixed, shapes
 from floatbase.viewer.scene.colours import COM, MEASURED
@@ -67,8 +67,11 @@ def term_arrows(
     dict
         Picture, path -> item; empty for a term that has no arrows.
     """
-    if term not in TERM_LEGEND:
+    if as_string("term", term) not in TERM_LEGEND:
         return {}
+    as_instance("record", record, fb.Rollout)
+    scale, size = as_positive("scale", scale, "m/N"), as_positive("size", size, "m")
+    mass, off = as_positive("mass", mass), as_strings("off", off)
     made = {
         "inertia": _inertia,
         "velocity": _velocity,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from floatbase._validation import as_strings
+from floatbase._validation import as_strings, short_repr
 from floatbase.errors import InputError
 
 
@@ -84,5 +84,7 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
         )
     if len(set(labels)) != count:
         duplicate = next(label for label in labels if labels.count(label) > 1)
-        raise InputError(f"Duplicate {kind} name {str(duplicate)!r}. Names must be unique.")
+        raise InputError(
+            f"Duplicate {kind} name {short_repr(str(duplicate))}. Names must be unique."
+        )
     return labels

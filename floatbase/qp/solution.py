@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from floatbase._validation import Array, Value, cached_property, read_only
+from floatbase._validation import Array, Value, cached_property, read_only, short_repr
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE, row_norms
 from floatbase.qp.conflicts import violation_tolerance
@@ -149,6 +149,7 @@ class Solution(Value):
         """Return one named block of x."""
         if not isinstance(block, str) or block not in self.qp.blocks:
             raise InputError(
-                f"This problem has no block {block!r}. Its blocks are {list(self.qp.blocks)}."
+                f"This problem has no block {short_repr(block)}. Its blocks are "
+                f"{list(self.qp.blocks)}."
             )
         return self.x[self.qp.blocks[block]]

@@ -231,7 +231,7 @@ def load_urdf(
         urdf = urdf.lstrip(_WHITESPACE)
     else:
         file = Path(os.path.expanduser(urdf))
-        if not file.exists():
+        if not os.path.exists(file):  # not file.exists(), which raises for a name that is too long
             import example_robot_data as data
 
             if urdf in data.robots_loader.ROBOTS:
@@ -414,11 +414,13 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """Return the entry of a robot in example-robot-data."""
-    if str(name).endswith((".urdf", ".xml", ".xacro")) or "/" in str(name):
+    text = str(name) if isinstance(name, str | Path) else ""
+    if text.endswith((".urdf", ".xml", ".xacro")) or "/" in text:
+        path = short_repr(text)
         raise UnknownNameError(
-            f"{str(name)!r} is the name of a file, not of a robot. Load your own URDF with "
-            f"fb.load_urdf({str(name)!r}, feet=[…]). fb.load accepts {', '.join(CATALOGUE)}, and "
-            f"the other names of example-robot-data."
+            f"{path} is the name of a file, not of a robot. Load your own URDF with "
+            f"fb.load_urdf({path}, feet=[…]). fb.load accepts {', '.join(CATALOGUE)}, and the "
+            f"other names of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:
         raise unknown_name(

@@ -63,7 +63,8 @@ def settling_rollout(
     """Record the next control steps after a record at whose end the controller is off."""
     stance = previous.contacts_at(-1) if len(previous) else previous.contacts
     record = Recorder(sim, stance, ticks, substeps)
-    record_settling(sim, record, stance, ticks, substeps, pushes)
+    with sim.exclusive():
+        record_settling(sim, record, stance, ticks, substeps, pushes)
     return record.to_rollout(pushes, previous.outcome, previous.error, previous.controller_off_time)
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import copy
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isfinite
 from typing import Any, Self
 
@@ -21,7 +24,7 @@ from floatbase._validation import (
     refuse_new_attributes,
 )
 from floatbase.dynamics import UP, Contacts
-from floatbase.errors import InputError
+from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
 from floatbase.simulation.build import Ground, body_name, build_model
@@ -86,6 +89,7 @@ class Simulation:
 
     def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
         self._robot = as_instance("robot", robot, Robot)
+        self._thread_lock = threading.RLock()  # two threads in one MjData crash the process
         self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
         self._feet = Contacts.feet(robot) if robot.feet else Contacts.none()
@@ -126,9 +130,12 @@ class Simulation:
             data.xmat[self._base_body, 2::3],
         )  # origin and z axis
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_thread_lock"}
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore a copy, which has its own MuJoCo data."""
-        vars(self).update(state)
+        vars(self).update(state, _thread_lock=threading.RLock())
         self._refresh_views()
 
     @property
@@ -255,6 +262,8 @@ class Simulation:
         ------
         InputError
             If the state belongs to a different robot.
+        SimulationError
+            If another thread is using the simulation.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
         if state.robot != self.robot:
@@ -262,16 +271,41 @@ class Simulation:
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."
             )
-        self.link_collisions = False
-        mujoco.mj_resetData(self.model, self.data)
-        self._qpos[:], self._qvel[:] = self._conversion.to_mujoco(state.q, state.v)
-        mujoco.mj_forward(self.model, self.data)
+        with self.exclusive():
+            self.link_collisions = False
+            mujoco.mj_resetData(self.model, self.data)
+            self._qpos[:], self._qvel[:] = self._conversion.to_mujoco(state.q, state.v)
+            mujoco.mj_forward(self.model, self.data)
         self._start_height = self._nominal_height = self._base_height()
         self._start_vertical = self._base_vertical.tolist()
         if (
             self._nominal_height <= _MIN_INITIAL_HEIGHT
         ):  # it lies on the ground: measure a fall by the distance to the centre of mass
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
+
+    @contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Reserve the simulation for the present thread, as a context manager.
+
+        Yields
+        ------
+        None
+            Nothing. The reservation ends with the context.
+
+        Raises
+        ------
+        SimulationError
+            If another thread is using the simulation.
+        """
+        if not self._thread_lock.acquire(blocking=False):
+            raise SimulationError(
+                "Another thread is using this simulation, for example a live run. Pause the run, "
+                "or make a second simulation with copy.copy(sim)."
+            )
+        try:
+            yield
+        finally:
+            self._thread_lock.release()
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance the simulation by one timestep.
@@ -282,8 +316,17 @@ class Simulation:
             Joint torques, clipped to the motors' limits [N·m].
         pushes : tuple of Push, optional
             External forces; each acts during its own time.
+
+        Raises
+        ------
+        InputError
+            If the torques or pushes are invalid.
+        SimulationError
+            If another thread is using the simulation.
         """
-        self.advance(as_array("torques", tau, (self.robot.d,), "N·m"), as_pushes(pushes))
+        torques, pushes = as_array("torques", tau, (self.robot.d,), "N·m"), as_pushes(pushes)
+        with self.exclusive():
+            self.advance(torques, pushes)
 
     def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
         """Advance by one timestep without the checks of `step`.

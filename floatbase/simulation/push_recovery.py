@@ -15,9 +15,11 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
+    as_integer,
     as_positive,
     cached_property,
     read_only,
+    short_repr,
     signature_error,
 )
 from floatbase.dynamics import Contacts
@@ -30,6 +32,7 @@ from floatbase.simulation.record import Rollout
 from floatbase.simulation.rollout import Controller, rollout
 from floatbase.simulation.sweep import sweep
 
+_MAX_DIRECTIONS = 3600  # a tenth of a degree; with more, the computation takes days
 _MIN_DIRECTIONS = 3  # directions: fewer do not enclose an area
 _FACETS = 16  # facets of the polyhedra inside the friction cones: 2 % of a cone is lost
 # times the robot's weight: if a larger push is survived, it is not the ground that resists it
@@ -202,14 +205,7 @@ def push_recovery(
         If the robot falls without a push, or if the next push to try exceeds a hundred times the
         robot's weight.
     """
-    if (
-        isinstance(directions, bool)
-        or not isinstance(directions, int | np.integer)
-        or directions < _MIN_DIRECTIONS
-    ):
-        raise InputError(
-            f"directions is {directions!r}; it must be a whole number ≥ {_MIN_DIRECTIONS}."
-        )
+    directions = as_integer("directions", directions, _MIN_DIRECTIONS, _MAX_DIRECTIONS)
     make = _factory_for(controller)
     sim, example = make()
     robot, contacts = sim.robot, getattr(example, "contacts", None)
@@ -253,7 +249,8 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     needs = "a controller with a robot, or a function without parameters that returns one"
     if not callable(controller):
         raise InputError(
-            f"push_recovery needs {needs} or a pair (simulation, controller), not {controller!r}."
+            f"push_recovery needs {needs} or a pair (simulation, controller), not "
+            f"{short_repr(controller)}."
         )
     if not hasattr(controller, "robot"):
         if fault := signature_error(controller):
@@ -280,7 +277,7 @@ def _simulation_and_controller(make: Callable[[], Any]) -> tuple[Simulation, Any
     if not callable(made) or not hasattr(made, "robot"):
         raise InputError(
             f"The function must return a controller with a robot, or a pair (simulation, "
-            f"controller), not {made!r}."
+            f"controller), not {short_repr(made)}."
         )
     return Simulation(made.robot), made
 

@@ -171,26 +171,27 @@ def rollout(
         from tqdm.auto import tqdm  # slow to load
 
         bar = tqdm(bar, "rollout", unit=" ticks")
-    for _ in bar:
-        t, q, v = sim.time, sim.q, sim.v
-        record.before_tick(t, q, v)
-        try:
-            command = controller(q, v, t)
-        except FloatbaseError as error:
-            return end("controller failed", error)
-        stance = _current_stance(sim, controller)
-        try:
-            desired = _desired_torques(sim, command)
-            planned = _planned_forces(command, stance)
-            _run_substeps(sim, desired, substeps, pushes, actuators, record)
-        except _NonFiniteTorques as error:
-            return end("controller failed", error)
-        record.complete_tick(desired, stance, planned)
-        if sim.diverged:
-            return record.to_rollout(pushes, "diverged")
-        if sim.fallen:
-            return end("fell")
-    return record.to_rollout(pushes, "completed")
+    with sim.exclusive():
+        for _ in bar:
+            t, q, v = sim.time, sim.q, sim.v
+            record.before_tick(t, q, v)
+            try:
+                command = controller(q, v, t)
+            except FloatbaseError as error:
+                return end("controller failed", error)
+            stance = _current_stance(sim, controller)
+            try:
+                desired = _desired_torques(sim, command)
+                planned = _planned_forces(command, stance)
+                _run_substeps(sim, desired, substeps, pushes, actuators, record)
+            except _NonFiniteTorques as error:
+                return end("controller failed", error)
+            record.complete_tick(desired, stance, planned)
+            if sim.diverged:
+                return record.to_rollout(pushes, "diverged")
+            if sim.fallen:
+                return end("fell")
+        return record.to_rollout(pushes, "completed")
 
 
 def _period_count(name: str, time: float, unit: str, period: float, minimum: int = 1) -> int:
@@ -311,7 +312,7 @@ def _desired_torques(sim: Simulation, command: Any) -> Array:
         raise InputError(
             f"A controller must return an object with an attribute tau, shape ({sim.robot.d},) "
             f"[N·m], such as a Command or types.SimpleNamespace(tau=…). This one returned "
-            f"{command!r}."
+            f"{short_repr(command)}."
         )
     return _as_torques(sim, "The controller's torques", command.tau)
 

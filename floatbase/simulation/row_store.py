@@ -40,6 +40,8 @@ def read_sweep(path: str | Path) -> DataFrame:
     InputError
         If the file cannot be read or was not written by a sweep.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f'path must be a path, such as "rows.jsonl", not {short_repr(path)}.')
     try:
         if Path(path).exists() and not Path(path).is_file():  # reading a device may never end
             raise _wrong_file_error(path, "that no sweep has written")

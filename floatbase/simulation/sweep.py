@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from floatbase._validation import signature_error
+from floatbase._validation import as_bool, as_integer, short_repr, signature_error
 from floatbase.errors import InputError, SimulationError, require
 from floatbase.simulation.row_store import (
     RESERVED_NAMES,
@@ -29,6 +29,7 @@ from floatbase.simulation.row_store import (
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+_MAX_WORKERS = 1024  # a typing error, not the number of cores of a computer, is larger
 _WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
 _POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
 _MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep
@@ -136,7 +137,7 @@ def sweep(
             initial=len(done),
             desc=name,
             unit="point",
-            disable=not progress,
+            disable=not as_bool("progress", progress),
         )
         with bar, closing(_completed_points(executor, job, points, pending)) as answers:
             for i, answer in answers:
@@ -160,10 +161,10 @@ def _grid_points(grid: Any) -> list[Row]:
     if isinstance(grid, Mapping):
         axes = {}
         for name, values in grid.items():
-            if isinstance(values, str) or not isinstance(values, Iterable):
+            if isinstance(values, str) or not _is_iterable(values):
                 raise InputError(
-                    f"The grid's {name!r} must be a list of values, not {values!r}. For a single "
-                    f"value, use [{values!r}]."
+                    f"The grid's {name!r} must be a list of values, not {short_repr(values)}. For "
+                    f"a single value, use [{short_repr(values)}]."
                 )
             axes[name] = list(values)
             if not axes[name]:
@@ -176,34 +177,42 @@ def _grid_points(grid: Any) -> list[Row]:
             if axes
             else []
         )
-    elif isinstance(grid, Iterable) and not isinstance(grid, str):
+    elif _is_iterable(grid) and not isinstance(grid, str):
         points = list(grid)
         for point in points:
             if not isinstance(point, Mapping):
                 raise InputError(
                     f"A grid that is a list must hold a dict, name -> value, for each point, not "
-                    f"{point!r}."
+                    f"{short_repr(point)}."
                 )
         points = [dict(point) for point in points]
     else:
         raise InputError(
-            f"The grid must be a dict, name -> list of values, or a list of dicts, not {grid!r}."
+            f"The grid must be a dict, name -> list of values, or a list of dicts, not "
+            f"{short_repr(grid)}."
         )
     if not points:
         raise InputError("The grid has no points. Give at least one point.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
-                f"A parameter cannot be called {name!r}. Use another string; the names "
+                f"A parameter cannot be called {short_repr(name)}. Use another string; the names "
                 f"{' and '.join(RESERVED_NAMES)} are reserved."
             )
     return points
 
 
+def _is_iterable(value: Any) -> bool:
+    """Return whether a value can be iterated, unlike an array of shape ()."""
+    return isinstance(value, Iterable) and getattr(value, "shape", None) != ()
+
+
 def _function_name(function: Any, file: Any) -> str:
     """Return the function's name for the file and the progress bar."""
     if not callable(function):
-        raise InputError(f"The first argument of sweep must be a function, not {function!r}.")
+        raise InputError(
+            f"The first argument of sweep must be a function, not {short_repr(function)}."
+        )
     name = getattr(function, "__qualname__", None)
     if file is not None and (name is None or name.endswith("<lambda>")):
         raise InputError(
@@ -216,7 +225,7 @@ def _function_name(function: Any, file: Any) -> str:
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:
     """Raise `InputError` if the function does not fit the grid or `setup` is not a function."""
     if setup is not None and not callable(setup):
-        raise InputError(f"setup must be a function without parameters, not {setup!r}.")
+        raise InputError(f"setup must be a function without parameters, not {short_repr(setup)}.")
     made = () if setup is None else (None,)
     for names in dict.fromkeys(tuple(point) for point in points):
         if fault := signature_error(function, *made, **dict.fromkeys(names)):
@@ -230,12 +239,7 @@ def _worker_count(workers: Any) -> int:
     """Return the number of processes, checked."""
     if workers is None:
         return int(require("loky", "sweep").cpu_count())
-    if isinstance(workers, bool) or not hasattr(workers, "__index__") or workers < 1:
-        raise InputError(
-            f"workers is {workers!r}; it must be a whole number of processes ≥ 1, or None for one "
-            f"process on each core."
-        )
-    return int(workers)
+    return as_integer("workers", workers, 1, _MAX_WORKERS, "None is one process on each core")
 
 
 def _make_job(function: Any, setup: Any) -> _Job:
@@ -309,7 +313,8 @@ def _dask_client(cluster: Any) -> Iterator[Any]:
         return
     if not isinstance(cluster, str):
         raise InputError(
-            f"cluster must be a dask.distributed.Client or a scheduler's address, not {cluster!r}."
+            f"cluster must be a dask.distributed.Client or a scheduler's address, not "
+            f"{short_repr(cluster)}."
         )
     try:
         parse_host_port(cluster)

@@ -13,6 +13,7 @@ from floatbase._validation import (
     as_positive,
     as_string,
     as_strings,
+    short_repr,
 )
 from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
@@ -271,7 +272,7 @@ def _placement(name: str, section: str, column: str = "") -> dict[str, str]:
         or not as_string("name", name).endswith(column)
     ):
         raise InputError(
-            f'column of {name!r} is {column!r}; it must be "model" or "reality", and the name must '
-            f"end in the same word."
+            f"column of {short_repr(name)} is {short_repr(column)}; it must be "
+            f'"model" or "reality", and the name must end in the same word.'
         )
     return {"section": as_string("section", section), **({"column": column} if column else {})}

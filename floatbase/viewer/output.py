@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import html
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from floatbase._files import write_whole
 from floatbase._validation import as_string
 from floatbase.errors import ViewerError
 from floatbase.robots import Robot
@@ -54,7 +56,7 @@ class Output:
             If nothing has been drawn yet, if the extension is unknown, or if the file cannot be
             written.
         """
-        target = Path(path if isinstance(path, Path) else as_string("path", path))
+        target = Path(as_string("path", str(path) if isinstance(path, Path) else path))
         if self.window.scene.is_empty:
             raise ViewerError(
                 "Nothing has been drawn yet, so there is nothing to save. Call show(state) or "
@@ -70,7 +72,8 @@ class Output:
             if target.suffix.lower() in film.FRAME_RATES:
                 film.capture(self.static_html(title), target, size)
             else:
-                target.write_text(self.static_html(title), encoding="utf-8")
+                # a link stays, and the file that it names is replaced
+                write_whole(Path(os.path.realpath(target)), self.static_html(title).encode())
         except OSError as error:
             raise ViewerError(
                 f"Cannot write {target} ({error.strerror}). Choose an existing folder in which you "

@@ -221,7 +221,25 @@ def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None
     assert hand_in("Eve").name == "answers-Eve-3.json"
 
 
-@pytest.mark.parametrize("folder", [5, None, "a\0b", ["."]])
+def test_learners_with_similar_names_can_hand_in_at_once(
+    learner: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    check("00.1", LIFTED)
+    submission = sys.modules[hand_in.__module__]
+    write = submission.write_whole
+
+    def write_after_another(path: Path, text: bytes) -> None:
+        monkeypatch.setattr(submission, "write_whole", write)
+        hand_in("A B")  # between the choice of the first one's file and its writing
+        write(path, text)
+
+    monkeypatch.setattr(submission, "write_whole", write_after_another)
+    hand_in("A.B")
+    names = [json.loads(path.read_text())["name"] for path in learner.glob("answers-*.json")]
+    assert sorted(names) == ["A B", "A.B"]
+
+
+@pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
 def test_a_folder_that_is_no_path_is_refused(learner: Path, folder: Any) -> None:
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):

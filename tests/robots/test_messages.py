@@ -9,10 +9,13 @@ import judges
 import numpy as np
 import pytest
 from messages import missing, refused
+from values import controller
 
 import floatbase as fb
+from floatbase.dynamics import fixed_frame
 from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots import Foot
+from floatbase.simulation import LiveSimulation
 
 GO2 = judges.load("go2")
 Q = GO2.standing().q
@@ -123,3 +126,44 @@ def test_unknown_names_list_the_near_ones_or_all_of_a_few() -> None:
     )
     assert not missing(many, "frame 0") and missing(many, "frame 49")
     assert many.endswith(" robot.frames lists them all.")
+
+
+class Unprintable:
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.mark.parametrize(
+    "value",
+    [Unprintable(), [Unprintable()], [10**5000], 10**5000, "a" * 10**5, "\ud800", b"x" * 999],
+    ids=["object", "list", "digits in a list", "digits", "text", "surrogate", "bytes"],
+)
+def test_any_value_has_a_short_message(value: Any) -> None:
+    for call in (
+        lambda: fb.load(value), lambda: fb.Push(value), lambda: GO2.frame_id(value),
+        lambda: fb.solve(controller().qp(GO2.standing()), value),
+        lambda: fb.Contacts.points(GO2, frames=value),
+    ):  # fmt: skip
+        with pytest.raises(fb.FloatbaseError) as caught:
+            call()
+        assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("name", ["a\0b", "\ud800"])
+def test_a_name_that_no_file_can_hold_is_refused(name: str, tmp_path: Path) -> None:
+    view = fb.Viewer(GO2)
+    view.show(GO2.standing())
+    for call in (
+        lambda: fixed_frame(name), lambda: fb.FrameTask(name, np.zeros(3)),
+        lambda: view.add_text(name, "x"), lambda: view.save(tmp_path / f"{name}.html"),
+    ):  # fmt: skip
+        with pytest.raises(InputError):
+            call()
+
+
+def test_bytes_are_no_numbers_and_the_smallest_numbers_have_a_quotient() -> None:
+    with pytest.raises(InputError):
+        fb.ForceTask(bytearray(12))
+    for number in (1e-320, 1e-31):
+        with pytest.raises(InputError):
+            LiveSimulation(fb.Simulation(GO2), controller(), print, control_period=number)

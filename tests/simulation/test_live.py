@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Iterator
 from functools import cache
@@ -13,6 +14,7 @@ import pytest
 from waiting import until
 
 import floatbase as fb
+from floatbase.errors import SimulationError
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, status_message
 from floatbase.viewer.export.recording import push_at
@@ -360,3 +362,25 @@ def test_a_change_that_fails_is_said(run: LiveSimulation, slices: list[fb.Rollou
     assert "no such world" in run.reason
     run.reset()
     until(lambda: run.status == "running" and len(slices) > 1)
+
+
+def test_a_second_thread_cannot_use_a_simulation_that_runs() -> None:
+    sim = fb.Simulation(judges.load("go2"))
+    refused: list[Exception] = []
+
+    def use() -> None:
+        for call in (sim.reset, lambda: sim.step(np.zeros(12))):
+            try:
+                call()
+            except Exception as error:
+                refused.append(error)
+
+    with sim.exclusive():
+        sim.step(np.zeros(12))  # the thread that has reserved it may use it
+        thread = threading.Thread(target=use)
+        thread.start()
+        thread.join()
+    assert [type(error) for error in refused] == [SimulationError] * 2
+    assert sim.time == sim.timestep
+    use()
+    assert len(refused) == 2 and copy.copy(sim).time == sim.timestep

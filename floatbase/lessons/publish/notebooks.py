@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.workspace import (
@@ -112,4 +113,4 @@ def run_and_store(path: Path) -> None:
             [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
         )
     notebook.metadata.pop("widgets", None)
-    nbformat.write(notebook, path)
+    write_whole(path, f"{nbformat.writes(notebook)}\n".encode())

@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from floatbase._files import write_whole
 from floatbase.errors import InputError
 
 NOTEBOOKS = Path(__file__).parents[3] / "notebooks"  # of the course
@@ -117,16 +118,6 @@ def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
     write_whole(target, text)
     record[copy.name] = present
     return [message]
-
-
-def write_whole(path: Path, text: bytes) -> None:
-    """Write a whole file or nothing, so that a full disk leaves the former file."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(text)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def read_record(folder: Path) -> dict[str, str]:

@@ -212,9 +212,11 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
             squeeze=False,
         )[1]
         axes = list(grid[:, 0])
+    if isinstance(axes, np.ndarray):  # as of plt.subplots
+        axes = list(axes.flat)
     made = [
         as_instance("one of axes", axis, Axes, "plt.gca()")
-        for axis in np.atleast_1d(np.asarray(axes, dtype=object)).flat
+        for axis in (axes if isinstance(axes, list | tuple) else [axes])
     ]
     if len(made) != len(names):
         raise InputError(

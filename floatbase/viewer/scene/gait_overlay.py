@@ -144,10 +144,12 @@ def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
     list of StepPlan
         The steps.
     """
-    if not isinstance(steps, Iterable):
+    try:
+        steps = list(steps)
+    except TypeError:
         raise InputError(
             f"steps must be the steps of a Walk, such as walk.history, not {short_repr(steps)}."
-        )
+        ) from None
     return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import tornado.netutil
 
+from floatbase._validation import short_repr
 from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.store import Scene
@@ -177,7 +178,8 @@ def _checked_port(port: int) -> int:
     """Return a port number, 0 for any; raise `ViewerError` if it is invalid."""
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 65536:
         raise ViewerError(
-            f"port is {port!r}; it must be a whole number from 0 (any free port) to 65535."
+            f"port is {short_repr(port)}; it must be a whole number from 0 (any free port) to "
+            f"65535."
         )
     return port
 

@@ -98,7 +98,12 @@ def replace_site(built: Path, folder: Path) -> None:
     listed = folder / _FILE_LIST
     earlier = set(listed.read_text(encoding="utf-8").splitlines()) if listed.is_file() else set()
     earlier = {name for name in earlier if ".." not in name and not Path(name).is_absolute()}
-    if foreign := sorted(name for name in names - earlier if (folder / name).exists()):
+    # a link may point to any file of the user, whoever wrote it
+    if foreign := sorted(
+        name
+        for name in names
+        if (folder / name).is_symlink() or (name not in earlier and (folder / name).exists())
+    ):
         raise InputError(
             f"{folder / foreign[0]} was not written by an earlier build of the site, so it is not "
             f"replaced. Choose another folder, or move the file."
