@@ -281,6 +281,25 @@ def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
+def planned_qdd_at(rollout: Rollout, row: int) -> Array | None:
+    """Find the accelerations that the controller planned at a row of a rollout.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The rollout.
+    row : int
+        Index of the row.
+
+    Returns
+    -------
+    ndarray, shape (nv,), or None
+        Accelerations as in `Command.qdd` [m/s² or rad/s²]; None without a plan.
+    """
+    planned = None if rollout.planned_qdd is None else rollout.planned_qdd[row]
+    return planned if planned is not None and np.isfinite(planned).all() else None
+
+
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
     """Return every item over time; a path whose shape changes becomes several items."""
     appearances: dict[str, dict[int, Item]] = {}
