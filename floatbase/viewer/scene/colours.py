@@ -2,9 +2,10 @@
 
 The colours are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces
 light blue. A friction cone is green when its force is inside, orange when the force reaches a facet
-or the surface, vermilion when it is outside, and a faint grey when there is no force. A ring around
-a joint is orange near a position limit and vermilion at an active limit. Everything else is grey, such as a curve, a position or a matrix entry, because
-all readers can tell greys apart by their lightness.
+or the surface, vermilion when it is outside, and a faint grey when there is no force. The ring of a
+joint is orange near a position limit, and vermilion when a limit is active. Everything else is
+grey, such as a curve, a position or a matrix entry, because all readers can tell greys apart by
+their lightness.
 """
 
 from __future__ import annotations

@@ -43,9 +43,8 @@ def limit_rings(state: State, limits: JointLimits, qdd: Array | None, size: floa
     """
     robot = state.robot
     first = robot.nv - robot.d
-    q, span = joint_positions(robot, state.q), limits.upper - limits.lower
-    gap = np.minimum(limits.upper - q, q - limits.lower)
-    near = gap < NEAR * np.where(np.isfinite(span), span, -np.inf)
+    q, (low, high) = joint_positions(robot, state.q), _near_positions(limits)
+    near = (q < low) | (q > high)
     active = np.zeros(robot.d, dtype=bool)
     if qdd is not None:
         least, largest = limits.bounds(q, state.v[first:])
@@ -62,6 +61,17 @@ def limit_rings(state: State, limits: JointLimits, qdd: Array | None, size: floa
             transform(pose[:3, 3], pose[:3, :3] @ _axis_frames(robot)[i], _RADIUS * size),
         )
     return picture
+
+
+@lru_cache(maxsize=64)
+def _near_positions(limits: JointLimits) -> tuple[Array, Array]:
+    """Return the positions below and above which joints are near a limit, (d,) each [rad or m].
+
+    A joint that has only one position limit, or none, has no range and is never near a limit.
+    """
+    span = limits.upper - limits.lower
+    margin = np.where(np.isfinite(span), NEAR * span, -np.inf)
+    return limits.lower + margin, limits.upper - margin
 
 
 @lru_cache(maxsize=64)
