@@ -18,7 +18,7 @@ NEAR = 0.05  # fraction of its range within which a joint is near a limit
 # difference between a planned acceleration and its bound at which the limit is active, as a
 # fraction of 1 rad/s² plus the acceleration: rounding errors of the QP are smaller
 _TOLERANCE = 1e-6
-_RADIUS = 0.09  # fraction of the robot's size
+_RADIUS = 0.075  # fraction of the robot's size
 
 
 def limit_rings(state: State, limits: JointLimits, qdd: Array | None, size: float) -> Picture:
