@@ -296,7 +296,8 @@ def planned_qdd_at(rollout: Rollout, row: int) -> Array | None:
     ndarray, shape (nv,), or None
         Accelerations as in `Command.qdd` [m/s² or rad/s²]; None without a plan.
     """
-    planned = None if rollout.planned_qdd is None else rollout.planned_qdd[row]
+    rows = as_rollout(rollout).planned_qdd
+    planned = None if rows is None else rows[as_integer("row", row, -len(rows), len(rows) - 1)]
     return planned if planned is not None and np.isfinite(planned).all() else None
 
 

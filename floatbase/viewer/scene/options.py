@@ -111,6 +111,8 @@ class PictureOptions:
         as_instance("swing_feet", self.swing_feet, frozenset)
         if not isinstance(self.joint_limits, JointLimits):
             as_bool("joint_limits", self.joint_limits)
+        if self.qdd is not None:
+            as_array("qdd", self.qdd, (None,), "m/s² or rad/s²")
         if not isinstance(self.extra, Mapping | None) or not all(
             isinstance(item, Item) for item in (self.extra or {}).values()
         ):

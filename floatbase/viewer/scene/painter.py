@@ -11,7 +11,6 @@ from scipy.spatial.distance import pdist
 
 from floatbase._validation import (
     Array,
-    as_array,
     as_instance,
     cached_property,
 )
@@ -403,13 +402,10 @@ class Painter:
 
     def _limit_rings(self, state: State, chosen: PictureOptions) -> Picture:
         """Draw rings at joints near their limits, and at joints whose limits are active."""
-        limits, qdd = chosen.joint_limits, chosen.qdd
+        limits = chosen.joint_limits
         if not isinstance(limits, JointLimits):
             limits = self._joint_limits
-        limits.check_size(self.robot)
-        if qdd is not None:
-            qdd = as_array("qdd", qdd, (self.robot.nv,), "m/s² or rad/s²")
-        return limit_rings(state, limits, qdd, self.size)
+        return limit_rings(state, limits, chosen.qdd, self.size)
 
     @cached_property
     def _joint_limits(self) -> JointLimits:
