@@ -44,6 +44,9 @@ _SPEED_MARGIN = 3e-3
 # s: bounds for a longer control period also hold for shorter ones, and the slowest loops run at
 # 250 Hz
 _CONTROL_PERIOD = 4e-3
+# difference between an acceleration and its bound, as a fraction of 1 rad/s² plus the acceleration:
+# rounding errors of the QP are smaller
+_REACHED_TOLERANCE = 1e-6
 _KINDS = ("position", "velocity", "acceleration")
 
 
@@ -246,6 +249,63 @@ class JointLimits(Value):
         conflict = least > largest  # as in a locked joint
         least[conflict] = largest[conflict] = 0.5 * (least[conflict] + largest[conflict])
         return least, largest
+
+    def near(self, state: State, fraction: float) -> npt.NDArray[np.bool_]:
+        """Return which joints are near a position limit, or beyond it.
+
+        Parameters
+        ----------
+        state : State
+            State of a robot with d joints.
+        fraction : float
+            Fraction of its range within which a joint is near a limit [-]. A joint without a lower
+            or an upper limit has no range and is never near a limit.
+
+        Returns
+        -------
+        ndarray of bool, shape (d,)
+            The joints.
+        """
+        q, _ = self._joints_of(state)
+        margin = as_positive("fraction", fraction) * (self.upper - self.lower)
+        with np.errstate(invalid="ignore"):  # inf - inf
+            below, above = q < self.lower + margin, q > self.upper - margin
+        near: npt.NDArray[np.bool_] = (below | above) & np.isfinite(margin)
+        return near
+
+    def reached(self, state: State, qdd: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Return which joints have an acceleration at one of their bounds, or beyond it.
+
+        The limits of these joints are active if a controller with these limits planned the
+        accelerations.
+
+        Parameters
+        ----------
+        state : State
+            State of a robot with d joints.
+        qdd : array_like, shape (nv,)
+            Generalized acceleration [m/s² or rad/s²].
+
+        Returns
+        -------
+        ndarray of bool, shape (d,)
+            The joints.
+        """
+        q, v = self._joints_of(state)
+        robot = state.robot
+        planned = as_array("qdd", qdd, (robot.nv,), "m/s² or rad/s²")[robot.nv - robot.d :]
+        least, largest = self.bounds(q, v)
+        tolerance = _REACHED_TOLERANCE * (1.0 + np.abs(planned))
+        reached: npt.NDArray[np.bool_] = (planned >= largest - tolerance) | (
+            planned <= least + tolerance
+        )
+        return reached
+
+    def _joints_of(self, state: State) -> tuple[Array, Array]:
+        """Return positions [rad or m] and velocities [rad/s or m/s] of the joints, (d,) each."""
+        robot = as_instance("state", state, State).robot
+        self.check_size(robot)
+        return joint_positions(robot, state.q), state.v[robot.nv - robot.d :]
 
     def _upper_bounds(self, gap: Array, v: Array) -> tuple[Array, npt.NDArray[np.intp]]:
         """Return the largest accelerations towards a limit, (d,), and the index of their kind.

@@ -72,6 +72,9 @@ class Rollout(Value):
         Time at which the controller was switched off after a fall or a failure [s], otherwise None.
         With a settling time, the rollout has rows from then on: `tau_desired` is the joint damping
         and `planned` is NaN.
+    planned_qdd : ndarray, shape (n, nv), or None
+        Accelerations that the controller planned, as in `Command.qdd` [m/s² or rad/s²]; rows
+        without a plan have NaN.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -90,6 +93,7 @@ class Rollout(Value):
     error: FloatbaseError | None = None
     stances: tuple[Contacts, ...] = ()
     controller_off_time: float | None = None
+    planned_qdd: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -268,6 +272,7 @@ class Recorder:
             np.empty((ticks, sim.robot.nv)),
         )
         self._tau_desired = np.empty((ticks, d))
+        self._planned_qdd = np.full((ticks, sim.robot.nv), np.nan)
         # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
@@ -304,7 +309,13 @@ class Recorder:
         )
         self._n_steps += 1
 
-    def complete_tick(self, tau_desired: Array, stance: Contacts, planned: Array | None) -> None:
+    def complete_tick(
+        self,
+        tau_desired: Array,
+        stance: Contacts,
+        planned: Array | None,
+        planned_qdd: Array | None = None,
+    ) -> None:
         """Complete a row.
 
         Parameters
@@ -315,8 +326,12 @@ class Recorder:
             The controller's contacts.
         planned : ndarray, shape (k,), or None
             Forces that the controller planned at the contacts, in the world frame [N].
+        planned_qdd : ndarray, shape (nv,), or None
+            Accelerations that the controller planned [m/s² or rad/s²].
         """
         n = self._n
+        if planned_qdd is not None:
+            self._planned_qdd[n] = planned_qdd
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
@@ -389,6 +404,7 @@ class Recorder:
             if all(stance is contacts for stance in self._stances)
             else tuple(self._stances),
             controller_off_time=controller_off_time,
+            planned_qdd=self._complete_rows(self._planned_qdd),
         )
 
     def _complete_rows(self, rows: Array) -> Array:

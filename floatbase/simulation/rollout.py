@@ -186,7 +186,8 @@ def rollout(
                 _run_substeps(sim, desired, substeps, pushes, actuators, record)
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
-            record.complete_tick(desired, stance, planned)
+            accelerations = _planned_accelerations(sim, command)
+            record.complete_tick(desired, stance, planned, accelerations)
             if sim.diverged:
                 return record.to_rollout(pushes, "diverged")
             if sim.fallen:
@@ -364,3 +365,10 @@ def _planned_forces(command: Any, stance: Contacts) -> Array | None:
             f"attribute contacts."
         )
     return planned
+
+
+def _planned_accelerations(sim: Simulation, command: Any) -> Array | None:
+    """Return a command's accelerations, shape (nv,) [m/s² or rad/s²], or None if it has none."""
+    qdd = getattr(command, "qdd", None)
+    is_vector = type(qdd) is np.ndarray and qdd.dtype.char == "d" and qdd.shape == (sim.robot.nv,)
+    return qdd if is_vector else None

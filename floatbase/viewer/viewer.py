@@ -192,7 +192,7 @@ class Viewer(Controls, Output):
             Name of the ghost in the legend.
         **options
             What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
-            extra, swing_feet. `PictureOptions` describes them.
+            extra, swing_feet, joint_limits, qdd. `PictureOptions` describes them.
 
         Returns
         -------
@@ -410,7 +410,7 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         **options
-            As for `show`. The rollout itself determines `push` and `swing_feet`.
+            As for `show`. The rollout itself determines `push`, `swing_feet` and `qdd`.
 
         Returns
         -------
@@ -446,6 +446,7 @@ class Viewer(Controls, Output):
             chosen: PictureKeywords = {**options, "extra": overlay}
             chosen["push"] = recording.push_at(rollout, i)
             chosen["swing_feet"] = recording.swing_feet_at(rollout, i)
+            chosen["qdd"] = recording.planned_qdd_at(rollout, i)
             pictures.append(
                 self.painter.picture(
                     state,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from messages import raises, refused
 from PIL import Image
 
 import floatbase as fb
+from floatbase.control import JointLimits
 from floatbase.errors import InputError, ViewerError
 from floatbase.lessons import ConstantTorques
 from floatbase.simulation import Push
@@ -113,3 +115,21 @@ def test_a_machine_without_a_browser_is_told(
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
     refused(lambda: view.save(tmp_path / "push.png", size=SIZE), ViewerError, "browser")
+
+
+@needs_chromium
+def test_a_gif_keeps_colours_that_appear_after_its_first_picture(tmp_path: Path) -> None:
+    robot = fb.load("go2")
+    standing, q = robot.standing(), np.array(robot.standing().q)
+    q[7 + robot.joint_names.index("FL_calf_joint")] = JointLimits.of(robot).upper[2]
+    with closing(fb.Viewer(robot)) as view:
+        pictures = [view.painter.picture(state) for state in (standing, fb.State(robot, q))]
+        view.show(standing)  # places the camera
+        view.play_pictures([0.0, 0.2, 0.4], [*pictures, pictures[1]])
+        with Image.open(view.save(tmp_path / "limit.gif", size=SIZE)) as gif:
+            orange = []
+            for frame in (0, gif.n_frames - 1):  # type: ignore[attr-defined]
+                gif.seek(frame)
+                red, green, blue = np.moveaxis(np.array(gif.convert("RGB"), dtype=int), 2, 0)
+                orange.append(np.sum((red > green + SOME) & (green > blue + 2 * SOME)))
+    assert orange[0] == 0 and orange[1] > 10

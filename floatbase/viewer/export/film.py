@@ -17,6 +17,7 @@ from tqdm.auto import tqdm
 
 from floatbase._validation import as_array, short_repr
 from floatbase.errors import InputError, ViewerError
+from floatbase.viewer.scene.colours import LEGEND
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -172,13 +173,27 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
 
 def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
     """Write pictures as an animated GIF with one palette."""
+    from PIL import Image
     from PIL.Image import Dither, Quantize
 
     none = Dither.NONE
     # one palette for all, since separate palettes flicker; the octree keeps the colours of small
     # things, such as arrows
-    first = next(pictures).quantize(method=Quantize.FASTOCTREE, dither=none)
-    rest = (picture.quantize(palette=first, dither=none) for picture in pictures)
+    first = next(pictures)
+    # objects that appear later need their colours too, lit and in shade
+    shades = [
+        tuple(round(255 * shade * part) for part in colour)
+        for _, colour, _ in LEGEND
+        for shade in (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+    ]
+    width, height = first.size
+    samples = Image.new("RGB", (width, height + len(shades)))
+    samples.paste(first)
+    for i, shade in enumerate(shades):
+        samples.paste(shade, (0, height + i, width, height + i + 1))
+    palette = samples.quantize(method=Quantize.FASTOCTREE, dither=none)
+    first = first.quantize(palette=palette, dither=none)
+    rest = (picture.quantize(palette=palette, dither=none) for picture in pictures)
     first.save(
         target, save_all=True, append_images=rest, duration=1000 // FRAME_RATES[".gif"], loop=0
     )

@@ -281,6 +281,26 @@ def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
+def planned_qdd_at(rollout: Rollout, row: int) -> Array | None:
+    """Find the accelerations that the controller planned at a row of a rollout.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The rollout.
+    row : int
+        Index of the row.
+
+    Returns
+    -------
+    ndarray, shape (nv,), or None
+        Accelerations as in `Command.qdd` [m/s² or rad/s²]; None without a plan.
+    """
+    rows = as_rollout(rollout).planned_qdd
+    planned = None if rows is None else rows[as_integer("row", row, -len(rows), len(rows) - 1)]
+    return planned if planned is not None and np.isfinite(planned).all() else None
+
+
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:
     """Return every item over time; a path whose shape changes becomes several items."""
     appearances: dict[str, dict[int, Item]] = {}

@@ -2,9 +2,10 @@
 
 The colours are from the palette of Okabe and Ito. Measured forces are dark blue, planned forces
 light blue. A friction cone is green when its force is inside, orange when the force reaches a facet
-or the surface, vermilion when it is outside, and a faint grey when there is no force. Everything
-that is neither a force nor a cone is grey, such as a curve, a position or a matrix entry, because
-all readers can tell greys apart by their lightness.
+or the surface, vermilion when it is outside, and a faint grey when there is no force. The ring of a
+joint is orange near a position limit, and vermilion when a limit is active. Everything else is
+grey, such as a curve, a position or a matrix entry, because all readers can tell greys apart by
+their lightness.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("cone", WARNING, "friction cone: surface reached"),
     ("cone", ALARM, "friction cone: force outside (rim)"),
     ("idle cone", IDLE, "friction cone: no force"),
+    ("near_limit", WARNING, "joint near a position limit"),
+    ("active_limit", ALARM, "active joint limit"),
     ("multiplier", PUSH, "multiplier (shadow price)"),
     ("support", SUPPORT, "support polygon"),
     ("dcm", COM, "capture point"),
@@ -75,7 +78,7 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
 # page's style
 LEGEND_SYMBOLS = {
     "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
-    "cone": "cone", "idle cone": "cone",
+    "cone": "cone", "idle cone": "cone", "near_limit": "ring", "active_limit": "ring",
     "support": "tile", "wrench": "curl",
 }  # fmt: skip
 

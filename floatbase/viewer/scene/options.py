@@ -9,6 +9,7 @@ from typing import TypedDict
 import numpy.typing as npt
 
 from floatbase._validation import as_array, as_bool, as_instance, as_strings, short_repr
+from floatbase.control import JointLimits
 from floatbase.errors import InputError
 from floatbase.robots import State
 from floatbase.viewer.scene.shapes import Item
@@ -28,6 +29,8 @@ class PictureKeywords(TypedDict, total=False):
     labels: bool
     extra: Mapping[str, Item] | None
     swing_feet: frozenset[str]
+    joint_limits: bool | JointLimits
+    qdd: npt.ArrayLike | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,6 +65,13 @@ class PictureOptions:
     swing_feet : frozenset of str
         Names of contacts that are in the air. Such contacts have no patch and no cone, and are not
         part of the support polygon.
+    joint_limits : bool or JointLimits
+        Whether to draw a ring around the axis of each joint that is within 5 % of its range from a
+        position limit, and of each joint whose limit is active. True uses the limits in the robot's
+        URDF.
+    qdd : array_like, shape (nv,), or None
+        Accelerations that the controller planned in this state, such as `command.qdd` [m/s²
+        or rad/s²]. A joint limit is active if a planned acceleration is at its bound.
 
     Raises
     ------
@@ -80,6 +90,8 @@ class PictureOptions:
     labels: bool = False
     extra: Mapping[str, Item] | None = None
     swing_feet: frozenset[str] = frozenset()
+    joint_limits: bool | JointLimits = True
+    qdd: npt.ArrayLike | None = None
 
     def __post_init__(self) -> None:
         for name in ("com", "cones", "arrows", "support", "labels"):
@@ -97,6 +109,10 @@ class PictureOptions:
             as_instance("ghost", self.ghost, State)
         as_strings("frames", self.frames)
         as_instance("swing_feet", self.swing_feet, frozenset)
+        if not isinstance(self.joint_limits, JointLimits):
+            as_bool("joint_limits", self.joint_limits)
+        if self.qdd is not None:
+            as_array("qdd", self.qdd, (None,), "m/s² or rad/s²")
         if not isinstance(self.extra, Mapping | None) or not all(
             isinstance(item, Item) for item in (self.extra or {}).values()
         ):

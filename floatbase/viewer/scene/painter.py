@@ -14,6 +14,7 @@ from floatbase._validation import (
     as_instance,
     cached_property,
 )
+from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -22,6 +23,7 @@ from floatbase.viewer.scene.colours import GHOST, RGB
 from floatbase.viewer.scene.cone_picture import ConeShape, cone_picture
 from floatbase.viewer.scene.contact_forces import Forces, as_point_forces
 from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
+from floatbase.viewer.scene.limit_rings import limit_rings
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
 from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
@@ -135,6 +137,8 @@ class Painter:
             picture |= prefixed(
                 "com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
             )
+        if chosen.joint_limits:
+            picture |= self._limit_rings(state, chosen)
         if chosen.wrench is not None:
             picture |= self._wrench(state, np.asarray(chosen.wrench, dtype=np.float64))
         if chosen.push is not None:
@@ -172,7 +176,7 @@ class Painter:
         """
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
-        computed |= {"_ghost_shapes", "_scale_bars"}
+        computed |= {"_ghost_shapes", "_scale_bars", "_joint_limits"}
         kept = {name: value for name, value in self.__dict__.items() if name in computed}
         other.__dict__.update(kept)
         return other
@@ -395,6 +399,18 @@ class Painter:
                 at, self.scale * force, self.size, self.text_colour, self.background_colour
             )
         }
+
+    def _limit_rings(self, state: State, chosen: PictureOptions) -> Picture:
+        """Draw rings at joints near their limits, and at joints whose limits are active."""
+        limits = chosen.joint_limits
+        if not isinstance(limits, JointLimits):
+            limits = self._joint_limits
+        return limit_rings(state, limits, chosen.qdd, self.size)
+
+    @cached_property
+    def _joint_limits(self) -> JointLimits:
+        """Limits in the robot's URDF."""
+        return JointLimits.of(self.robot)
 
     @cached_property
     def _patch_radius(self) -> float:

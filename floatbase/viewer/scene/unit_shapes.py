@@ -193,6 +193,26 @@ def round_rim() -> Shape:
     return threejs.mesh(vertices + np.array([0.0, 0.0, 1.0], dtype=np.float32), faces, PATCH)
 
 
+@lru_cache(maxsize=8)
+def ring(colour: RGB, thick: bool) -> Shape:
+    """Return a ring around z of radius 1 that is drawn on top of objects in front of it.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        RGB.
+    thick : bool
+        Whether the ring is twice as thick.
+
+    Returns
+    -------
+    Shape
+        The ring.
+    """
+    mesh = geometry.torus_arc(1.0, 0.2 if thick else 0.1, 0.0, 2.0 * np.pi)
+    return threejs.mesh(*mesh, colour, on_top=True)
+
+
 @lru_cache(maxsize=256)
 def facet(
     mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int

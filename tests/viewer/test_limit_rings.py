@@ -1,0 +1,180 @@
+"""Rings at joints near a position limit and at joints whose limit is active."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from messages import refused
+
+import floatbase as fb
+from floatbase.control import Command, JointLimits
+from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
+from floatbase.robots import Robot, State, load
+from floatbase.viewer import Viewer
+from floatbase.viewer.scene.colours import ALARM, WARNING
+from floatbase.viewer.scene.threejs import colour_number
+
+from .test_recording import tracks
+
+JOINT = "FL_calf_joint"
+
+
+def at_fraction(robot: Robot, joint: str, fraction: float) -> State:
+    """Return the standing state with a joint at a fraction of its range."""
+    i, limits, q = robot.joint_names.index(joint), JointLimits.of(robot), robot.standing().q.copy()
+    q[robot.nq - robot.d + i] = (1.0 - fraction) * limits.lower[i] + fraction * limits.upper[i]
+    return State(robot, q)
+
+
+def rings(paths: Iterable[str]) -> dict[str, str]:
+    """Return the kind of each joint's ring."""
+    parts = (path.split("/") for path in paths if "_limit/" in path)
+    return {joint: kind for kind, joint in parts}
+
+
+def owners(command: Command) -> set[str]:
+    """Return the joints with an active limit, from the multipliers."""
+    ends = ("position limit", "velocity limit")
+    return {label.owner for label in command.active if label.kind.endswith(ends)}  # type: ignore[attr-defined]
+
+
+@pytest.fixture(scope="module")
+def commands() -> list[Command]:
+    """Commands of the controller in `stretched`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def stretched(go2: Robot, commands: list[Command]) -> fb.Rollout:
+    """A run in which the robot rises until its knees are at their limits."""
+    standing, contacts = go2.standing(), Contacts.points(go2, mu=0.7)
+    rise = fb.CoMTask(standing.com + [0.0, 0.0, 0.3])
+    tasks = [rise if isinstance(t, fb.CoMTask) else t for t in fb.standing_tasks(standing)]
+    controller = fb.WholeBodyController(go2, contacts, tasks)
+
+    def record(q: np.ndarray, v: np.ndarray, t: float) -> Command:
+        commands.append(controller(q, v, t))
+        return commands[-1]
+
+    return fb.rollout(fb.Simulation(go2), record, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("fraction", "is_near"),
+    [(-0.01, True), (0.04, True), (0.06, False), (0.5, False), (0.94, False), (0.96, True)],
+)
+def test_a_joint_near_a_limit_has_a_ring(
+    viewer: Viewer, go2: Robot, fraction: float, is_near: bool
+) -> None:
+    state = at_fraction(go2, JOINT, fraction)
+    viewer.show(state)
+    assert rings(viewer.renderer.picture) == ({JOINT: "near_limit"} if is_near else {})
+    viewer.show(state, joint_limits=False)
+    assert rings(viewer.renderer.picture) == {}
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_a_ring_is_around_the_axis_of_its_joint(name: str) -> None:
+    robot = load(name)
+    with_view = Viewer(robot)
+    for joint in robot.joint_names[:7]:
+        state = at_fraction(robot, joint, 0.99)
+        matrix = with_view.show(state).renderer.picture[f"near_limit/{joint}"].matrix
+        index, turn = robot.model.getJointId(joint), np.zeros(robot.nv)
+        turn[robot.model.idx_vs[index]] = 0.1
+        turned = State(robot, pin.integrate(robot.model, state.q, turn)).joint_transforms[index]
+        before = state.joint_transforms[index]
+        axis = pin.log3(turned[:3, :3] @ before[:3, :3].T) / 0.1
+        size = np.linalg.norm(matrix[:3, 2])
+        np.testing.assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
+        np.testing.assert_allclose(matrix[:3, 2] / size, axis, atol=1e-6)
+    with_view.close()
+
+
+def test_a_ring_is_vermilion_while_the_controllers_limit_is_active(
+    viewer: Viewer, stretched: fb.Rollout, commands: list[Command]
+) -> None:
+    seen = set()
+    for i in range(0, len(stretched), 10):
+        command = commands[i]
+        viewer.show(stretched.state(i), command.contacts, qdd=command.qdd)
+        drawn = rings(viewer.renderer.picture)
+        active = {joint for joint, kind in drawn.items() if kind == "active_limit"}
+        assert active == owners(command)
+        seen |= set(drawn.values())
+        for path, item in viewer.renderer.picture.items():
+            if "_limit/" in path:
+                colour = ALARM if path.startswith("active") else WARNING
+                assert item.shape.data["materials"][0]["color"] == colour_number(colour)
+    assert seen == {"near_limit", "active_limit"}
+
+
+def test_the_legend_explains_only_rings_that_are_drawn(
+    viewer: Viewer, go2: Robot, stretched: fb.Rollout, commands: list[Command]
+) -> None:
+    def legend() -> set[str]:
+        items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
+        return {text for _, text, _ in items if "limit" in text}
+
+    viewer.show(go2.standing())
+    assert legend() == set()
+    viewer.show(at_fraction(go2, JOINT, 1.0))
+    near = legend()
+    assert len(near) == 1
+    i = next(i for i, command in enumerate(commands) if owners(command))
+    viewer.show(stretched.state(i), qdd=commands[i].qdd)
+    assert legend() - near
+    viewer.play(stretched)
+    assert len(legend()) == 2
+    viewer.play(stretched, joint_limits=False)
+    assert legend() == set()
+
+
+def test_rings_appear_in_a_recording_when_limits_are_active(
+    viewer: Viewer, stretched: fb.Rollout, commands: list[Command]
+) -> None:
+    viewer.play(stretched, rate=100.0)
+    moving, hidden = tracks(viewer), 0
+    for joint in {joint for command in commands for joint in owners(command)}:
+        times, visible = moving[f"active_limit/{joint}", ".visible"]
+        rows = np.round(times / 1e-3).astype(int)
+        expected = [joint in owners(commands[i]) for i in rows]
+        np.testing.assert_array_equal(visible[:, 0].astype(bool), expected)
+        hidden += expected.count(False)
+    assert hidden
+
+
+def test_a_rollout_has_the_planned_accelerations(
+    go2: Robot, stretched: fb.Rollout, commands: list[Command]
+) -> None:
+    np.testing.assert_array_equal(stretched.planned_qdd, [command.qdd for command in commands])
+    torques = SimpleNamespace(tau=np.zeros(go2.d))
+    run = fb.rollout(fb.Simulation(go2), lambda q, v, t: torques, 0.01)
+    assert run.planned_qdd is not None and run.planned_qdd.shape == (len(run), go2.nv)
+    assert np.isnan(run.planned_qdd).all()
+
+
+def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(
+    viewer: Viewer, go2: Robot
+) -> None:
+    standing, limits = go2.standing(), JointLimits.of(go2)
+    upper = limits.upper.copy()
+    upper[2] = standing.q[7 + 2] + 0.01
+    viewer.show(standing, joint_limits=replace(limits, upper=upper))
+    assert rings(viewer.renderer.picture) == {JOINT: "near_limit"}
+    one_sided = replace(limits, lower=np.full(12, -np.inf), upper=upper)
+    viewer.show(standing, joint_limits=one_sided)
+    assert rings(viewer.renderer.picture) == {}
+    for wrong, *named in (
+        (lambda: viewer.show(standing, joint_limits="robot"), "joint_limits", "robot"),  # type: ignore[arg-type]
+        (lambda: viewer.show(standing, joint_limits=JointLimits.of(load("ur5"))), 6, 12),
+        (lambda: viewer.show(standing, qdd=np.zeros(12)), "qdd", 12, 18),
+        (lambda: viewer.show(standing, qdd=np.full(18, np.nan)), "qdd", np.nan),
+    ):
+        refused(wrong, InputError, *named)
