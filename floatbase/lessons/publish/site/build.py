@@ -35,7 +35,6 @@ _MOVED = {
 }
 _FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
-_TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 
@@ -236,16 +235,6 @@ def _with_anchors(page: str) -> str:
         address = known.get(f"floatbase.{match[1]}")
         return f"{{py:obj}}`{match[1]} <{address}>`" if address else match[0]
 
-    def fold(match: re.Match[str]) -> str:
-        files = match[1].replace("`", "").split(", ")
-        listed = " ".join(f"<code>{file}</code>" for file in files)
-        count = "1 file" if len(files) == 1 else f"{len(files)} files"
-        return (
-            f'- <details class="tests"><summary>tests that use them, in '
-            f"{count}</summary>{listed}</details>"
-        )
-
-    page = _TESTS.sub(fold, page)
     page = page.replace(
         "## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text"
     )
