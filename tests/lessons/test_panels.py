@@ -206,6 +206,18 @@ def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(pan
     until(lambda: panel.arrow is not None)
 
 
+def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel: Pushed) -> None:
+    report = panel.view.window._server.on_control
+    assert report is not None
+    for _ in range(2):
+        for name, value in {"towards [°]": 30.0, "push [N]": 40.0}.items():
+            report(name, value)
+        assert (panel.towards.value, panel.force.value) == (30.0, 40.0)
+        assert panel.line.value == "pushed with 40 N towards 30° for 0.1 s"
+        until(lambda: panel.arrow is not None)
+        until(lambda: panel.arrow is None)
+
+
 def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pushed) -> None:
     panel.towards.value = 60.0
     panel.force.value = 600.0
