@@ -111,13 +111,9 @@ def replace_site(built: Path, folder: Path) -> None:
 
 
 def _front_page_notebook() -> Path:
-    """Write a notebook that runs the README's program and plays its run."""
-    readme = (_ROOT / "README.md").read_text(encoding="utf-8")
-    code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
-    play = 'fb.Viewer(robot, height=420).play(run, title="a 30 N push to the side")'
-    notebook = new_notebook(
-        cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")]
-    )
+    """Write a notebook that plays the moving picture of the first page."""
+    code = 'from floatbase.lessons.figures import stepping\n\nstepping("light", height=420)'
+    notebook = new_notebook(cells=[new_code_cell(code, id="picture")])
     path = RUN_FOLDER / "first_page.ipynb"
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, path)
@@ -141,7 +137,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
     )
     placed = pictures.place(data)
     image = (
-        f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+        f'<img alt="go2 steps after a push" src="data:image/png;base64,{data.get("image/png")}">'
     )
     return f"```{{raw}} html\n{placed or image}\n```"
 
