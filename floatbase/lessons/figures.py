@@ -234,7 +234,7 @@ def stepping(background: str = "white", height: int = 480) -> Viewer:
     """
     robot = load("go2")
     stand = Stand(robot, Contacts.feet(robot), stepping_gait=Gait.trot(robot, swing=0.2))
-    push = Push([0.0, 300.0, 0.0], start=0.3)
+    push = Push(np.array([0.0, 300.0, 0.0]), start=0.3)
     run = rollout(Simulation(robot), stand, 2.2, pushes=[push])
     view = Viewer(robot, background=background, height=height)
     return view.play(run, speed=0.5, planned=False, title="a 300 N push to the side, half speed")

@@ -5,12 +5,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 from floatbase.viewer.scene import protocol, shapes
-from floatbase.viewer.scene.colours import CONE, LEGEND, LEGEND_SYMBOLS, RGB, hex_code
+from floatbase.viewer.scene.colours import CONE, LEGEND, LEGEND_SYMBOLS, RGB, RGBA, hex_code
 from floatbase.viewer.scene.shapes import Picture
 
 Entry = tuple[str, RGB, str]  # kind of items, colour, meaning
 
-_CONE_KINDS = {shapes.cone_colour(status): f"{status} cone" for status in CONE}
+_CONE_KINDS: dict[RGBA | None, str] = {
+    shapes.cone_colour(status): f"{status} cone" for status in CONE
+}
 
 
 def kinds(picture: Picture) -> set[str]:
