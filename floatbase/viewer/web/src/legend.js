@@ -14,7 +14,7 @@ export function isCrowded({lines, player, titleBottom, aside, width, height}) {
   const away = Math.hypot(
     Math.max(middle.x - lines.right, 0), Math.max(lines.top - middle.y, 0),
   );
-  return lines.bottom - lines.top > height / 4
+  return lines.bottom - lines.top > 0.3 * height
     || away < middle.y // the camera fits what it looks at into a ball as high as the picture
     || lines.top < titleBottom
     || (player !== null && lines.right > player.left);

@@ -17,7 +17,7 @@ test("a legend is folded where it would cover it, or the title", () => {
   assert.ok(crowded(420, 360));
   assert.ok(crowded(590, 480));
   assert.ok(crowded(1300, 160));
-  assert.ok(crowded(1300, 390));
+  assert.ok(crowded(1300, 320));
   assert.ok(crowded(1000, 480, {titleBottom: 400}));
 });
 
