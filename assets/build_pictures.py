@@ -2,7 +2,8 @@
 playwright and a Chromium.
 
 They show the course text's figures, every robot of the catalogue with its forces and friction
-cones, go2 with four-sided cones, and the feet of talos.
+cones, go2 with four-sided cones, and the feet of talos. The moving picture is go2 that steps after
+a push; it also needs the extra `video`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from playwright.sync_api import sync_playwright
 
 import floatbase as fb
 from floatbase.lessons import FIGURES
+from floatbase.lessons.figures import stepping
 from floatbase.viewer import Viewer
 
 OUT = Path(__file__).parent / "pictures"
@@ -30,6 +32,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
 ]
 SIZE = {"width": 1000, "height": 640}
+FILM = "go2_steps"
 
 
 def standing(name: str, facets: int | None = None) -> Viewer:
@@ -61,9 +64,20 @@ SCENES: dict[str, Callable[[], Viewer]] = {
 }
 
 
+def film() -> None:
+    """Save the moving picture."""
+    view = stepping()
+    path = view.save(OUT / f"{FILM}.gif", size=(480, 300))
+    view.close()
+    print(f"{FILM}: {path.stat().st_size / 1000:.0f} KB")
+
+
 def main(names: list[str]) -> None:
     """Draw each scene, take a screenshot of its page, and save it with 255 colours."""
     OUT.mkdir(exist_ok=True)
+    if FILM in names:
+        film()
+        names = [name for name in names if name != FILM]
     browser_path = (
         shutil.which("chromium")
         or shutil.which("chromium-browser")
@@ -91,4 +105,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(SCENES))
+    main(sys.argv[1:] or [FILM, *SCENES])

@@ -187,10 +187,11 @@ def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -
     page.close()
 
 
-# addresses of images whose proportions are not their own
+# addresses of images that are stretched to proportions other than their own
 STRETCHED = """() => [...document.images].filter((image) => {
     const [width, height] = [image.clientWidth, image.clientHeight];
-    return height && Math.abs(width * image.naturalHeight / image.naturalWidth / height - 1) > .05;
+    return height && getComputedStyle(image).objectFit === "fill"
+        && Math.abs(width * image.naturalHeight / image.naturalWidth / height - 1) > .05;
 }).map((image) => image.src)"""
 SEARCHES = {
     "install": "Installation and troubleshooting",
@@ -208,6 +209,17 @@ SEARCHES = {
     "numba cache": "Installation and troubleshooting",
     "cite": "References",
 }
+
+
+@needs_chromium
+def test_excerpts_of_search_results_are_sentences(built: Path, browser: Any) -> None:
+    page = browser.new_page()
+    page.goto((built / "search.html").as_uri())
+    found = """<nav><p>A cone in a list.</p></nav><div class=cell><p>cone = 0</p></div>
+        <p>First. A cone opens. It has a tip.</p>"""
+    summary = f"Search.makeSearchSummary(`<div role=main>{found}</div>`, ['cone'], '')"
+    assert page.evaluate(f"{summary}.textContent") == "A cone opens. It has a tip."
+    page.close()
 
 
 @needs_chromium

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -19,7 +19,7 @@ import numpy as np
 from floatbase.affine import Quadratic
 from floatbase.errors import unknown_name
 from floatbase.lessons import progress
-from floatbase.lessons.judges import Example, Verdict, array_or_verdict
+from floatbase.lessons.judges import NO_ANSWER, Example, Verdict, array_or_verdict
 
 TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
@@ -85,7 +85,7 @@ def all_exercises() -> dict[str, Exercise]:
 def check(name: str, answer: Any) -> Verdict:
     """Check an answer to an exercise and record the try.
 
-    An unchanged stub does not count as a try.
+    An unchanged stub does not count as a try; its comment begins with "Your turn".
 
     Parameters
     ----------
@@ -106,12 +106,9 @@ def check(name: str, answer: Any) -> Verdict:
     """
     exercise = _find_exercise(name)
     verdict = exercise.judge(answer)
-    if (
-        answer is not None
-        and answer is not Ellipsis
-        and not _is_placeholder(answer, exercise.placeholder())
-    ):
-        progress.record_try(name, verdict.right, answer)
+    if answer is None or answer is Ellipsis or _is_placeholder(answer, exercise.placeholder()):
+        return replace(NO_ANSWER if verdict.hint.startswith("unknown") else verdict, is_try=False)
+    progress.record_try(name, verdict.right, answer)
     return verdict
 
 

@@ -2,7 +2,7 @@
 
 Figure 1: on the left a robot bolted to the ground, on the right a floating base. Figure 2: a
 quadruped with its base, centre of mass and feet. Figure 3: on the left the friction cone, on the
-right the plane through normal and force.
+right the plane through normal and force. `stepping` is the moving picture of the first pages.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array
+from floatbase.behaviours import Gait, Stand
 from floatbase.dynamics import Contacts
 from floatbase.lessons import props
 from floatbase.robots import load
+from floatbase.simulation import Push, Simulation, rollout
 from floatbase.viewer import Picture, View, Viewer, markers, prefixed, shapes
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED, PATCH, RGB
@@ -213,6 +215,29 @@ def figure_3_right(background: str = "white") -> Viewer:
     picture |= _labels(view, labels)
     view.draw(view.painter.ground_only() | picture, "Figure 3, right: α∥ ≤ μ α⊥")
     return view.camera(View(0.0, 4.0, 1.0, around=((0.0, 0.0, 0.42), 0.62)))
+
+
+def stepping(background: str = "white", height: int = 480) -> Viewer:
+    """Play a quadruped that is pushed to its left with 300 N for 0.1 s and steps to stay upright.
+
+    Parameters
+    ----------
+    background : str, optional
+        Background of the picture, such as "white".
+    height : int, optional
+        Height of the picture in a notebook [pixels].
+
+    Returns
+    -------
+    Viewer
+        Viewer that plays the run in a loop, at half speed.
+    """
+    robot = load("go2")
+    stand = Stand(robot, Contacts.feet(robot), stepping_gait=Gait.trot(robot, swing=0.2))
+    push = Push(np.array([0.0, 300.0, 0.0]), start=0.3)
+    run = rollout(Simulation(robot), stand, 2.2, pushes=[push])
+    view = Viewer(robot, background=background, height=height)
+    return view.play(run, speed=0.5, planned=False, title="a 300 N push to the side, half speed")
 
 
 FIGURES: dict[str, Callable[..., Viewer]] = {

@@ -36,14 +36,18 @@ class Verdict:
         The comment for the learner.
     hint : str
         Name of the mistake that the text is about; "" if the answer is right.
+    is_try : bool
+        Whether the answer is the learner's own; False for an unchanged stub.
     """
 
     right: bool
     text: str
     hint: str = ""
+    is_try: bool = True
 
     def __repr__(self) -> str:
-        return f"{'✓ Right.' if self.right else '✗ Not yet.'} {self.text}"
+        mark = "✓ Right." if self.right else "✗ Not yet." if self.is_try else "· Your turn."
+        return f"{mark} {self.text}"
 
 
 NO_ANSWER = Verdict(

@@ -260,7 +260,8 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
     The first slider sets the force [N] and pushes when it is released. The second sets the
     direction [°]: 0 is forwards, 90 to the robot's left (+y at the start), 180 backwards. The
-    button *push* pushes again. A push starts the simulation, as *run* does; both first put a fallen
+    button *push* pushes again, and dragging the robot in the picture with Shift held pushes it that
+    way. A push starts the simulation, as *run* does; both first put a fallen
     robot back on its feet. *pause* stops the simulation, and *reset* restores the initial state and
     both sliders. The third slider slows down time. A line shows the status and why the simulation
     stopped.
@@ -300,6 +301,13 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
         if change["new"]:
             push()
 
+    def dragged(newtons: float, direction: float) -> None:
+        towards.value = direction
+        if force.value == newtons:
+            push()
+        else:
+            force.value = newtons
+
     def reset() -> None:
         force.value, towards.value = 0.0, 90.0
         run.reset()
@@ -313,6 +321,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
     run.on_status(lambda _: line.show_status())
     force.observe(let_go, names="value")
+    view.on_drag(dragged, max_force)
     buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
     wrapped = widgets.Layout(flex_flow="row wrap")
     aim, bar = (

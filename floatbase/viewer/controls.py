@@ -236,6 +236,33 @@ class Controls:
             [protocol.page_command("add_plot_point", name=as_string("name", name), **point)]
         )
 
+    def on_drag(self, pushed: Callable[[float, float], None], max_force: float) -> None:
+        """Set the function that is called when the reader drags the robot with Shift held.
+
+        Parameters
+        ----------
+        pushed : callable
+            Called as `pushed(force, towards)` in the window's thread when the reader lets go:
+            force [N] and horizontal direction [°], 0 for +x and 90 for +y of the world frame.
+        max_force : float
+            Force of the longest drag [N].
+        """
+        pushed = as_callable("pushed", pushed, "pushed(force, towards)")
+        max_force = as_positive("max_force", max_force, "N")
+        direction = 0.0
+
+        def aim(towards: float) -> None:
+            nonlocal direction
+            direction = towards
+
+        def let_go(force: float) -> None:
+            pushed(force, direction)
+
+        # hidden sliders; the page reports the direction first, see drag.js
+        hidden = {"value": 0.0, "step": 1.0, "is_hidden": True}
+        self._add_control("towards [°]", aim, min=-180.0, max=180.0, **hidden)
+        self._add_control("push [N]", let_go, min=0.0, max=max_force, **hidden)
+
     def set_control_value(self, name: str, value: float | bool) -> None:
         """Show another value in a control, without calling its callback.
 

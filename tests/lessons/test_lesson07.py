@@ -47,7 +47,7 @@ def test_a_note_names_the_constraints_with_the_largest_multipliers_first() -> No
     )
     solution = fb.solve(leaning_controller(0.5).qp(STATE))
     note = multiplier_text(solution)
-    prices = [float(text) for text in re.findall(r"facet \d ([\d.]+)", note)]
+    prices = [float(text) for text in re.findall(r"([\d.]+) \(\w+ facet \d\)", note)]
     assert prices == sorted(prices, reverse=True) and len(prices) == len(solution.active) == 4
 
 

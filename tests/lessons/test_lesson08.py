@@ -130,3 +130,4 @@ def test_both_are_pushed_alike_and_one_falls(together: PushComparison) -> None:
     until(lambda: "fell" in together.lines["stands"].value)
     together.reset_button.click()
     until(lambda: together.runs["stands"].status == "running")
+    until(lambda: together.lines["stands"].value == "")

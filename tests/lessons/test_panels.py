@@ -4,12 +4,15 @@ a line tells of it.
 
 from __future__ import annotations
 
+import asyncio
+import json
 import time
 from collections.abc import Iterator
 
 import ipywidgets as widgets
 import numpy as np
 import pytest
+import tornado.websocket
 from waiting import until
 
 import floatbase as fb
@@ -204,6 +207,25 @@ def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(pan
     until(lambda: panel.arrow is None)
     panel.push.click()
     until(lambda: panel.arrow is not None)
+
+
+def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel: Pushed) -> None:
+    async def drag(newtons: float, towards: float) -> None:
+        url = panel.view.window.web_url.replace("http", "ws") + "socket"
+        client = await tornado.websocket.websocket_connect(url)
+        for name, value in {"towards [°]": towards, "push [N]": newtons}.items():
+            await client.write_message(
+                json.dumps({"type": "control", "name": name, "value": value})
+            )
+        while panel.arrow is None:
+            await asyncio.sleep(0.01)
+        client.close()
+
+    for _ in range(2):
+        asyncio.run(asyncio.wait_for(drag(40.0, 30.0), 20.0))
+        assert (panel.towards.value, panel.force.value) == (30.0, 40.0)
+        assert panel.line.value == "pushed with 40 N towards 30° for 0.1 s"
+        until(lambda: panel.arrow is None)
 
 
 def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pushed) -> None:

@@ -230,6 +230,7 @@ def test_polyhedra_highlight_their_active_facets(
         "/meshcat/cone/FR_foot/facet 3",
     }
     assert colours(viewer, "/meshcat/cone/")["FL_foot"] == CALM
+    assert "friction cone: surface reached" in legend(viewer)
     viewer.show(standing, contacts, forces=0.5 * force + [0, 0, 20.0])
     assert not {path for path in paths(viewer) if "facet" in path}
     viewer.close()
@@ -273,8 +274,8 @@ def test_a_change_sends_only_what_changed(
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
     assert (
-        viewer.window.scene.newest - newest == 4 + 1
-    )  # four arrows, and a cone that is no longer on its surface
+        viewer.window.scene.newest - newest == 4 + 2
+    )  # four arrows, a cone that is no longer on its surface, and its entry in the legend
 
 
 # the same few paths in many spellings, some below others
@@ -375,6 +376,8 @@ def test_the_legend_explains_what_is_shown(
     one_off = forces * [[1.0], [1.0], [1.0], [0.0]]
     viewer.show(standing, contacts, one_off, com=False)
     assert legend(viewer) == ["measured force", *cone, "friction cone: no force"]
+    viewer.show(standing, contacts, forces * [0.0, 0.0, 1.0], com=False)
+    assert legend(viewer) == ["measured force", cone[0]]
     viewer.show(standing, contacts, com=False)
     assert legend(viewer) == ["friction cone: no force"]
     viewer.show(standing, com=False)

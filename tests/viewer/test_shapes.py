@@ -249,6 +249,7 @@ def test_multipliers_are_at_the_middle_of_their_facets(
     answer = controller(standing.q, standing.v).solution
     picture = viewer.multiplier_labels(standing, contacts, answer)
     shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}
+    shown = {name: price for name, price in shown.items() if price > 0.01 * max(shown.values())}
     assert {path.removeprefix("multiplier/") for path in picture} == set(shown)
     assert any("facet" in name for name in shown) and any("normal force" in name for name in shown)
     height = viewer.painter.cone_height(contacts)
@@ -279,7 +280,7 @@ def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: St
     contacts = Contacts.points(standing.robot)
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
-    mu[[0, 1, 2]] = 1e4, 9.0, 11.0  # of FL's facets
+    mu[[0, 1, 2]] = 1e4, 90.0, 110.0  # of FL's facets
     picture = viewer.multiplier_labels(
         standing, contacts, Solution(qp, np.zeros(qp.n), mu, "made up")
     )

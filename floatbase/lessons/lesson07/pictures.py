@@ -81,7 +81,7 @@ def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
 def multiplier_text(solution: Solution) -> str:
     """Return the active constraints with their multipliers, largest first, as a line of text."""
     prices = sorted(solution.multipliers.items(), key=lambda row: -row[1])
-    shown = [f"{name} {rounded(price)}" for name, price in prices if price > 1e-3]
+    shown = [f"{rounded(price)} ({name})" for name, price in prices if price > 1e-3]
     more = f" and {len(shown) - _MAX_LISTED} more" if len(shown) > _MAX_LISTED else ""
     return (
         "largest multipliers: " + ", ".join(shown[:_MAX_LISTED]) + more

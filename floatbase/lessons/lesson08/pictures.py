@@ -149,7 +149,7 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
     """
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
-    aside = np.array([0.0, 0.12, 0.03])  # of the first label; the next one is on the other side
+    aside = np.array([0.0, 0.07, 0.02])  # of the first label; the next one is on the other side
     for name, place in places.items():
         at = np.array([*np.asarray(place, dtype=np.float64)[:2], _PATCH_HEIGHT])
         foot = name in feet
@@ -190,7 +190,7 @@ class PushComparison(widgets.VBox):
             for title, one in controllers.items()
         }
         self.runs: dict[str, LiveSimulation] = {}
-        self.lines = {title: widgets.Label(value="paused") for title in controllers}
+        self.lines = {title: widgets.Label() for title in controllers}  # empty until a run ends
         for title, one in controllers.items():
             sim = fb.Simulation(one.robot)
             self.views[title].show(sim.state, contacts=sim.feet, cones=False)
@@ -228,7 +228,8 @@ class PushComparison(widgets.VBox):
             run.reset()
 
     def _tell(self, title: str, status: str) -> None:
-        self.lines[title].value = status_message(status, self.runs[title].reason)
+        goes_on = status in ("paused", "running")  # the pictures show it
+        self.lines[title].value = "" if goes_on else status_message(status, self.runs[title].reason)
 
     def close(self) -> None:
         """Stop the simulations and close the pictures."""

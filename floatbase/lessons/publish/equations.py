@@ -1,9 +1,9 @@
-"""The page of equations: each equation with its functions, tests and lessons.
+"""The page of equations: each equation with its functions and lessons.
 
 A public docstring that cites the course text, as in "[FBR]_, eq. (9)." or "[FBR]_, App. A.",
-implements that equation. Public names are those that a package exports. A test counts if it names
-the function, a lesson if the metadata of one of its cells says that it teaches the equation.
-`formulas` contains the equations themselves.
+implements that equation. Public names are those that a package exports. A lesson counts if the
+metadata of one of its cells says that it teaches the equation. `formulas` contains the equations
+themselves. The checks of the repository require a test that names each function.
 """
 
 from __future__ import annotations
@@ -81,12 +81,11 @@ def table() -> str:
         "# Equations",
         "",
         "Every equation of the course text *Controlling Floating-Based Robots*, by section, with "
-        "the functions that implement it,",
-        "the lessons that teach it, and the tests that use it. Import a function such as "
-        "`dynamics.forces_from_torques` with",
+        "the functions that implement it and",
+        "the lessons that teach it. Import a function such as `dynamics.forces_from_torques` with",
         "`from floatbase.dynamics import forces_from_torques`.",
         "",
-        "This page is generated from docstrings, tests and lessons by `python -m "
+        "This page is generated from docstrings and lessons by `python -m "
         "floatbase.lessons.publish map`; do not edit it.",
     ]
     for section in SECTIONS:
@@ -101,16 +100,14 @@ def table() -> str:
 
 
 def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:
-    """Write the lines of one equation: formula, meaning, functions, lessons, tests."""
+    """Write the lines of one equation: formula, meaning, functions, lessons."""
     appendix = formula.number == formula.section
-    tests = sorted({test.split("::")[0] for entry in found for test in entry.tests})
     tag = "" if appendix else f" \\tag{{{formula.number.strip('()')}}}"
     return [
         *([] if appendix else ["", f"### {formula.number} {formula.title}"]),
         *("", f"$${formula.latex}{tag}$$", "", formula.meaning, ""),
         f"- functions: {', '.join(f'`{entry.path}`' for entry in found)}",
         f"- lessons: {', '.join(f'[{title_of(NOTEBOOKS / name)}]({name})' for name in lessons)}",
-        f"- tests that use them: {', '.join(f'`{test}`' for test in tests)}",
     ]
 
 

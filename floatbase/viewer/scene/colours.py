@@ -47,16 +47,17 @@ Z_AXIS = _rgb("#0072B2")
 
 GHOST_NAME = "desired posture"  # in the legend, unless `show` is given another name
 
-# entries of the legend, in order: first part of the item's path, colour, meaning
+# entries of the legend, in order: first part of the item's path, or status and "cone"; colour,
+# meaning
 LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("measured", MEASURED, "measured force"),
     ("planned", PLANNED, "planned force"),
     ("wrench", COM, "wrench at the centre of mass"),
     ("com", COM, "centre of mass"),
     ("push", PUSH, "push"),
-    ("cone", CALM, "friction cone: force inside"),
-    ("cone", WARNING, "friction cone: surface reached"),
-    ("cone", ALARM, "friction cone: force outside (rim)"),
+    ("inside cone", CALM, "friction cone: force inside"),
+    ("active cone", WARNING, "friction cone: surface reached"),
+    ("outside cone", ALARM, "friction cone: force outside (rim)"),
     ("idle cone", IDLE, "friction cone: no force"),
     ("near_limit", WARNING, "joint near a position limit"),
     ("active_limit", ALARM, "active joint limit"),
@@ -74,17 +75,16 @@ LEGEND: tuple[tuple[str, RGB, str], ...] = (
     ("ghost", GHOST, GHOST_NAME),
 )
 
-# symbols in the legend other than a patch of colour: first part of the item's path -> class of the
-# page's style
-LEGEND_SYMBOLS = {
-    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
-    "cone": "cone", "idle cone": "cone", "near_limit": "ring", "active_limit": "ring",
-    "support": "tile", "wrench": "curl",
-}  # fmt: skip
-
 # status of a friction cone -> its colour and its opacity
 CONE = {"idle": IDLE, "inside": CALM, "active": WARNING, "outside": ALARM}
 CONE_ALPHA = {"idle": 0.12, "inside": 0.28, "active": 0.28, "outside": 0.28}
+
+# symbols in the legend other than a patch of colour: kind of item -> class of the page's style
+LEGEND_SYMBOLS = {
+    "com": "disc", "dcm": "ring", "zmp": "diamond", "foothold": "ring", "swing": "line",
+    "near_limit": "ring", "active_limit": "ring", "support": "tile", "wrench": "curl",
+    **{f"{status} cone": "cone" for status in CONE},
+}  # fmt: skip
 
 # background -> colours of the page's top and bottom, of the ground's lines, and of text
 BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {

@@ -5,16 +5,21 @@ from __future__ import annotations
 from functools import lru_cache
 
 from floatbase.viewer.scene import protocol, shapes
-from floatbase.viewer.scene.colours import LEGEND, LEGEND_SYMBOLS, RGB, hex_code
+from floatbase.viewer.scene.colours import CONE, LEGEND, LEGEND_SYMBOLS, RGB, RGBA, hex_code
 from floatbase.viewer.scene.shapes import Picture
 
 Entry = tuple[str, RGB, str]  # kind of items, colour, meaning
+
+_CONE_KINDS: dict[RGBA | None, str] = {
+    shapes.cone_colour(status): f"{status} cone" for status in CONE
+}
 
 
 def kinds(picture: Picture) -> set[str]:
     """Find which kinds of `LEGEND` a picture shows.
 
-    The kind of an item is the first part of its path. A cone without a force is an "idle cone".
+    The kind of an item is the first part of its path. Those of friction cones contain their status,
+    such as "idle cone" for a cone without a force; a highlighted facet is an "active cone".
 
     Parameters
     ----------
@@ -26,11 +31,15 @@ def kinds(picture: Picture) -> set[str]:
     set of str
         The kinds.
     """
-    idle = shapes.cone_colour("idle")
-    return {
-        "idle cone" if item.colour == idle else path.strip("/").split("/")[0]
-        for path, item in picture.items()
-    }
+    found = set()
+    for path, item in picture.items():
+        kind, *rest = path.strip("/").split("/")
+        if kind == "cone" and rest and rest[-1].startswith("facet "):
+            kind = "active cone"
+        elif kind == "cone" or item.colour == shapes.cone_colour("idle"):
+            kind = _CONE_KINDS.get(item.colour, kind)
+        found.add(kind)
+    return found
 
 
 @lru_cache(maxsize=64)  # most pictures show the same kinds as the previous one

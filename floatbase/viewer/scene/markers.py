@@ -35,7 +35,7 @@ _CONE_CONSTRAINTS = (
     "largest normal force",
 )  # kinds of the constraints whose multipliers are shown
 # fraction of the largest multiplier: labels of smaller ones would only hide others
-_LEAST_SHOWN = 1e-3
+_LEAST_SHOWN = 0.01  # fraction of the largest multiplier; labels of smaller ones would cover others
 OUTLINE = 0.6  # width of the outline of a push, as a fraction of the radius of its shaft
 
 
@@ -180,7 +180,7 @@ def multiplier_labels(
     """Label the facets of active friction constraints with their multipliers.
 
     Multipliers have two significant digits. The label of a normal-force limit, which has no facet,
-    is on the cone's axis at the top. Multipliers below a thousandth of the largest one have no
+    is on the cone's axis at the top. Multipliers below a hundredth of the largest one have no
     label.
 
     Parameters
@@ -242,7 +242,7 @@ def multiplier_labels(
             np.asarray(positions)[i] + height / 1.5 * to_facet
         )  # the centroid of a triangle with its tip at the point
         picture[f"/{name.replace('/', '_')}"] = label(
-            at, f"{float(f'{found[name]:.2g}'):g}", 0.05 * size
+            at, f"{float(f'{found[name]:.2g}'):g}", 0.042 * size
         )
     return picture
 

@@ -35,7 +35,6 @@ _MOVED = {
 }
 _FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
-_TESTS = re.compile(r"^- tests that use them: (.+)$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 
@@ -117,13 +116,9 @@ def replace_site(built: Path, folder: Path) -> None:
 
 
 def _front_page_notebook() -> Path:
-    """Write a notebook that runs the README's program and plays its run."""
-    readme = (_ROOT / "README.md").read_text(encoding="utf-8")
-    code = next(iter(re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)))
-    play = 'fb.Viewer(robot, height=420).play(run, title="a 30 N push to the side")'
-    notebook = new_notebook(
-        cells=[new_code_cell(code, id="program"), new_code_cell(play, id="picture")]
-    )
+    """Write a notebook that plays the moving picture of the first page."""
+    code = 'from floatbase.lessons.figures import stepping\n\nstepping("light", height=420)'
+    notebook = new_notebook(cells=[new_code_cell(code, id="picture")])
     path = RUN_FOLDER / "first_page.ipynb"
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, path)
@@ -147,7 +142,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
     )
     placed = pictures.place(data)
     image = (
-        f'<img alt="go2 stands on four feet" src="data:image/png;base64,{data.get("image/png")}">'
+        f'<img alt="go2 steps after a push" src="data:image/png;base64,{data.get("image/png")}">'
     )
     return f"```{{raw}} html\n{placed or image}\n```"
 
@@ -241,16 +236,6 @@ def _with_anchors(page: str) -> str:
         address = known.get(f"floatbase.{match[1]}")
         return f"{{py:obj}}`{match[1]} <{address}>`" if address else match[0]
 
-    def fold(match: re.Match[str]) -> str:
-        files = match[1].replace("`", "").split(", ")
-        listed = " ".join(f"<code>{file}</code>" for file in files)
-        count = "1 file" if len(files) == 1 else f"{len(files)} files"
-        return (
-            f'- <details class="tests"><summary>tests that use them, in '
-            f"{count}</summary>{listed}</details>"
-        )
-
-    page = _TESTS.sub(fold, page)
     page = page.replace(
         "## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text"
     )

@@ -1,5 +1,5 @@
 // Push the robot by dragging it with the Shift key held: the way over the ground sets the sliders
-// "push [N]" and "towards [°]", where a page has them, and letting go pushes.
+// "push [N]" and "towards [°]", visible or hidden, where a page has them, and letting go pushes.
 
 import {element} from "./dom.js";
 import {findNode, three} from "./meshcat.js";

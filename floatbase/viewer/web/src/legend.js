@@ -4,6 +4,8 @@
 
 import {element, make} from "./dom.js";
 
+const LINGER = 1000; // ms before entries disappear: a force that comes and goes makes no flicker
+
 // Whether an open legend would be in the way. All in pixels: lines: the box of the open legend;
 // player: that of the player, null without one; titleBottom: lower edge of the title; aside: by how
 // much the middle of the picture is left of the window's; width, height: of the window.
@@ -12,9 +14,16 @@ export function isCrowded({lines, player, titleBottom, aside, width, height}) {
   const away = Math.hypot(
     Math.max(middle.x - lines.right, 0), Math.max(lines.top - middle.y, 0),
   );
-  return away < middle.y // the camera fits what it looks at into a ball as high as the picture
+  return lines.bottom - lines.top > 0.3 * height
+    || away < middle.y // the camera fits what it looks at into a ball as high as the picture
     || lines.top < titleBottom
     || (player !== null && lines.right > player.left);
+}
+
+// Whether items are some of those that are shown, and not all.
+export function isFewer(items, shown) {
+  const known = new Set(shown.map(String));
+  return items.length < shown.length && items.every((item) => known.has(String(item)));
 }
 
 // The items in the colours of a theme, and each of these colours once. items: [colour, text,
@@ -29,7 +38,7 @@ export function createLegend(camera, shade) {
   const legend = element("legend"), lines = element("lines");
   const button = legend.querySelector("button");
   const box = (id) => element(id).getBoundingClientRect();
-  let isKept = false, shown = [];
+  let isKept = false, shown = [], timer = 0;
   const open = (now) => {
     legend.classList.toggle("open", now);
     button.setAttribute("aria-expanded", now);
@@ -55,6 +64,11 @@ export function createLegend(camera, shade) {
   const sizes = new ResizeObserver(fold);
   for (const id of ["meshcat-pane", "player", "panel"]) sizes.observe(element(id));
   function show(items) {
+    clearTimeout(timer);
+    if (isFewer(items, shown)) timer = setTimeout(draw, LINGER, items);
+    else draw(items);
+  }
+  function draw(items) {
     shown = items;
     const {shaded, colours} = shadedItems(items, shade);
     lines.replaceChildren(...shaded.map(
@@ -63,7 +77,7 @@ export function createLegend(camera, shade) {
     button.firstChild.replaceChildren(...colours.map((colour) => spot(colour)));
     fold();
   }
-  return {show, redraw: () => show(shown)};
+  return {show, redraw: () => draw(shown)};
 }
 
 // A patch of a colour, or one of the style sheet's symbols in it: a disc, a ring, a diamond, a

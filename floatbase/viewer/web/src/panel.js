@@ -79,7 +79,7 @@ export function createPanel({report: send, redraw}) {
     input.oninput = () => waits ? show(input.value) : setValue(input.value);
     if (waits) input.onchange = () => setValue(input.value);
     input.ondblclick = () => setValue(input.dataset.home);
-    row(command).append(input, shown);
+    if (!command.is_hidden) row(command).append(input, shown);
     return {
       getValue: () => Number(input.value), getMax: () => Number(input.max), show, setValue, remake,
     };

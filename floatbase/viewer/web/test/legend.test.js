@@ -1,11 +1,11 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {isCrowded, shadedItems} from "../src/legend.js";
+import {isCrowded, isFewer, shadedItems} from "../src/legend.js";
 
-// a legend 220 pixels wide and 150 high at the lower left
+// a legend 220 pixels wide and 100 high at the lower left
 const crowded = (width, height, more = {}) => isCrowded({
-  lines: {right: 220, top: height - 150}, player: null, titleBottom: 30, aside: 0, width, height,
-  ...more,
+  lines: {right: 220, top: height - 100, bottom: height}, player: null, titleBottom: 30, aside: 0,
+  width, height, ...more,
 });
 
 test("a legend is open where it is beside what the camera looks at", () => {
@@ -17,13 +17,22 @@ test("a legend is folded where it would cover it, or the title", () => {
   assert.ok(crowded(420, 360));
   assert.ok(crowded(590, 480));
   assert.ok(crowded(1300, 160));
-  assert.ok(crowded(1000, 480, {titleBottom: 340}));
+  assert.ok(crowded(1300, 320));
+  assert.ok(crowded(1000, 480, {titleBottom: 400}));
 });
 
 test("a panel and a player take room from a legend", () => {
   assert.ok(crowded(1000, 480, {aside: 170}));
   assert.ok(crowded(1300, 600, {player: {left: 200}}));
   assert.ok(!crowded(1300, 600, {player: {left: 400}}));
+});
+
+test("only entries that disappear, and no new ones, are fewer", () => {
+  const [a, b] = [["#a", "force", "line"], ["#b", "cone", "cone"]];
+  assert.ok(isFewer([a], [a, b]));
+  assert.ok(isFewer([], [a]));
+  assert.ok(!isFewer([a, b], [a, b]));
+  assert.ok(!isFewer([["#c", "push", "patch"]], [a, b]));
 });
 
 test("items are shown in the theme's shades, and each colour once", () => {

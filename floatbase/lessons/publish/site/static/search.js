@@ -1,0 +1,33 @@
+// Excerpts of search results: whole sentences, from the first one with the keywords on, without
+// code, tables and lists of contents.
+
+if (typeof Search !== "undefined") {
+  const LENGTH = 240; // characters, about
+  const OMITTED = "nav, table, details, .toc, .contents, div.cell";
+
+  Search.makeSearchSummary = (html, keywords, anchor) => {
+    const page = new DOMParser().parseFromString(html, "text/html");
+    const main = page.querySelector("[role=main]");
+    const part = (anchor && main?.querySelector(anchor)) || main;
+    const sentences = [...part?.querySelectorAll("p, li:not(:has(p)), dd:not(:has(p))") ?? []]
+      .filter((paragraph) => !paragraph.closest(OMITTED))
+      .flatMap((paragraph) => paragraph.textContent.trim().split(/(?<=[.?!])\s+(?=\p{Lu})/u));
+    const words = [...keywords].map((word) => word.toLowerCase());
+    const has = (word) => (sentence) => sentence.toLowerCase().includes(word);
+    const first = [
+      sentences.findIndex((sentence) => words.every((word) => has(word)(sentence))),
+      ...words.map((word) => sentences.findIndex(has(word))),
+      0,
+    ].find((index) => index >= 0);
+    let text = "";
+    for (const sentence of sentences.slice(first)) {
+      if (text.length + sentence.length > LENGTH && text) break;
+      text = `${text} ${sentence}`.trim();
+    }
+    if (!text) return null;
+    const summary = document.createElement("p");
+    summary.className = "context";
+    summary.textContent = text;
+    return summary;
+  };
+}
