@@ -87,9 +87,12 @@ class Problem(Value):
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
         tasks, sizes = _with_regularisation(self.tasks)
+        if not isinstance(self.level_sizes, list | tuple):
+            raise InputError(
+                f"level_sizes must be a list of integers, not {short_repr(self.level_sizes)}."
+            )
         sizes = sizes or [
-            as_integer("each of level_sizes", size, 1, len(tasks))
-            for size in as_instance("level_sizes", self.level_sizes, Sequence, "(1, 2)")
+            as_integer("each of level_sizes", size, 1, len(tasks)) for size in self.level_sizes
         ]
         if sizes:
             sizes[-1] += len(tasks) - sum(sizes)
