@@ -94,6 +94,7 @@ def test_the_program_of_an_arm_and_of_a_biped_makes_the_same_run(name: str) -> N
     assert_same_run(robot, Settings(com_shift=(0.01, 0.0, 0.0), **walk))
 
 
+@pytest.mark.filterwarnings("ignore:.*has no posture")
 @pytest.mark.parametrize(
     "names", [("it's", 'a "quoted" \\ foot'), ("__import__('os')", "'); 1/0; ('")]
 )

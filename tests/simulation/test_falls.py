@@ -23,7 +23,7 @@ from floatbase.simulation import LiveSimulation
 # m below the ground, at most: a contact that supports a robot yields by less than a millimetre
 DEPTH = 5e-3
 PERIOD = 2e-3
-SETTLING_TIME = 2.0  # s
+SETTLING_TIME = 3.0  # s
 SLOW = 0.5  # m/s and rad/s: a leg in the air may still sink against the joint damping
 ROW_NAMES = ("time", "q", "v", "tau", "tau_desired", "planned", "measured", "foot_positions")
 

@@ -50,6 +50,7 @@ def test_a_page_has_what_is_shown(
         page.evaluate("Object.keys(viewer.scene_tree.children.meshcat.children.measured.children)")
         == []
     )
+    page.wait_for_timeout(1500)  # the legend keeps an entry for a second
     image = picture(page, "go2_bare")
     for colour in (MEASURED, WARNING, ALARM, COM):
         assert hue_pixels(image, colour) < 30
