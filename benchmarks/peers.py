@@ -277,7 +277,7 @@ The problem is the one above, with hard joint limits: `TaskJointPosVelAccBounds`
 `JointLimits(weight=None)` in floatbase. Both bound the joint accelerations by positions,
 velocities, accelerations and viability after a period of 4 ms. "tsid limits" uses the
 braking accelerations of `JointLimits.of(robot)`. "tsid tight limits" uses at most 20 rad/s².
-Differences between the libraries are removed or left out:
+Differences between the libraries are equalized or left out:
 
 - TSID limits accelerations to the braking acceleration. floatbase has a reserve of twice the
   braking acceleration. Here, the acceleration limit switches this reserve off.
