@@ -27,13 +27,13 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s² or m/s²: ten times the weight of a task, so tasks do not push a joint past its limit.
-# With a much larger weight, a supporting leg lets the robot fall rather than touch a joint's stop
+# per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much larger
+# weight, a supporting leg lets the robot fall rather than touch a joint's stop
 _WEIGHT = 100.0
-# fraction of a motor's acceleration in the standing posture that is always available for braking:
+# fraction of a motor's acceleration in the standing posture that a joint can rely on for braking:
 # gravity, other joints and other postures need the rest
 _BRAKING_FRACTION = 0.5
-# rad/s² or m/s²: a supporting leg cannot brake its joints faster
+# rad/s² or m/s²: a supporting leg brakes its joints no faster than this
 _MAX_BRAKING = 300.0
 # multiple of `braking` that a bound may demand: without a reserve, a joint that moves faster than
 # planned would not stop in time
