@@ -27,8 +27,8 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much larger
-# weight, a supporting leg lets the robot fall rather than touch a joint's stop
+# per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much
+# larger weight, a supporting leg lets the robot fall rather than touch a joint's stop
 _WEIGHT = 100.0
 # fraction of a motor's acceleration in the standing posture that a joint can rely on for braking:
 # gravity, other joints and other postures need the rest
