@@ -2,8 +2,8 @@
 playwright and a Chromium.
 
 They show the course text's figures, every robot of the catalogue with its forces and friction
-cones, go2 with four-sided cones, and the feet of talos. The moving picture is go2 that steps after
-a push; it also needs the extra `video`.
+cones, go2 with four-sided cones, and the feet of talos. The animation shows go2 stepping after a
+push; it also needs the extra `video`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ SCENES: dict[str, Callable[[], Viewer]] = {
 
 
 def film() -> None:
-    """Save the moving picture."""
+    """Save the animation."""
     view = stepping()
     path = view.save(OUT / f"{FILM}.gif", size=(480, 300))
     view.close()

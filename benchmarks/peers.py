@@ -273,19 +273,19 @@ for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at 
 while TSID uses its `TaskComEquality`."""
 
 LIMITS = """\
-The problem is the one above with hard joint limits: `TaskJointPosVelAccBounds` in TSID,
+The problem is the one above, with hard joint limits: `TaskJointPosVelAccBounds` in TSID,
 `JointLimits(weight=None)` in floatbase. Both bound the joint accelerations by positions,
-velocities, accelerations and viability after a period of 4 ms. "tsid limits" uses the accelerations
-with which `JointLimits.of(robot)` brakes, "tsid tight limits" at most 20 rad/s². What differs
-between the libraries is made equal or left out:
+velocities, accelerations and viability after a period of 4 ms. "tsid limits" uses the
+braking accelerations of `JointLimits.of(robot)`. "tsid tight limits" uses at most 20 rad/s².
+Differences between the libraries are equalized or left out:
 
-- TSID limits accelerations to the value with which joints brake. floatbase has a second value, a
-  reserve of twice the braking acceleration, which the acceleration limit switches off here.
+- TSID limits accelerations to the braking acceleration. floatbase has a reserve of twice the
+  braking acceleration. Here, the acceleration limit switches this reserve off.
 - floatbase keeps speeds 0.3 % below their limits; TSID gets these lower limits.
-- TSID doubles the time step of its constructor, so it gets half the period.
-- Hard limits: TSID has no soft inequalities.
+- TSID doubles the time step given to its constructor, so it is given half the period.
+- The limits are hard, because TSID has no soft inequalities.
 - States from which a joint cannot stop in time are left out. There, TSID replaces one of two
-  contradicting bounds by the other, and floatbase demands the largest deceleration."""
+  contradictory bounds with the other, and floatbase demands the largest deceleration."""
 
 SAMENESS = """\
 Torques are compared before times. They count as equal if they differ by at most a millionth of the

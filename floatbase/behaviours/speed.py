@@ -101,7 +101,7 @@ def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
 
 
 def _swing_lag(gait: Gait) -> float:
-    """Return how long after lift-off the distance from the body to the foot grows, in effect [s].
+    """Return the effective time after lift-off for which the body-to-foot distance grows [s].
 
     Times the speed, this is the distance beyond half a step. The body moves by speed t, and the
     foot by minimum jerk to the end of a step of length speed period.

@@ -43,8 +43,8 @@ Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
 _RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at which a ramp begins
-# per rad/s²: as much as a task. A knee that touches its stop is better than a fall: of 24 pushes of
-# 200 to 300 N, go2 survives 24 with this weight, 22 with 200 and 13 with 10 000
+# per rad/s²: the weight of a task. A knee that touches its stop is better than a fall: of 24
+# pushes of 200 to 300 N, go2 survives 24 with this weight, 22 with 200 and 13 with 10 000
 _JOINT_LIMIT_WEIGHT = 10.0
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB

@@ -31,7 +31,7 @@ def capture_point_inequality(
     margin : float, optional
         Distance from the edges of the support polygon [m].
     horizon : float, optional
-        Horizon T [s]. With a shorter one, the capture point may approach an edge faster.
+        Horizon T [s]. With a shorter horizon, the capture point may approach an edge faster.
     name : str, optional
         Name in messages.
 
@@ -45,9 +45,9 @@ def capture_point_inequality(
     Notes
     -----
     The constraint is from [Ramos2014]_, and the capture point from [Pratt2006]_. The inequalities
-    keep tasks from moving the robot to where it must step or fall. A disturbance can still move the
-    capture point to where no contact forces bring it back within the horizon. Then the problem
-    is infeasible.
+    keep tasks from moving the robot to a state from which it must step or fall. A disturbance can
+    still move the capture point so far that no contact forces bring it back within the horizon.
+    Then the problem is infeasible.
 
     Examples
     --------

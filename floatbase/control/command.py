@@ -31,8 +31,7 @@ class Command(Value):
     solution : Solution or callable
         Value of the property `solution`, or a function that computes it on first use.
     softened : bool, optional
-        Whether limits, or limits and contacts, were made soft because the QP had no solution
-        otherwise.
+        Whether limits, or limits and contacts, were made soft because the QP had no solution.
     """
 
     tau: Array
@@ -99,7 +98,7 @@ class Command(Value):
 
     @property
     def violations(self) -> dict[str, float]:
-        """Violation of each soft constraint that does not hold, by name.
+        """Violation of each violated soft constraint, by name.
 
         The unit is that of the constraint: rad/s² or m/s² for joint limits, N for normal forces.
         """

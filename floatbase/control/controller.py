@@ -94,8 +94,8 @@ class WholeBodyController:
     on_infeasible : {"raise", "soften"}, optional
         What to do if the QP has no solution. "raise" raises `InfeasibleError`. "soften" solves
         again with soft joint limits, user-defined inequalities and bounds of normal forces (weight
-        1e4), and sets `Command.softened`; `Command.violations` lists what is violated. If there
-        still is no solution, the contacts become soft as well (contact_weight=1e4). The equations
+        1e4), and sets `Command.softened`. `Command.violations` lists the violations. If there is
+        still no solution, the contacts become soft as well (contact_weight=1e4). The equations
         of motion, friction and torque limits always hold.
     modify_qp : callable, optional
         Function (qp, eom) -> QP that changes the problem before it is solved. It is called at every
@@ -125,7 +125,7 @@ class WholeBodyController:
     [FBR]_, eqs. (26), (27). A call raises `InfeasibleError` with the conflicting constraints.
 
     If the contacts are redundant or nearly so, as in eq. (5) for solo8 on four feet, a measured
-    velocity can contradict them. The controller then answers without an error, but its q̈ violates
+    velocity can contradict them. The controller then raises no error, but its q̈ violates
     some rows of eq. (5), by several m/s² for solo8 at joint velocities of 3 rad/s. The residual of
     eq. (5), A q̈ - b, shows how much. See `build_qp`.
 

@@ -27,15 +27,15 @@ from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s² or m/s²: ten times the weight of a task, which a limit withstands. With much more, a
-# leg that carries the robot makes it fall rather than touch a joint's stop
+# per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much
+# larger weight, a supporting leg lets the robot fall rather than touch a joint's stop
 _WEIGHT = 100.0
-# fraction of a motor's acceleration in the standing posture that a joint can surely brake with:
+# fraction of a motor's acceleration in the standing posture that a joint can rely on for braking:
 # gravity, other joints and other postures need the rest
 _BRAKING_FRACTION = 0.5
-# rad/s² or m/s²: a leg that carries the robot brakes its joints no faster
+# rad/s² or m/s²: a supporting leg brakes its joints no faster than this
 _MAX_BRAKING = 300.0
-# multiple of `braking` that a bound may demand: without a reserve, a joint that is faster than
+# multiple of `braking` that a bound may demand: without a reserve, a joint that moves faster than
 # planned would not stop in time
 _RESERVE = 2.0
 # fraction of a speed limit: torques are constant in a control period, so a joint gets faster than
@@ -64,7 +64,7 @@ def _as_magnitudes(name: str, value: Any) -> Array:
     """Return a vector of positive numbers or inf, checked."""
     bounds = _as_bounds(name, value)
     if not np.all(bounds > 0.0):
-        raise InputError(f"{name} must be positive, but its least entry is {bounds.min():g}.")
+        raise InputError(f"{name} must be positive, but its smallest entry is {bounds.min():g}.")
     return bounds
 
 
@@ -106,8 +106,8 @@ class JointLimits(Value):
     acceleration : array_like, shape (d,)
         Largest accelerations in both directions [rad/s² or m/s²]; inf for none.
     braking : array_like, shape (d,)
-        Decelerations with which the joints stop [rad/s² or m/s²]. Limits demand at most twice as
-        much, if a joint is faster than planned.
+        Decelerations with which the joints stop [rad/s² or m/s²]. If a joint moves faster than
+        planned, the bounds demand at most twice as much.
     period : float, optional
         Control period [s]. The limits also hold for shorter periods.
     weight : float, optional
@@ -118,7 +118,7 @@ class JointLimits(Value):
     Raises
     ------
     InputError
-        If shapes do not fit, if a lower limit is above its upper limit, or if a value is not
+        If shapes do not match, if a lower limit is above its upper limit, or if a value is not
         positive.
 
     Notes
@@ -163,13 +163,13 @@ class JointLimits(Value):
         robot : Robot
             The robot. Joints without position or velocity limits in the URDF have none.
         **changes
-            Parameters of the class that differ, such as velocity=... or weight=1e4.
+            Parameters of the class to change, such as velocity=... or weight=1e4.
 
         Returns
         -------
         JointLimits
             The limits. The URDF has no acceleration limits. `braking` is half of the acceleration
-            that each motor gives its joint in the standing posture with the base fixed, and at
+            that each motor gives its joint in the standing posture with the base fixed, but at
             most 300 rad/s².
 
         Raises
@@ -199,7 +199,7 @@ class JointLimits(Value):
         Raises
         ------
         InputError
-            If they have not.
+            If they do not.
         """
         if len(self.lower) != robot.d:
             raise InputError(
@@ -343,7 +343,7 @@ class JointLimits(Value):
         -------
         tuple of ConstraintLabel
             Names such as "FL_calf_joint position upper", for bounded joints only. The second word
-            says which limit is the strictest in this state.
+            names the strictest limit in this state.
         """
         upper, lower = self._upper_bounds(self.upper - q, v), self._upper_bounds(q - self.lower, -v)
         return tuple(

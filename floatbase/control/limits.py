@@ -292,7 +292,7 @@ class Limits(Value):
     def softened(self, weight: float) -> Limits:
         """Return limits whose hard constraints are soft, except the physical ones.
 
-        Soft are then all joint limits, user-defined inequalities and bounds of normal forces.
+        All joint limits, user-defined inequalities and bounds of normal forces are then soft.
         Friction, torque limits and normal forces ≥ 0 remain hard.
 
         Parameters
@@ -303,7 +303,7 @@ class Limits(Value):
         Returns
         -------
         Limits
-            The limits, or this object if nothing changes.
+            The limits; this object if nothing changes.
         """
         joints, inequalities = self.joint_limits, self.inequalities
         bounded = bool(self.min_normal_force) or self.max_normal_force != {}

@@ -1,4 +1,4 @@
-"""Strict priorities: one QP for each level of tasks, in what the levels before leave free."""
+"""Strict priorities: one QP per level, in the freedom that earlier levels leave."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def solve_levels(
 
     The optimum of a level has the same residuals wherever it is attained, because the cost is
     strictly convex in them. The next level therefore keeps the residuals, not the variables. Soft
-    inequalities are violated only as much as in the first level.
+    inequalities are violated no more than in the first level.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 Figure 1: on the left a robot bolted to the ground, on the right a floating base. Figure 2: a
 quadruped with its base, centre of mass and feet. Figure 3: on the left the friction cone, on the
-right the plane through normal and force. `stepping` is the moving picture of the first pages.
+right the plane through normal and force. `stepping` is the animation on the first pages.
 """
 
 from __future__ import annotations

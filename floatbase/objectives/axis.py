@@ -55,7 +55,7 @@ class AxisTask(TargetTask):
     For an axis with angular velocity ω, n × ṅ = P ω and n × n̈ = P ω̇ + (n · ω) n × ω, where
     P = 1 - n nᵀ. The residual is n × n̈ - P (d × d̈ - kp e - kd (n × ṅ - d × ḋ)). The feedback acts
     along the shortest way on the sphere, as in [Bullo1995]_, so it is largest close to the opposite
-    direction. If the axis is exactly opposite to the direction, every way is equally short and the
+    direction. If the axis is exactly opposite to the direction, all ways are equally short, and the
     task chooses one of them.
 
     Examples

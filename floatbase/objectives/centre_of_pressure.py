@@ -38,13 +38,13 @@ class CentreOfPressureTask(TargetTask):
     it.
 
     The centre of pressure p and the centre of mass c are not independent: without a change of the
-    angular momentum, c̈ = ω² (c - p), with ω = √(g / height). So a fixed target lets the robot fall,
-    and tasks for both compete unless their targets satisfy this equation, as those of
+    angular momentum, c̈ = ω² (c - p), with ω = √(g / height). The robot falls if the target
+    is fixed. Tasks for both conflict unless their targets satisfy this equation, as those of
     `floatbase.behaviours.LIPM` do.
 
     The task leaves most of λ open. Add a `ForceTask` with a small weight, in particular with flat
-    feet: otherwise the forces are not unique, and the compiled backend may leave control steps to
-    the slower reference backend.
+    feet. Otherwise the forces are not unique, and some control steps may fall back to the slower
+    reference backend.
     """
 
     position: Target

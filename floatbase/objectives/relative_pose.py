@@ -59,7 +59,7 @@ class RelativePoseTask(MotionTask):
 
     Examples
     --------
-    Keep the two front feet of a robot at their distance and orientation:
+    Keep the relative position and orientation of a robot's two front feet:
 
     >>> from floatbase.objectives import RelativePoseTask
     >>> state = fb.load("go2").standing()

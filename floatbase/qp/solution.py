@@ -127,7 +127,7 @@ class Solution(Value):
 
     @property
     def violations(self) -> dict[str, float]:
-        """Violation of each soft inequality that does not hold, by name [units of h]."""
+        """Violation of each violated soft inequality, by name [units of h]."""
         qp = self.qp
         size = qp.row_norms[qp.soft]
         excess = (qp.G @ self.x - qp.h)[qp.soft]

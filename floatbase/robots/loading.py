@@ -46,8 +46,8 @@ PLATE_SIZE = (
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
-# ratio of a leg's smallest to its largest singular value at which it is singular: about sin θ / 5
-# for two equal links that are θ from straight, so this is 3°
+# ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
+# about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
@@ -405,7 +405,7 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
     if singular:
         message = (
             f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
-            f"Then the legs of {', '.join(singular)} are singular, for example straight, and "
+            f"The legs of {', '.join(singular)} are then singular, for example straight, and "
             f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
             f"load_urdf: {robot.d} joint positions."
         )

@@ -285,7 +285,7 @@ class Simulation:
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Reserve the simulation for the present thread, as a context manager.
+        """Reserve the simulation for the current thread, as a context manager.
 
         Yields
         ------

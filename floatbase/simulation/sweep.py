@@ -29,7 +29,7 @@ from floatbase.simulation.row_store import (
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_MAX_WORKERS = 1024  # a typing error, not the number of cores of a computer, is larger
+_MAX_WORKERS = 1024  # a larger number is a typing error
 _WORKER_IDLE_TIMEOUT = 60.0  # s after which an idle worker ends; a sweep before that reuses it
 _POINTS_PER_WORKER = 2  # submitted at a time, the current one and the next; a kill loses no others
 _MIN_CLUSTER_THREADS = 32  # a Dask cluster that begins with fewer may grow during the sweep

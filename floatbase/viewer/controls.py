@@ -237,12 +237,12 @@ class Controls:
         )
 
     def on_drag(self, pushed: Callable[[float, float], None], max_force: float) -> None:
-        """Set the function that is called when the reader drags the robot with Shift held.
+        """Set the function that is called when the user drags the robot with Shift held down.
 
         Parameters
         ----------
         pushed : callable
-            Called as `pushed(force, towards)` in the window's thread when the reader lets go:
+            Called as `pushed(force, towards)` in the window's thread when the user lets go:
             force [N] and horizontal direction [°], 0 for +x and 90 for +y of the world frame.
         max_force : float
             Force of the longest drag [N].

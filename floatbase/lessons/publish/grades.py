@@ -268,7 +268,7 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
     Raises
     ------
     InputError
-        If the file cannot be written, or if there is one that is no such table.
+        If the file cannot be written, or if an existing file is not such a table.
     """
     rows = [
         (one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback)

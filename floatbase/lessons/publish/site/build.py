@@ -116,7 +116,7 @@ def replace_site(built: Path, folder: Path) -> None:
 
 
 def _front_page_notebook() -> Path:
-    """Write a notebook that plays the moving picture of the first page."""
+    """Write a notebook that plays the animation of the first page."""
     code = 'from floatbase.lessons.figures import stepping\n\nstepping("light", height=420)'
     notebook = new_notebook(cells=[new_code_cell(code, id="picture")])
     path = RUN_FOLDER / "first_page.ipynb"

@@ -1,8 +1,8 @@
-// Excerpts of search results: whole sentences, from the first one with the keywords on, without
+// Excerpts of search results: whole sentences, starting at the first one with the keywords, without
 // code, tables and lists of contents.
 
 if (typeof Search !== "undefined") {
-  const LENGTH = 240; // characters, about
+  const LENGTH = 240; // characters, approximately
   const OMITTED = "nav, table, details, .toc, .contents, div.cell";
 
   Search.makeSearchSummary = (html, keywords, anchor) => {
