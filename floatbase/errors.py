@@ -14,7 +14,7 @@ from types import ModuleType
 import numpy as np
 
 MAX_REPR = 60  # characters of a value that a message shows
-_MAX_INTEGER = 10**30  # Python refuses to write an integer of more than 4300 digits
+_MAX_INTEGER = 10**30  # larger integers fill a message, and Python writes at most 4300 digits
 
 
 class FloatbaseError(Exception):

@@ -81,8 +81,8 @@ class WholeBodyController:
         User-defined inequality constraints on q̈, τ or λ.
     joint_limits : JointLimits or {"robot"}, optional
         Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
-        `JointLimits.of(robot)`, as soft constraints: they hold in every state in which torques and
-        contacts allow it. None switches them off.
+        `JointLimits.of(robot)`, as soft constraints with a weight of 100: a limit yields only if
+        torques, contacts or tasks of larger weight oppose it. None switches them off.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation
         times this weight is added to the objective [1/N].

@@ -31,7 +31,7 @@ from floatbase.viewer.export.recording import planned_qdd_at, push_at
 _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
-_DEFAULT_PUSH = 60.0  # N: go2 moves visibly, and all robots of the catalogue keep standing
+_DEFAULT_PUSH = 60.0  # N: go2 moves visibly and keeps standing
 _LARGEST_DEFAULT_PUSH = 0.4  # times the weight, for light robots
 _MAX_HISTORY = 100  # changes that `undo` remembers
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
