@@ -47,6 +47,9 @@ _CONTROL_PERIOD = 4e-3
 # difference between an acceleration and its bound, as a fraction of 1 rad/s² plus the acceleration:
 # rounding errors of the QP are smaller
 _REACHED_TOLERANCE = 1e-6
+_MIN_PERIOD = 1e-6  # s: shorter periods are in another unit
+# of soft constraints: beside larger weights, those of tasks and regularization lose their digits
+_MAX_WEIGHT = 1e8
 _KINDS = ("position", "velocity", "acceleration")
 
 
@@ -66,6 +69,14 @@ def _as_magnitudes(name: str, value: Any) -> Array:
     if not np.all(bounds > 0.0):
         raise InputError(f"{name} must be positive, but its smallest entry is {bounds.min():g}.")
     return bounds
+
+
+def _as_period(name: str, value: Any) -> float:
+    """Return a control period [s], checked."""
+    period = as_positive(name, value, "s")
+    if period < _MIN_PERIOD:
+        raise InputError(f"{name} is {period:g} s. It must be at least {_MIN_PERIOD:g} s.")
+    return period
 
 
 def as_weight(name: str, value: Any) -> float | None:
@@ -88,7 +99,7 @@ def as_weight(name: str, value: Any) -> float | None:
     InputError
         If it is not a positive number.
     """
-    return None if value is None else as_positive(name, value)
+    return None if value is None else as_positive(name, value, maximum=_MAX_WEIGHT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +145,7 @@ class JointLimits(Value):
     velocity: Array = field(metadata=checked(_as_magnitudes))
     acceleration: Array = field(metadata=checked(_as_magnitudes))
     braking: Array = field(metadata=checked(_as_magnitudes))
-    period: float = field(default=_CONTROL_PERIOD, metadata=checked(as_positive, "s"))
+    period: float = field(default=_CONTROL_PERIOD, metadata=checked(_as_period))
     weight: float | None = field(default=_WEIGHT, metadata=checked(as_weight))
 
     def __post_init__(self) -> None:
@@ -151,6 +162,8 @@ class JointLimits(Value):
                 f"The lower limit of joint {joint}, {self.lower[joint]:g}, is above its upper "
                 f"limit, {self.upper[joint]:g}."
             )
+        if np.any(self.lower == np.inf) or np.any(self.upper == -np.inf):
+            raise InputError("lower must be below inf, and upper above -inf.")
         if not np.all(np.isfinite(self.braking)):
             raise InputError("braking must be finite.")
 
@@ -161,7 +174,8 @@ class JointLimits(Value):
         Parameters
         ----------
         robot : Robot
-            The robot. Joints without position or velocity limits in the URDF have none.
+            The robot. Joints without position or velocity limits in the URDF have none, and neither
+            have joints whose lower and upper limits are equal there.
         **changes
             Parameters of the class to change, such as velocity=... or weight=1e4.
 
@@ -267,8 +281,8 @@ class JointLimits(Value):
             The joints.
         """
         q, _ = self._joints_of(state)
-        margin = as_positive("fraction", fraction) * (self.upper - self.lower)
         with np.errstate(invalid="ignore"):  # inf - inf
+            margin = as_positive("fraction", fraction) * (self.upper - self.lower)
             below, above = q < self.lower + margin, q > self.upper - margin
         near: npt.NDArray[np.bool_] = (below | above) & np.isfinite(margin)
         return near
@@ -375,8 +389,8 @@ class JointLimits(Value):
         names : tuple of ConstraintLabel
             Names of the rows.
         """
+        q, v = self._joints_of(state)
         robot = state.robot
-        q, v = joint_positions(robot, state.q), state.v[robot.nv - robot.d :]
         least, largest = self.bounds(q, v)
         upper, lower = self.bounded
         h = np.concatenate([largest[upper], -least[lower]])

@@ -35,7 +35,9 @@ def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list
     InputError
         If some elements are levels and others are not, or if a level is empty.
     """
-    are_levels = [isinstance(each, list | tuple) for each in tasks]
+    are_levels = [
+        isinstance(each, list | tuple) and not hasattr(each, "residual") for each in tasks
+    ]
     if not any(are_levels):
         return list(tasks), []  # type: ignore[arg-type]
     if not all(are_levels):

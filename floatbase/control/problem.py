@@ -95,7 +95,13 @@ class Problem(Value):
             as_integer("each of level_sizes", size, 1, len(tasks)) for size in self.level_sizes
         ]
         if sizes:
-            sizes[-1] += len(tasks) - sum(sizes)
+            added = len(tasks) - sum(sizes)  # regularization tasks that complete the last level
+            if not 0 <= added <= 2:
+                raise InputError(
+                    f"level_sizes is {sizes}, but there are {len(tasks)} tasks. The sizes must add "
+                    f"up to the number of tasks."
+                )
+            sizes[-1] += added
             if self.modify_qp is not None:
                 raise InputError("modify_qp cannot change a problem with priority levels.")
         object.__setattr__(self, "tasks", tasks)

@@ -175,10 +175,17 @@ class QP(Value):
         QP
             Problem whose variables are x and, in the block "violations", the violations of the soft
             inequalities.
+
+        Raises
+        ------
+        InputError
+            If a block of the problem is named "violations".
         """
         n, s, soft = self.n, len(self.soft), self.soft
         if not s:
             return self
+        if "violations" in self.blocks:
+            raise InputError('A problem with soft inequalities needs a free name "violations".')
         assert self.penalties is not None
         H, G = np.zeros((n + s, n + s)), np.zeros((len(self.G) + s, n + s))
         H[:n, :n], G[: len(self.G), :n] = self.H, self.G

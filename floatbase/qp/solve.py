@@ -91,7 +91,7 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     which cost accuracy.
     """
     assert qp.penalties is not None
-    with suppress(InfeasibleError):
+    with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
         hard = solve(replace(qp, penalties=None), solver)
         if np.all(hard.inequality_multipliers <= qp.penalties):
             return replace(hard, qp=qp)

@@ -347,6 +347,7 @@ def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> 
         ),
         lambda: page.wait_for_timeout(20),
     )
+    page.wait_for_timeout(1500)  # until the page has written its own address
     page.evaluate("location.hash = '#facets=5'")
     until(
         lambda: field.session.settings.facets == 5 and field.session.settings.gait is None,

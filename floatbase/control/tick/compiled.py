@@ -389,7 +389,7 @@ class CompiledTick:
             )
             soft_rows, saturated = all_rows[-len(weights) :], result[sum(sizes) :] > 0.0
             # rows with the opposite sign start at their weight
-            soft_rows[saturated] = (weights - soft_rows)[saturated]
+            soft_rows[saturated] = np.maximum(weights - soft_rows, 0.0)[saturated]
         multipliers: Array = all_rows[has_row]
         return multipliers
 

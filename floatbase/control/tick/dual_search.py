@@ -371,7 +371,7 @@ def dual_search(
         return INACCURATE
     solve_cholesky(L, grad, beta)
     q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False
-    for _ in range(100 + 10 * nb):
+    for _ in range(100 + 10 * nb + 4 * limits.saturated.size):
         number = violated_row(limits, space, beta, forces, tau, qdd)
         if number < 0:
             if refined == NEWTON_STEPS:
