@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from floatbase.lessons import all_exercises
-from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
+from floatbase.lessons.publish import NOTEBOOKS, equations, lesson_minutes, read_notebook
 
 LONGEST = 88  # characters of a line that JupyterLab shows whole in a window of 1100 px
 CLAIMS = "# claims of the text above"
@@ -232,3 +232,11 @@ def test_an_equation_is_taught_where_it_is_written_out_with_its_number(path: Pat
     }
     missing = {equation for teaches, _ in taught(path) for equation in teaches} - here
     assert missing == set(), "run `python -m floatbase.lessons.publish map`"
+
+
+@LESSONS
+def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path: Path) -> None:
+    stated = re.search(r"\*\*Time\*\* (\d+) minutes", cells(path)[0].source)
+    assert stated, "a lesson without a time"
+    assert int(stated[1]) == lesson_minutes(path)
+    assert int(stated[1]) <= (30 if path.stem.startswith("00") else 100)

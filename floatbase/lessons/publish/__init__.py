@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from floatbase.lessons.publish.contents import README, lesson_table, readme_with_table, title_of
+from floatbase.lessons.publish.duration import lesson_counts, lesson_minutes
 from floatbase.lessons.publish.notebooks import (
     execute_notebook,
     read_notebook,
@@ -32,6 +33,8 @@ __all__ = [
     "equations",
     "execute_notebook",
     "grades",
+    "lesson_counts",
+    "lesson_minutes",
     "lesson_table",
     "pictures",
     "prepare_workspace",
