@@ -40,8 +40,7 @@ from floatbase.viewer.plots import run_plots
 
 PACKAGES = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp",
-    "robots", "simulation",
-    "viewer",
+    "playground", "robots", "simulation", "viewer",
 )  # fmt: skip
 MODULES = (
     run_plots,
@@ -180,7 +179,7 @@ RESULTS = """
     AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
 """
 LEFT_OUT = {
-    "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),
+    "made by `slider_panel`": ("SliderPanel",),
     "judges whatever a learner may give": (
         "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in",
         "array_or_verdict", "predict", "reveal", "review",

@@ -163,6 +163,7 @@ class Settings(Value):
 
 
 SETTING_NAMES = tuple(field.name for field in fields(Settings))
+PAIR_NAMES = ("friction", "slope", "mass", "bandwidth")  # settings that are (nominal, actual)
 
 
 def six_digits(x: float) -> float:
