@@ -149,6 +149,7 @@ def right() -> dict[str, Any]:
         "npt.ArrayLike": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
         "Sequence[Task]": controller().tasks,
         "Sequence[str]": ["a", "b"],
+        "Picture": view.painter.picture(state, contacts),
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2,
         "A": np.eye(12), "b": ZERO,
         "x": ZERO, "r": ZERO,
@@ -234,8 +235,7 @@ LEFT_OUT = {
     "takes any field of `Settings`, which is checked itself": ("Session.change",),
     "needs trimesh": ("urdf_visuals",),
     "draws what it is given": (
-        "Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
-        "appearance_digest",
+        "prefixed", "hex_code", "robot_meshes", "appearance_digest",
     ),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"

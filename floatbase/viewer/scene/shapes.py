@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_positive, read_only
+from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs, unit_shapes
@@ -59,7 +59,7 @@ _IDENTITY = read_only(np.eye(3))
 Picture = dict[str, Item]
 
 
-def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
+def with_normal_paths(picture: Picture) -> Picture:
     """Return the picture with normalized paths: "com/ball" instead of "/com//ball".
 
     Parameters
@@ -75,9 +75,13 @@ def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
     Raises
     ------
     InputError
-        If a path has no name, because its matrix would move the whole picture.
+        If the picture is not a dictionary of items, or if a path has no name, because its matrix
+        would move the whole picture.
     """
-    return {_normal_path(path): item for path, item in picture.items()}
+    normal = {}
+    for path, item in as_instance("picture", picture, dict).items():
+        normal[_normal_path(path)] = as_instance("an item of the picture", item, Item)
+    return normal
 
 
 @lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
