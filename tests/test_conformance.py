@@ -149,6 +149,7 @@ def right() -> dict[str, Any]:
         "npt.ArrayLike": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
         "Sequence[Task]": controller().tasks,
         "Sequence[str]": ["a", "b"],
+        "items": view.painter.picture(state, contacts), "prefixed.path": "new",
         "Picture": view.painter.picture(state, contacts),
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2,
         "A": np.eye(12), "b": ZERO,
@@ -235,7 +236,7 @@ LEFT_OUT = {
     "takes any field of `Settings`, which is checked itself": ("Session.change",),
     "needs trimesh": ("urdf_visuals",),
     "draws what it is given": (
-        "prefixed", "hex_code", "robot_meshes", "appearance_digest",
+        "hex_code", "robot_meshes", "appearance_digest",
     ),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"

@@ -56,15 +56,17 @@ def test_the_permissions_of_a_file_are_kept(tmp_path: Path) -> None:
     assert target.read_bytes() == b"new" and target.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_pipe_is_written_and_not_replaced(tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe"
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_pipe_is_written_and_not_replaced(linked: bool, tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
     os.mkfifo(pipe)
+    link.symlink_to(pipe)
     received: list[bytes] = []
     reader = threading.Thread(target=lambda: received.append(pipe.read_bytes()), daemon=True)
     reader.start()
-    write_whole(pipe, b"text")
+    write_table([], link if linked else pipe)  # such as --table /dev/stdout
     reader.join(20.0)
-    assert received == [b"text"] and pipe.is_fifo()
+    assert received[0].startswith(b"file,name") and pipe.is_fifo() and link.is_symlink()
 
 
 def test_two_files_of_one_folder_can_be_written_at_once(tmp_path: Path) -> None:

@@ -287,8 +287,7 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
         writer = csv.writer(text)
         writer.writerow(_COLUMNS)
         writer.writerows([_csv_safe(part) for part in row] for row in rows)
-        # a link stays, and the file that it names is replaced
-        write_whole(Path(os.path.realpath(path)), text.getvalue().encode())
+        write_whole(path, text.getvalue().encode(), keep_link=True)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}.") from None
 

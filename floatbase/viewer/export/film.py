@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -112,11 +111,9 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     ViewerError
         If the browser or a package is missing, or if the recording is too long.
     """
-    # a link stays, and the file that it names is replaced; the new file is created first, so that
-    # `OSError` is raised now instead of after the work; playwright refuses a thread with an event
-    # loop, such as a notebook's
-    file = whole_file(Path(os.path.realpath(target)))
-    with file as part, ThreadPoolExecutor(1) as thread:
+    # the new file is created first, so that `OSError` is raised now instead of after the work;
+    # playwright refuses a thread with an event loop, such as a notebook's
+    with whole_file(target, keep_link=True) as part, ThreadPoolExecutor(1) as thread:
         thread.submit(_capture, page, part, target.suffix.lower(), size).result()
 
 

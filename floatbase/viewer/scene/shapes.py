@@ -8,14 +8,20 @@ opening of a cone.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_instance, as_positive, read_only
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_instance,
+    as_positive,
+    as_string,
+    read_only,
+)
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs, unit_shapes
@@ -96,7 +102,7 @@ def _normal_path(path: str) -> str:
     return normal
 
 
-def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
+def prefixed(path: str, items: Picture) -> Picture:
     """Put items below a path.
 
     Parameters
@@ -110,8 +116,14 @@ def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
     -------
     Picture
         The same items with longer paths.
+
+    Raises
+    ------
+    InputError
+        If the path is not a string, or if `items` is not a dictionary.
     """
-    return {path + name: item for name, item in items.items()}
+    as_string("path", path)
+    return {path + name: item for name, item in as_instance("items", items, dict).items()}
 
 
 def path_part(name: str) -> str:
