@@ -61,6 +61,14 @@ class Item(NamedTuple):
 
 _IDENTITY = read_only(np.eye(3))
 
+# names that every JavaScript object has: the page would take its own function for an object of the
+# picture, so a link with such a name would not be drawn
+_JAVASCRIPT_NAMES = (
+    "__defineGetter__", "__defineSetter__", "__lookupGetter__", "__lookupSetter__", "__proto__",
+    "constructor", "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString",
+    "toString", "valueOf",
+)  # fmt: skip
+
 # path -> item. No path may lie below another one, because a matrix moves everything below its path.
 Picture = dict[str, Item]
 
@@ -92,8 +100,9 @@ def with_normal_paths(picture: Picture) -> Picture:
 
 @lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _normal_path(path: str) -> str:
-    """Return a path without empty parts; raise `InputError` if nothing remains."""
-    normal = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
+    """Return a path without empty parts and names of JavaScript; raise `InputError` if empty."""
+    parts = path.split("/") if isinstance(path, str) else []
+    normal = "/".join(f"{part}'" if part in _JAVASCRIPT_NAMES else part for part in parts if part)
     if not normal:
         raise InputError(
             f"The path {path!r} in a picture has no name. Give it one, as in "
