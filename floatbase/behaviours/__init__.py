@@ -10,7 +10,8 @@ from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
-from floatbase.behaviours.planner import StepPlan
+from floatbase.behaviours.path import Path
+from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
 from floatbase.behaviours.walk import Walk, raibert_foothold
@@ -19,6 +20,7 @@ __all__ = [
     "LIPM",
     "Gains",
     "Gait",
+    "Path",
     "Stand",
     "StepPlan",
     "Swing",

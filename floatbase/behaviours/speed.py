@@ -10,6 +10,7 @@ import numpy as np
 from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array
 from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.posture import WalkingPosture
 from floatbase.robots import State
 
 # with four feet or fewer, the middle of all feet is at the edge of each smaller stance
@@ -20,11 +21,10 @@ _MAX_EXTENSION = 0.9
 
 def speed_fractions(
     gait: Gait,
-    state: State,
-    nominal_feet: dict[str, Array],
-    flat_feet: set[str],
+    posture: WalkingPosture,
     reach: float,
     motion: Array,
+    acceleration: float,
 ) -> tuple[float, float]:
     """Return the largest fractions of a desired motion that the feet can follow, at most 1.
 
@@ -40,21 +40,19 @@ def speed_fractions(
     ----------
     gait : Gait
         The gait.
-    state : State
-        State whose posture the robot keeps.
-    nominal_feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame in the standing posture, relative to the middle of the feet
-        [m].
-    flat_feet : set of str
-        Names of the flat feet.
+    posture : WalkingPosture
+        The standing posture.
     reach : float
         Largest distance of a foothold from the nominal one [m].
     motion : ndarray, shape (3,)
         Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
+    acceleration : float
+        Largest acceleration of the velocity [m/s²].
     """
     if not motion.any():
         return 1.0, 1.0
     first_fraction, fraction = 1.0, 1.0
+    state, nominal_feet, flat_feet = posture.state, posture.nominal_feet, posture.flat_feet
     wait, shifts = max(gait.offsets.values()) * gait.period, _weight_shifts(gait, nominal_feet)
     half_stance = (gait.period - gait.swing) / 2.0
     longest = half_stance + _swing_lag(gait)
@@ -70,11 +68,11 @@ def speed_fractions(
             shift = float(np.abs(shifts @ direction).max())
             leg_limit = max(_leg_reach(state, foot, direction) - shift, 0.0)
             fraction = min(fraction, leg_limit / (longest * speed))
-            # at 1 m/s², the distance after `wait` is speed wait - speed² / 2
-            if wait**2 > 2.0 * leg_limit:
-                first_fraction = min(
-                    first_fraction, (wait - sqrt(wait**2 - 2.0 * leg_limit)) / speed
-                )
+            # at the largest acceleration, the distance after `wait` is
+            # speed wait - speed² / (2 acceleration)
+            square = wait**2 - 2.0 * leg_limit / acceleration
+            if square > 0.0:
+                first_fraction = min(first_fraction, acceleration * (wait - sqrt(square)) / speed)
     return min(first_fraction, fraction), fraction
 
 
