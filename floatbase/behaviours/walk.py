@@ -25,6 +25,7 @@ from floatbase._validation import (
     as_instance,
     as_number,
     as_positive,
+    numeric_copy,
     refuse_new_attributes,
 )
 from floatbase.behaviours.active_plan import ActivePlan, compile_targets
@@ -237,7 +238,11 @@ class Walk:
         self._user_tasks = tuple(tasks)
         check_options(type(self).__name__, options)
         self._options = options
-        self._single_contacts = {contact.name: Contacts([contact]) for contact in contacts}
+        full_load = _RAMP_LOAD_FACTOR * robot.weight / len(contacts)
+        self._full_loads = {
+            name: (contacts.only(name), full_load / len(contacts.only(name).point_names))
+            for name in contacts.names
+        }
         self._limits = WholeBodyController(
             robot, contacts, self._user_tasks, **options
         ).limits  # reports wrong options and tasks now
@@ -463,20 +468,20 @@ class Walk:
         Command
             Joint torques, with the planned accelerations and contact forces.
         """
-        q, v = as_array("q", q, (self.robot.nq,)), as_array("v", v, (self.robot.nv,))
-        t, active = as_number("t", t, "s"), self._active
+        robot, t, active = self._robot, as_number("t", t, "s"), self._active
+        q, v = _as_vector("q", q, robot.nq), _as_vector("v", v, robot.nv)
         if active is None or not self._continues(t):
             self.restart()
         else:
             self.select_gait(q, v, t)
         if self._active is None or self._gait is not self._requested_gait or t >= self._next_change:
-            self._change(State(self.robot, q, v), t)
+            self._change(State(robot, q, v), t)
         active = self._active
         assert active is not None
-        pin.centerOfMass(self.robot.model, self._data, q, v, False)
+        pin.centerOfMass(robot.model, self._data, q, v, False)
         controller = self._controllers[active.plan.stance]
         targets = controller.targets_at(t)
-        active.write(t, self._data.com[0], self._data.vcom[0], targets)
+        active.write(t, *self._com, targets)
         self._time = t
         return controller(q, v, t, targets)
 
@@ -511,6 +516,8 @@ class Walk:
         """Discard everything that a copy makes anew."""
         self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         self._data = self._robot.model.createData()
+        self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
+        self._active = None
         self._requested_gait: Gait | None = None
         self._planning_path: Path | None = None
         self._start_time = self._next_change = -inf
@@ -694,10 +701,8 @@ class Walk:
         """Return the upper bound of the normal force of each point of a foot at t [s], in N."""
         if self._active is None:  # a controller is being made
             return UNBOUNDED
-        contact = self._single_contacts[foot]
-        n_points = len(self._all_contacts) * len(contact.point_names)
-        full_load = _RAMP_LOAD_FACTOR * self.robot.weight / n_points
-        bound = normal_force_bound(self._active.plan, foot, t, self.ramp, full_load)
+        contact, full_load = self._full_loads[foot]
+        bound = normal_force_bound(self._active.plan, foot, t, self._ramp, full_load)
         if bound == UNBOUNDED:
             return bound
         return max(float(self._limits.normal_forces(contact, t)[0].max()), bound)
@@ -707,7 +712,7 @@ class Walk:
         return {
             key: value
             for key, value in vars(self).items()
-            if key not in ("_controllers", "_active", "_history", "_data")
+            if key not in ("_controllers", "_active", "_history", "_data", "_com")
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -720,6 +725,14 @@ class Walk:
             f"{type(self).__name__}({self.robot.name}, {len(self.gait.feet)} feet, "
             f"{forwards:g} and {left:g} m/s)"
         )
+
+
+def _as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
+    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
+    vector = numeric_copy(values)
+    if vector is None or vector.shape != (size,):
+        return as_array(name, values, (size,))
+    return vector
 
 
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:

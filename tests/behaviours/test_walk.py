@@ -567,7 +567,12 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
         (lambda: Walk(robot, contacts.without("FL_foot"), trot), "FL_foot"),
         (lambda: Walk(robot, fb.Contacts.none(), trot), "FL_foot"),
         (lambda: Walk(robot, contacts, trot, speed=0.3), "speed", "facets"),
-        (lambda: Walk(robot, contacts, trot, tasks=[]), "tasks", "facets"),
+        (lambda: Walk(robot, contacts, trot, tasks=[3]), "tasks"),
+        (lambda: Walk(robot, contacts, trot, ground=3), "ground", "height"),
+        (lambda: Walk(robot, contacts, trot, acceleration=(-1.0, 1.0)), "acceleration", -1),
+        (lambda: Walk(robot, contacts, trot, height=-4.0), "height", -4),
+        (lambda: Walk(robot, contacts, trot, pitch=90.0), "pitch", 90),
+        (lambda: Walk(robot, contacts, trot, swing=lambda start: start), "swing", "end"),
         (lambda: Walk(robot, contacts, trot, velocity=(20.0, 0.0)), 20, 10),  # wrong units
         (lambda: Walk(robot, contacts, trot, yaw_rate=30.0), "yaw_rate", 30, 10),
         (lambda: Walk(robot, contacts, trot, clearance=5.0), "clearance", 5, 1),
