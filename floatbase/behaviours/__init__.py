@@ -11,7 +11,7 @@ from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.path import Path
-from floatbase.behaviours.plan import StepPlan
+from floatbase.behaviours.plan import StepPlan, SwingPath
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing
 from floatbase.behaviours.walk import Walk, raibert_foothold
@@ -24,6 +24,7 @@ __all__ = [
     "Stand",
     "StepPlan",
     "Swing",
+    "SwingPath",
     "Walk",
     "capture_point",
     "neutral_point",

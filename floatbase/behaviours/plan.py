@@ -64,6 +64,10 @@ class SwingPath(Protocol):
     def touchdown(self) -> float:
         """Time of touchdown [s]."""
 
+    @property
+    def height(self) -> float:
+        """Height above the line from start to end, half-way, for pictures [m]."""
+
     def with_end(self, end: npt.ArrayLike) -> SwingPath:
         """Return the same path to another end, shape (3,), in the world frame [m]."""
 
