@@ -47,6 +47,7 @@ from floatbase.behaviours.plan import (
 )
 from floatbase.behaviours.posture import WalkingPosture
 from floatbase.behaviours.speed import speed_fractions
+from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import Swing
 from floatbase.behaviours.targets import UNBOUNDED, Adjustment, BodyPose, normal_force_bound
 from floatbase.behaviours.terrain import Terrain
@@ -247,6 +248,7 @@ class Walk:
             robot, contacts, self._user_tasks, **options
         ).limits  # reports wrong options and tasks now
         self._posture = WalkingPosture(contacts, robot.standing())
+        self._check_friction(gait)
         self._clear()
         self._limit_speed(stacklevel=3)
         self._prepare_controllers()
@@ -301,6 +303,8 @@ class Walk:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
+        if "_posture" in vars(self):
+            self._check_friction(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
         self._prepare_controllers()
@@ -545,6 +549,13 @@ class Walk:
                 stacklevel=stacklevel,
             )
         self._refresh()
+
+    def _check_friction(self, gait: Gait) -> None:
+        """Raise `InputError` if a gait needs more friction than the contacts have."""
+        limits = self._limits
+        check_friction(
+            gait, self._posture, self._all_contacts, limits.facets, limits.inner_approximation
+        )
 
     def _refresh(self) -> None:
         """Apply a new desired motion or pose to the plan in use."""
