@@ -10,21 +10,21 @@ from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
-from floatbase.behaviours.path import Path
-from floatbase.behaviours.plan import StepPlan, SwingPath
+from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.stand import Stand
-from floatbase.behaviours.swing import Swing
+from floatbase.behaviours.swing import Swing, SwingPath
+from floatbase.behaviours.terrain import Terrain
 from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
     "LIPM",
     "Gains",
     "Gait",
-    "Path",
     "Stand",
     "StepPlan",
     "Swing",
     "SwingPath",
+    "Terrain",
     "Walk",
     "capture_point",
     "neutral_point",

@@ -13,9 +13,9 @@ import numpy as np
 from floatbase._validation import Array, as_array
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.path import DesiredMotion, Path
-from floatbase.behaviours.plan import StepPlan, SwingPath
+from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.posture import MIN_SIDE_FRACTION, WalkingPosture
-from floatbase.behaviours.swing import Swing
+from floatbase.behaviours.swing import Swing, SwingPath
 from floatbase.behaviours.targets import (
     Adjustment,
     BodyPose,

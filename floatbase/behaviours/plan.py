@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +19,11 @@ from floatbase._validation import Array, as_array, frozen
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.lipm import LIPM, ZMPSegment
+from floatbase.behaviours.options import WalkOptions
 from floatbase.behaviours.path import Path, yaw_of
 from floatbase.behaviours.posture import WalkingPosture
 from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY
+from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.terrain import Plane, Terrain
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -43,39 +45,6 @@ _PATH_SHIFT_THRESHOLD = 0.05
 _MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
 _BISECTIONS = 10  # halvings of the way, so that the ZMP is known to 0.1 % of it
 LEVEL = Plane(frozen(np.zeros(2)), 0.0)
-
-
-class SwingPath(Protocol):
-    """Path of a foot through the air, such as `Swing`."""
-
-    @property
-    def start(self) -> Array:
-        """Position at lift-off, shape (3,), world frame [m]."""
-
-    @property
-    def end(self) -> Array:
-        """Position at touchdown, shape (3,), world frame [m]."""
-
-    @property
-    def lift_off(self) -> float:
-        """Time of lift-off [s]."""
-
-    @property
-    def touchdown(self) -> float:
-        """Time of touchdown [s]."""
-
-    @property
-    def height(self) -> float:
-        """Height above the line from start to end, half-way, for pictures [m]."""
-
-    def with_end(self, end: npt.ArrayLike) -> SwingPath:
-        """Return the same path to another end, shape (3,), in the world frame [m]."""
-
-    def __call__(self, t: float) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration at t [s], each (3,), in the world frame."""
-
-
-MakeSwing: TypeAlias = Callable[[Array, Array, float, float, float], SwingPath]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,25 +144,6 @@ class StepPlan:
         return {foot: each.path for foot, each in self.planned_swings.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class StepOptions:
-    """Options of a plan.
-
-    Parameters
-    ----------
-    clearance : float
-        Height of the swings [m].
-    terrain : Terrain or None
-        The ground, if it is known. Otherwise it is the plane through the feet.
-    swing : callable
-        Called as swing(start, end, lift_off, touchdown, clearance); returns the path of a swing.
-    """
-
-    clearance: float
-    terrain: Terrain | None
-    swing: MakeSwing
-
-
 def first_path(posture: WalkingPosture, state: State, t: float) -> Path:
     """Return the path of a measured state, which begins in the middle of the feet, at rest."""
     path = Path(t, np.zeros(2), yaw_of(state.frame_pose("base").rotation), np.zeros(3))
@@ -250,7 +200,7 @@ def next_footing(
 
 def make_plan(
     posture: WalkingPosture,
-    options: StepOptions,
+    options: WalkOptions,
     state: State,
     path: Path,
     gait: Gait,
@@ -267,8 +217,8 @@ def make_plan(
     ----------
     posture : WalkingPosture
         The standing posture.
-    options : StepOptions
-        Clearance, terrain and shape of the swings.
+    options : WalkOptions
+        Clearance, ground and shape of the swings.
     state : State
         The measured state.
     path : Path
@@ -303,7 +253,7 @@ def make_plan(
     nominal = posture.nominal_feet
     heights = np.array([[0.0, 0.0, nominal[foot][2]] for foot in nominal])
     ground = Plane.through(np.array([footing.feet[foot] for foot in nominal]) - heights)
-    plan_foothold = partial(_foothold, posture, options.terrain, ground, foothold)
+    plan_foothold = partial(_foothold, posture, options.ground, ground, foothold)
     centres, footholds = _stance_centres(posture, phases, gait, path.yaw, footing, plan_foothold)
     zmp = previous.plan.zmp(t) if previous else centres[0]
     lipm = LIPM(_zmp_segments(phases, centres, zmp, len(gait.feet)), state.com[:2], posture.omega)
@@ -408,7 +358,7 @@ def _foothold(
 
 def _planned_swing(
     posture: WalkingPosture,
-    options: StepOptions,
+    options: WalkOptions,
     start: Array,
     foot: str,
     foothold: _Foothold,
@@ -417,11 +367,11 @@ def _planned_swing(
 ) -> PlannedSwing:
     """Return the swing of a foot that lifts off now from `start`, (3,) [m]."""
     end, clearance = foothold.position, options.clearance
-    if options.terrain is not None:  # the foot rises above both ends
+    if options.ground is not None:  # the foot rises above both ends
         clearance += abs(float(end[2] - start[2])) / 2.0
     tilts = LEVEL.slope, LEVEL.slope
-    if options.terrain is not None and foot in posture.flat_feet:
-        below = Plane.tangent(options.terrain, start[:2])
+    if options.ground is not None and foot in posture.flat_feet:
+        below = Plane.tangent(options.ground, start[:2])
         tilts = below.tilt, foothold.ground.tilt
     path = options.swing(start, end, *times, clearance)
     return PlannedSwing(path, end, yaws, tilts, foothold.ground)

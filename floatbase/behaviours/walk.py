@@ -10,7 +10,6 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from math import inf
 from typing import Any, TypeAlias
 
@@ -21,24 +20,20 @@ import pinocchio as pin
 from floatbase._validation import (
     Array,
     as_array,
-    as_callable,
     as_instance,
     as_number,
-    as_positive,
     numeric_copy,
     refuse_new_attributes,
 )
-from floatbase.behaviours.active_plan import ActivePlan, compile_targets
+from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
+from floatbase.behaviours.gait_clock import GaitClock
 from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import Gains, check_gait_feet, check_options, flat_foot_names
+from floatbase.behaviours.options import Gains, WalkOptions, check_gait_feet, check_options
 from floatbase.behaviours.path import DesiredMotion, Path
 from floatbase.behaviours.plan import (
-    MakeSwing,
-    StepOptions,
     StepPlan,
-    SwingPath,
     first_footing,
     first_path,
     make_plan,
@@ -47,26 +42,25 @@ from floatbase.behaviours.plan import (
 )
 from floatbase.behaviours.posture import WalkingPosture
 from floatbase.behaviours.speed import speed_fractions
+from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
-from floatbase.behaviours.swing import Swing
-from floatbase.behaviours.targets import UNBOUNDED, Adjustment, BodyPose, normal_force_bound
+from floatbase.behaviours.swing import SwingPath
+from floatbase.behaviours.targets import Adjustment, BodyPose
 from floatbase.behaviours.terrain import Terrain
-from floatbase.control import Command, JointLimits, WholeBodyController
+from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
-from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
+from floatbase.objectives import Task
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
-_DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-_RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at which a ramp begins
-# per rad/s²: the weight of a task. A knee that touches its stop is better than a fall: of 24
-# pushes of 200 to 300 N, go2 survives 24 with this weight, 22 with 200 and 13 with 10 000
-_JOINT_LIMIT_WEIGHT = 10.0
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
-_MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
+# attributes of a walk that its copies do not share
+_MADE_ANEW = (
+    "_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_data", "_com",
+)  # fmt: skip
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -185,7 +179,7 @@ class Walk:
         ramp: float = 0.1,
         foothold: Foothold | None = None,
         adjustment: Adjustment | None = None,
-        swing: MakeSwing | None = None,
+        swing: Callable[..., SwingPath] | None = None,
         ground: Terrain | None = None,
         tasks: Sequence[Task] = (),
         height: float = 0.0,
@@ -198,60 +192,18 @@ class Walk:
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
         self._active: ActivePlan | None = None
-        self._speeds: tuple[float, float] | None = None  # none while arguments are checked
+        self._speeds = 1.0, 1.0  # fractions in the first period, and later
         self._pose = BodyPose()
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
         self.height, self.pitch = height, pitch
-        limits = as_array("acceleration", acceleration, (2,))
-        forwards, turning = (
-            as_positive("acceleration", limit, unit, maximum=_MAX_ACCELERATION)
-            for limit, unit in zip(limits.tolist(), ("m/s²", "rad/s²"), strict=True)
-        )
-        self._acceleration = np.array([forwards, forwards, turning])
-        clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
-        if reach is None:
-            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
-        self._reach = as_positive("reach", reach, "m", maximum=1.0)
-        self._ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
-        self._foothold = (
-            raibert_foothold
-            if foothold is None
-            else as_callable("foothold", foothold, "foothold(foot, touchdown, walk)")
-        )
-        self._adjustment = adjustment and as_callable(
-            "adjustment", adjustment, "adjustment(plan, path, com, com_velocity, t)"
-        )
-        if ground is not None and not isinstance(ground, Terrain):
-            raise InputError(
-                f"ground must have the methods height(xy) and normal(xy), as fb.Ground has, but "
-                f"{ground!r} lacks at least one of them."
-            )
-        self._step_options = StepOptions(
-            clearance,
-            ground,
-            Swing
-            if swing is None
-            else as_callable("swing", swing, "swing(start, end, lift_off, touchdown, clearance)"),
-        )
-        self._gains = (
-            Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains)
-        )
-        self._user_tasks = tuple(tasks)
         check_options(type(self).__name__, options)
-        self._options = options
-        full_load = _RAMP_LOAD_FACTOR * robot.weight / len(contacts)
-        self._full_loads = {
-            name: (contacts.only(name), full_load / len(contacts.only(name).point_names))
-            for name in contacts.names
-        }
-        self._limits = WholeBodyController(
-            robot, contacts, self._user_tasks, **options
-        ).limits  # reports wrong options and tasks now
-        self._posture = WalkingPosture(contacts, robot.standing())
-        self._check_friction(gait)
+        self._options = WalkOptions.checked(
+            self._all_contacts, clearance, reach, ramp, foothold or raibert_foothold, adjustment,
+            swing, ground, tasks, acceleration, gains, options,
+        )  # fmt: skip
         self._clear()
+        self._prepare(gait)
         self._limit_speed(stacklevel=3)
-        self._prepare_controllers()
 
     @property
     def robot(self) -> Robot:
@@ -261,27 +213,27 @@ class Walk:
     @property
     def clearance(self) -> float:
         """Height of the swings [m]."""
-        return self._step_options.clearance
+        return self._options.clearance
 
     @property
     def reach(self) -> float:
         """Largest distance of a foothold from the nominal one below the body [m]."""
-        return self._reach
+        return self._options.reach
 
     @property
     def ramp(self) -> float:
         """Time in which a foot is unloaded or loaded [s]."""
-        return self._ramp
+        return self._options.ramp
 
     @property
     def foothold(self) -> Foothold:
         """Function that returns the foothold of a foot."""
-        return self._foothold
+        return self._options.foothold
 
     @property
     def gains(self) -> Gains:
         """Gains of the tasks."""
-        return self._gains
+        return self._options.gains
 
     @property
     def omega(self) -> float:
@@ -303,11 +255,10 @@ class Walk:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
-        if "_posture" in vars(self):
-            self._check_friction(gait)
+        if self._is_complete:
+            self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
-        self._prepare_controllers()
 
     @property
     def velocity(self) -> Array:
@@ -356,7 +307,7 @@ class Walk:
     @property
     def speed_fraction(self) -> float:
         """Fraction of the desired velocity and yaw rate at which the robot walks, at most 1."""
-        return self._speeds[1] if self._speeds else 1.0
+        return self._speeds[1]
 
     @property
     def time(self) -> float | None:
@@ -371,8 +322,7 @@ class Walk:
     @property
     def contacts(self) -> Contacts:
         """Contacts of the present stance."""
-        controller = self._controllers.get(self.stance)
-        return self._all_contacts if controller is None else controller.contacts
+        return self._controllers[self.stance].contacts if self._active else self._all_contacts
 
     @property
     def footholds(self) -> dict[str, Array]:
@@ -478,7 +428,7 @@ class Walk:
             self.restart()
         else:
             self.select_gait(q, v, t)
-        if self._active is None or self._gait is not self._requested_gait or t >= self._next_change:
+        if self._active is None or not self._clock.follows(self._gait) or t >= self._next_change:
             self._change(State(robot, q, v), t)
         active = self._active
         assert active is not None
@@ -516,27 +466,39 @@ class Walk:
             self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
         )
 
+    @property
+    def _is_complete(self) -> bool:
+        """Whether the constructor has checked its arguments."""
+        return "_controllers" in vars(self)
+
     def _clear(self) -> None:
-        """Discard everything that a copy makes anew."""
-        self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
+        """Make everything that a copy makes anew."""
+        self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
+        self._controllers = StanceControllers(self._posture, self._options)
         self._data = self._robot.model.createData()
         self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
         self._active = None
-        self._requested_gait: Gait | None = None
         self._planning_path: Path | None = None
         self._start_time = self._next_change = -inf
         self.restart()
 
+    def _prepare(self, gait: Gait) -> None:
+        """Check the friction that a gait needs, and make the controllers of its stances."""
+        limits = self._controllers.limits
+        facets, inner = limits.facets, limits.inner_approximation
+        check_friction(gait, self._posture, self._all_contacts, facets, inner)
+        self._controllers.prepare(gait)
+
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
-        if "_posture" not in vars(self):  # the constructor is still checking its arguments
+        if not self._is_complete:
             return
         self._speeds = speed_fractions(
             self._gait,
             self._posture,
-            self._reach,
+            self._options.reach,
             np.array([*self._velocity, self._yaw_rate]),
-            self._acceleration[0],
+            self._options.acceleration[0],
         )
         if self.speed_fraction < 1.0:
             x, y = self.speed_fraction * self._velocity
@@ -550,19 +512,11 @@ class Walk:
             )
         self._refresh()
 
-    def _check_friction(self, gait: Gait) -> None:
-        """Raise `InputError` if a gait needs more friction than the contacts have."""
-        limits = self._limits
-        check_friction(
-            gait, self._posture, self._all_contacts, limits.facets, limits.inner_approximation
-        )
-
     def _refresh(self) -> None:
         """Apply a new desired motion or pose to the plan in use."""
         active = self._active
         if active is not None:
-            swinging = bool(active.plan.planned_swings)
-            self._desired = self._desired_motion(swinging, self._time)
+            self._desired = self._desired_motion(bool(active.plan.planned_swings), self._time)
             self._active = active.changed(self._desired, self._pose)
 
     def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
@@ -570,29 +524,28 @@ class Walk:
 
         The path does not move before the first lift-off or after the last touchdown.
         """
-        assert self._speeds is not None
-        gait, motion = self._gait_in_use, np.array([*self._velocity, self._yaw_rate])
-        begin = max(t, gait.start)
-        if not (swinging or any(gait.next_swing(foot, begin) for foot in gait.feet)):
+        gait, motion = self._clock.gait, np.array([*self._velocity, self._yaw_rate])
+        if not (swinging or self._clock.lifts_later(t)):
             motion = np.zeros(3)
         first, later = (fraction * motion for fraction in self._speeds)
         first_until = gait.start + gait.period
-        return DesiredMotion(first, later, first_until, gait.start, self._acceleration)
+        return DesiredMotion(first, later, first_until, gait.start, self._options.acceleration)
 
     def _change(self, state: State, t: float) -> None:
         """Start, or change stance or gait, if it is time to do so."""
-        active, new_gait = self._active, True
+        active, posture, names = self._active, self._posture, self._all_contacts.names
         if active is None:
-            self._start_time = t
-            self._requested_gait, self._gait_in_use = self._gait, self._gait.starting_at(t)
-            path = first_path(self._posture, state, t)
-            footing, swings = first_footing(self._posture, state), dict[str, SwingPath]()
-            stance = self._stance_at(t)
+            self._start_time, self._clock = t, GaitClock(self._gait, t)
+            stance = self._clock.stance(names, t)
+            path, footing = first_path(posture, state, t), first_footing(posture, state)
+            swings: dict[str, SwingPath] = {}
         else:
-            new_gait = self._update_gait(state, t)
-            self._desired = self._desired_motion(bool(active.plan.planned_swings), self._time)
-            self._active = active = active.changed(self._desired, self._pose)
-            stance, swings = self._stance_at(t), active.swings
+            swinging = bool(active.plan.planned_swings)
+            new_gait = self._clock.update(
+                self._gait, swinging, t, lambda gait: self._delay(gait, state, t)
+            )
+            self._refresh()
+            stance, swings = self._clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
                 self._next_change = self._change_after(t, active.plan)
                 return
@@ -603,8 +556,8 @@ class Walk:
         self._planning_path, self._desired = path, self._desired_motion(bool(swings), t)
         try:
             plan = make_plan(
-                self._posture, self._step_options, state, path, self._gait_in_use, stance, footing,
-                lambda foot, touchdown: self._foothold(foot, touchdown, self),
+                posture, self._options, state, path, self._clock.gait, stance, footing,
+                lambda foot, touchdown: self._options.foothold(foot, touchdown, self),
                 lambda time: self.path_at(time).yaw,
                 active.plan if active else None,
                 swings,
@@ -612,119 +565,24 @@ class Walk:
         finally:
             self._planning_path = None
         self._history.append(plan)
-        controller = self._controller(stance)
+        self._controllers.plan, controller = plan, self._controllers[stance]
         self._active = ActivePlan(
-            self._posture, plan, self._desired, self._pose, self._reach, controller.targets,
-            self._adjustment, controller.compiled is not None,
+            posture, plan, self._desired, self._pose, self._options.reach, controller.targets,
+            self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._change_after(t, plan)
 
+    def _delay(self, gait: Gait, state: State, t: float) -> float:
+        """Return how much later a gait must begin, so that the weight can shift before [s]."""
+        return weight_shift(self._posture, gait, state, t) if self.waits_for_weight else 0.0
+
     def _change_after(self, t: float, plan: StepPlan) -> float:
         """Return until when a plan that is in use at t needs no change [s]."""
-        stance_end = self._gait_in_use.phases(t, 1)[0][1]
-        return min(stance_end, plan.replan_time) - TIME_TOLERANCE
-
-    def _update_gait(self, state: State, t: float) -> bool:
-        """Change to a newly requested gait once all feet stand, and return whether it changed.
-
-        Feet that are in the air come down as planned.
-        """
-        assert self._active is not None
-        requested, gait = self._requested_gait, self._gait_in_use
-        if requested is not None and vars(self._gait) == vars(requested):
-            self._requested_gait = self._gait
-        elif not self._active.plan.planned_swings:
-            gait = self._gait.starting_at(t)
-            if self.waits_for_weight and (delay := weight_shift(self._posture, gait, state, t)):
-                gait = replace(gait, start=gait.start + delay)
-            self._requested_gait, self._gait_in_use = self._gait, gait
-            return True
-        elif gait.stop is None or gait.stop > t:
-            self._requested_gait, self._gait_in_use = None, replace(gait, stop=t)
-        return False
-
-    def _stance_at(self, t: float) -> tuple[str, ...]:
-        """Return the contacts that stand at t [s]."""
-        gait = self._gait_in_use
-        swinging = {foot for foot in gait.feet if gait.swing_at(foot, t)}
-        return tuple(name for name in self._all_contacts.names if name not in swinging)
-
-    def _prepare_controllers(self) -> None:
-        """Make the controllers of all stances of the gait, since that takes milliseconds."""
-        if "_controllers" not in vars(self):  # the constructor is still checking its arguments
-            return
-        gait = replace(self._gait, stop=None)
-        changes = [
-            gait.start + (1.0 + offset) * gait.period + time
-            for offset in gait.offsets.values()
-            for time in (0.0, gait.swing)
-        ]
-        stances = [gait.stance(t) for t in changes]
-        for standing in (gait.feet, *stances):
-            names = self._all_contacts.names
-            self._controller(
-                tuple(name for name in names if name in standing or name not in gait.feet)
-            )
-
-    def _controller(self, stance: tuple[str, ...]) -> WholeBodyController:
-        """Return the controller of a stance, which is made when first needed."""
-        if stance not in self._controllers:
-            arguments: dict[str, Any] = {
-                "max_normal_force": self._normal_force_bounds(stance),
-                "on_infeasible": "soften",  # torques and friction may be unable to hold the feet
-                "joint_limits": JointLimits.of(self.robot, weight=_JOINT_LIMIT_WEIGHT),
-                **self._options,
-            }
-            controller = WholeBodyController(
-                self.robot, self._all_contacts.only(*stance), self._tasks(stance), **arguments
-            )
-            if controller.compiled is not None:
-                compile_targets()
-            self._controllers[stance] = controller
-        return self._controllers[stance]
-
-    def _tasks(self, stance: Sequence[str]) -> list[Task]:
-        """Return the tasks of a stance; `ActivePlan.write` replaces the targets of most of them."""
-        (com, com_weight), (base, base_weight) = self.gains.com, self.gains.base
-        (swing, swing_weight), (posture, posture_weight) = self.gains.swing, self.gains.posture
-        state = self._posture.state
-        tasks: list[Task] = [
-            CoMTask(state.com, kp=com, weight=com_weight),
-            OrientationTask("base", self._posture.rotation("base"), kp=base, weight=base_weight),
-            PostureTask(state.q, kp=posture, weight=posture_weight),
-        ]
-        for foot in [name for name in self._all_contacts.names if name not in stance]:
-            tasks.append(FrameTask(foot, state.point(foot), kp=swing, weight=swing_weight))
-            if foot in self._posture.flat_feet:
-                rotation = self._posture.rotation(foot)
-                tasks.append(OrientationTask(foot, rotation, kp=swing, weight=swing_weight))
-        return [*tasks, *self._user_tasks]
-
-    def _normal_force_bounds(
-        self, stance: Sequence[str]
-    ) -> dict[str, Callable[[float], float]] | None:
-        """Return ramps for the normal force of each point if all feet stand, otherwise None."""
-        if self.ramp == 0.0 or len(stance) < len(self._all_contacts) or len(stance) < 2:
-            return None
-        return {foot: partial(self._normal_force_bound, foot) for foot in self._all_contacts.names}
-
-    def _normal_force_bound(self, foot: str, t: float) -> float:
-        """Return the upper bound of the normal force of each point of a foot at t [s], in N."""
-        if self._active is None:  # a controller is being made
-            return UNBOUNDED
-        contact, full_load = self._full_loads[foot]
-        bound = normal_force_bound(self._active.plan, foot, t, self._ramp, full_load)
-        if bound == UNBOUNDED:
-            return bound
-        return max(float(self._limits.normal_forces(contact, t)[0].max()), bound)
+        return min(self._clock.stance_end(t), plan.replan_time) - TIME_TOLERANCE
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
-        return {
-            key: value
-            for key, value in vars(self).items()
-            if key not in ("_controllers", "_active", "_history", "_data", "_com")
-        }
+        return {key: value for key, value in vars(self).items() if key not in _MADE_ANEW}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

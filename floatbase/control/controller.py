@@ -503,6 +503,7 @@ class WholeBodyController:
         if n_active == tick.infeasible:
             return None
         result.setflags(write=False)
+        inputs.packed.setflags(write=False)
         solution = partial(self._solution_of, q_array, v_array, t, result, n_active, inputs)
         return Command(
             result[tick.tau],
@@ -512,6 +513,8 @@ class WholeBodyController:
             "compiled",
             solution,
             self._softened,
+            inputs.packed[: tick.layout.size],
+            tick.layout.names,
         )
 
     def _reference_attempt(
@@ -527,10 +530,17 @@ class WholeBodyController:
         self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
     ) -> Command:
         """Return the reference backend's command."""
-        problem = self._problem if targets is None else self._layout.fixed_problem(targets)
+        problem, values = self._problem, targets
+        if targets is not None:
+            problem = self._layout.fixed_problem(targets)
         solution = problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
+        if values is None:
+            values = self._layout.at(t) if self._layout.varies else self._layout.constant
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
-        return Command(tau, qdd, forces, self.contacts, "reference", solution, self._softened)
+        return Command(
+            tau, qdd, forces, self.contacts, "reference", solution, self._softened,
+            read_only(values), self._layout.names,
+        )  # fmt: skip
 
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
