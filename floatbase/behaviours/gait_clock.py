@@ -33,7 +33,7 @@ class GaitClock:
         return self._requested is requested
 
     def update(
-        self, requested: Gait, swinging: bool, t: float, delay: Callable[[Gait], float]
+        self, requested: Gait, swinging: bool, t: float, delay: Callable[[Gait], float] | None
     ) -> bool:
         """Change to a newly requested gait once all feet stand, and return whether it changed.
 
@@ -47,14 +47,14 @@ class GaitClock:
             Whether a foot is in the air.
         t : float
             The time [s].
-        delay : callable
+        delay : callable or None
             Called as delay(gait) with the new gait; returns how much later it must begin [s].
         """
         if self._requested is not None and vars(requested) == vars(self._requested):
             self._requested = requested
         elif not swinging:
             gait = requested.starting_at(t)
-            later = delay(gait)
+            later = delay(gait) if delay else 0.0
             self._requested = requested
             self.gait = replace(gait, start=gait.start + later) if later else gait
             return True

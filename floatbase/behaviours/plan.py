@@ -291,7 +291,7 @@ def make_plan(
     )
 
 
-def weight_shift(posture: WalkingPosture, gait: Gait, state: State, t: float) -> float:
+def weight_shift(posture: WalkingPosture, state: State, t: float, gait: Gait) -> float:
     """Return how much later a gait must begin, so that the weight can shift before [s].
 
     The delay is 0 if the capture point is above the feet that stand at the first lift-off, or if
@@ -301,12 +301,12 @@ def weight_shift(posture: WalkingPosture, gait: Gait, state: State, t: float) ->
     ----------
     posture : WalkingPosture
         The standing posture.
-    gait : Gait
-        Gait without lift-offs before t.
     state : State
         The measured state, with all feet on the ground.
     t : float
         The time [s].
+    gait : Gait
+        Gait without lift-offs before t.
     """
     swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
     first = min((times[0] for times in swings.values() if times), default=inf)

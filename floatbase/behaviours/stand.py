@@ -93,7 +93,7 @@ class Stand(Walk):
         return self.gait is not self._standing_gait
 
     def restart(self) -> None:
-        """Forget the plan; the next control step begins to stand in the measured state."""
+        """Let the next control step begin to stand in the measured state."""
         self.gait = self._standing_gait
         super().restart()
 

@@ -10,6 +10,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any, TypeAlias
 
@@ -192,6 +193,7 @@ class Walk:
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
         self._active: ActivePlan | None = None
+        self._planning_path: Path | None = None
         self._speeds = 1.0, 1.0  # fractions in the first period, and later
         self._pose = BodyPose()
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
@@ -312,7 +314,7 @@ class Walk:
     @property
     def time(self) -> float | None:
         """Time of the last control step [s]; None before the first."""
-        return self._time if self._active else None
+        return self._active.path.time if self._active else None
 
     @property
     def stance(self) -> tuple[str, ...]:
@@ -426,6 +428,7 @@ class Walk:
         q, v = _as_vector("q", q, robot.nq), _as_vector("v", v, robot.nv)
         if active is None or not self._continues(t):
             self.restart()
+            self._forget_plan()
         else:
             self.select_gait(q, v, t)
         if self._active is None or not self._clock.follows(self._gait) or t >= self._next_change:
@@ -440,12 +443,11 @@ class Walk:
         return controller(q, v, t, targets)
 
     def restart(self) -> None:
-        """Forget the plan, so that the next control step starts from the measured state.
+        """Let the next control step start from the measured state.
 
         `Walk` calls this method by itself if the time jumps. Derived classes may extend it.
         """
-        self._active, self._time = None, -inf
-        self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
+        self._time = -inf
 
     def select_gait(self, q: Array, v: Array, t: float) -> None:
         """Choose the gait before a control step; derived classes may set `gait` here.
@@ -477,10 +479,14 @@ class Walk:
         self._controllers = StanceControllers(self._posture, self._options)
         self._data = self._robot.model.createData()
         self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
-        self._active = None
-        self._planning_path: Path | None = None
         self._start_time = self._next_change = -inf
+        self._forget_plan()
         self.restart()
+
+    def _forget_plan(self) -> None:
+        """Discard the plan and the history."""
+        self._active, self._planning_path = None, None
+        self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _prepare(self, gait: Gait) -> None:
         """Check the friction that a gait needs, and make the controllers of its stances."""
@@ -516,7 +522,8 @@ class Walk:
         """Apply a new desired motion or pose to the plan in use."""
         active = self._active
         if active is not None:
-            self._desired = self._desired_motion(bool(active.plan.planned_swings), self._time)
+            swinging, time = bool(active.plan.planned_swings), active.path.time
+            self._desired = self._desired_motion(swinging, time)
             self._active = active.changed(self._desired, self._pose)
 
     def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
@@ -541,9 +548,8 @@ class Walk:
             swings: dict[str, SwingPath] = {}
         else:
             swinging = bool(active.plan.planned_swings)
-            new_gait = self._clock.update(
-                self._gait, swinging, t, lambda gait: self._delay(gait, state, t)
-            )
+            delay = partial(weight_shift, posture, state, t) if self.waits_for_weight else None
+            new_gait = self._clock.update(self._gait, swinging, t, delay)
             self._refresh()
             stance, swings = self._clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
@@ -571,10 +577,6 @@ class Walk:
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._change_after(t, plan)
-
-    def _delay(self, gait: Gait, state: State, t: float) -> float:
-        """Return how much later a gait must begin, so that the weight can shift before [s]."""
-        return weight_shift(self._posture, gait, state, t) if self.waits_for_weight else 0.0
 
     def _change_after(self, t: float, plan: StepPlan) -> float:
         """Return until when a plan that is in use at t needs no change [s]."""
@@ -607,6 +609,10 @@ def _as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
 
+    Where the body turns, the velocity is that of the foot's nominal position. The foothold also
+    lies farther outside by a / ω², with the centripetal acceleration a: the centre of mass of a
+    pendulum runs on a smaller circle than its zero-moment point.
+
     Parameters
     ----------
     foot : str
@@ -625,9 +631,11 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     -----
     The rule is from [Raibert1986]_.
     """
-    gait = walk.gait
-    return neutral_point(
-        walk.nominal_foothold(foot, touchdown),
-        walk.velocity_at(touchdown),
-        gait.period - gait.swing,
-    )
+    gait, path, velocity = walk.gait, walk.path_at(touchdown), walk.velocity_at(touchdown)
+    nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
+    arm = nominal - path.position
+    turning = yaw_rate * np.array([-arm[1], arm[0]])
+    centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
+    point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
+    foothold: Array = point - centripetal / walk.omega**2
+    return foothold

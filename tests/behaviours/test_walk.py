@@ -160,6 +160,18 @@ def test_it_turns_on_the_spot_and_goes_sideways() -> None:
     )  # half a second of it speeds up by 1 rad/s²
 
 
+def test_it_keeps_its_speed_on_a_circle() -> None:
+    """The centre of mass runs on a smaller circle than the feet: it was 5 % slower at 1.5 rad/s."""
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.2, 0.0), yaw_rate=1.5)
+    record = run(walk, 3.6)
+    rows = record.time > 2.0
+    x, y = record.com[rows, :2].T
+    A = np.column_stack([2.0 * x, 2.0 * y, np.ones(rows.sum())])
+    *centre, c = np.linalg.lstsq(A, x**2 + y**2, rcond=None)[0]
+    radius = np.sqrt(c + np.square(centre).sum())
+    assert np.isclose(radius, 0.2 / 1.5, rtol=0.03)
+
+
 def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew() -> None:
     walk = walk_of("go2", Gait.trot)
     sim = fb.Simulation(walk.robot)
@@ -354,6 +366,36 @@ def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot() -> None:
     assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(
         speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1
     )
+
+
+def test_gaits_that_sway_are_refused_unless_there_is_friction() -> None:
+    """A pace of go2 needs a coefficient of 0.52 = 165 mm / 316 mm; it slid and fell."""
+    robot = judges.load("go2")
+    feet = fb.Contacts.feet(robot).positions(robot.standing())
+    needed = np.abs(feet[:, 1]).mean() / robot.standing().com[2]
+    for mu, facets in ((0.6, 4), (0.99 * needed, 64)):
+        contacts = fb.Contacts.feet(robot, mu=mu)
+        for gait in (Gait.pace, Gait.bound):
+            refused(
+                lambda: Walk(robot, contacts, gait(robot), facets=facets), InputError, "friction"
+            )
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.8), Gait.pace(robot), (0.2, 0.0))
+    record = run(walk, 3.0)
+    assert record.outcome == "completed" and tilt(record) < 1.0
+    refused(lambda: setattr(walk, "gait", Gait.bound(robot)), InputError, "friction")
+    refused(lambda: setattr(walk, "gait", Gait.pronk(robot)), InputError, "air")
+
+
+def test_a_biped_on_points_walks_by_default() -> None:
+    robot = fb.load("bolt", feet=["FL_FOOT", "FR_FOOT"])
+    record = run(Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot)), 2.0)
+    assert record.outcome == "completed" and np.linalg.norm(record.final.com[:2]) < 0.3
+
+
+def test_four_feet_walk_one_after_the_other() -> None:
+    record = run(walk_of("go2", Gait.walk, (0.2, 0.0)), 4.0)
+    assert record.outcome == "completed" and tilt(record) < 1.0
+    assert np.isclose(speed(record, 2.99, 3.99)[0], 0.2, rtol=0.05)  # one period
 
 
 def test_endless_standing_has_an_end_to_plan_for() -> None:
