@@ -375,10 +375,9 @@ def test_gaits_that_sway_are_refused_unless_there_is_friction() -> None:
     needed = np.abs(feet[:, 1]).mean() / robot.standing().com[2]
     for mu, facets in ((0.6, 4), (0.99 * needed, 64)):
         contacts = fb.Contacts.feet(robot, mu=mu)
-        for gait in (Gait.pace, Gait.bound):
-            refused(
-                lambda: Walk(robot, contacts, gait(robot), facets=facets), InputError, "friction"
-            )
+        for gait in (Gait.pace(robot), Gait.bound(robot)):
+            make = partial(Walk, robot, contacts, gait, facets=facets)
+            refused(make, InputError, "friction")
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.8), Gait.pace(robot), (0.2, 0.0))
     record = run(walk, 3.0)
     assert record.outcome == "completed" and tilt(record) < 1.0
