@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from math import pi, sqrt
+from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -79,6 +80,32 @@ def speed_fractions(
             if square > 0.0:
                 first_fraction = min(first_fraction, acceleration * (wait - sqrt(square)) / speed)
     return min(first_fraction, fraction), fraction
+
+
+class _Walking(Protocol):
+    """A walk: its robot and its desired motion."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def velocity(self) -> Array:
+        """Desired velocity, shape (2,) [m/s]."""
+
+    @property
+    def yaw_rate(self) -> float:
+        """Desired yaw rate [rad/s]."""
+
+
+def slow_message(walk: _Walking, gait: Gait, fraction: float) -> str:
+    """Return the warning for a walk that is limited to a fraction of its desired motion."""
+    x, y = fraction * walk.velocity
+    return (
+        f"{walk.robot.name} cannot make steps that are long enough for {walk!r}. It walks at "
+        f"{x:.3g} and {y:.3g} m/s, and turns at {fraction * walk.yaw_rate:.3g} rad/s. Use a gait "
+        f"with a shorter period than {gait.period:g} s."
+    )
 
 
 def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import Array, as_instance, as_positive
+from floatbase._validation import Array, as_instance, as_number, as_positive
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import Gait, check_always_supported
 from floatbase.behaviours.walk import Walk
@@ -109,9 +109,9 @@ class Stand(Walk):
         t : float
             The time [s].
         """
+        state, t = State(self.robot, q, v), as_number("t", t, "s")
         if self.stepping_gait is None:
             return
-        state = State(self.robot, q, v)
         if not self.stepping:
             dcm = capture_point(state.com, state.com_velocity, self.omega)
             if support_margin(dcm, self._feet.positions(state)[:, :2]) < self.margin:

@@ -42,7 +42,7 @@ from floatbase.behaviours.plan import (
     weight_shift,
 )
 from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.speed import speed_fractions
+from floatbase.behaviours.speed import slow_message, speed_fractions
 from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import SwingPath
@@ -429,7 +429,7 @@ class Walk:
         if active is None or not self._continues(t):
             self.restart()
             self._forget_plan()
-        else:
+        elif type(self).select_gait is not Walk.select_gait:
             self.select_gait(q, v, t)
         if self._active is None or not self._clock.follows(self._gait) or t >= self._next_change:
             self._change(State(robot, q, v), t)
@@ -461,6 +461,8 @@ class Walk:
         t : float
             The time [s].
         """
+        State(self.robot, q, v)  # raises for wrong arguments
+        as_number("t", t, "s")
 
     def _continues(self, t: float) -> bool:
         """Return whether a time [s] follows the last control step, so that the walk continues."""
@@ -507,15 +509,8 @@ class Walk:
             self._options.acceleration[0],
         )
         if self.speed_fraction < 1.0:
-            x, y = self.speed_fraction * self._velocity
-            warnings.warn(
-                f"{self.robot.name} cannot make steps that are long enough for {self!r}. It walks "
-                f"at {x:.3g} and {y:.3g} m/s, and turns at "
-                f"{self.speed_fraction * self._yaw_rate:.3g} rad/s. Use a gait with a shorter "
-                f"period than {self._gait.period:g} s.",
-                SimulationWarning,
-                stacklevel=stacklevel,
-            )
+            message = slow_message(self, self._gait, self.speed_fraction)
+            warnings.warn(message, SimulationWarning, stacklevel=stacklevel)
         self._refresh()
 
     def _refresh(self) -> None:

@@ -508,7 +508,7 @@ def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(
 
 
 def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
-    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.2, 0.0))
+    walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.1, 0.0))
     sim = fb.Simulation(walk.robot)
     for _ in range(10):
         walk.gait = Gait.trot(walk.robot, start=0.1)
