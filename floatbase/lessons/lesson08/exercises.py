@@ -107,7 +107,7 @@ EXERCISES = (
         "in 6 s. x_c must stay at least 32 mm inside the feet on the ground, and no foot may "
         "carry more than 80 N.",
         stub="design = np.array([0.3, 0.1, 0.08])  # swing, pause, s; speed, m/s",
-        solution="design = np.array([0.3, 0.25, 0.12])",
+        solution="design = np.array([0.25, 0.22, 0.14])",
         judge=judge_crawl,
         examples=crawl_examples,
         explanation="Pauses give margin, because x_c shifts during them. Slow swings give quiet "

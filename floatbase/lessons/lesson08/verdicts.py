@@ -241,7 +241,7 @@ def judge_crawl(given: Array) -> Verdict:
 def crawl_examples() -> list[Example]:
     """Return examples for exercise 08.3."""
     return [
-        ((0.3, 0.25, 0.12), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"),
+        ((0.25, 0.22, 0.14), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"),
         ((0.3, 0.1, 0.13), "near"),
         ((0.15, 0.1, 0.15), "near_and_stamps"), ((0.15, 0.3, 0.13), "stamps"),
         ((2.0, 0.1, 0.4), "too_long_steps"),
