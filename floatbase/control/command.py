@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array, Value, cached_property
+from floatbase.control.joint_limits import JointLimits
 from floatbase.dynamics import Contacts
 from floatbase.qp import Solution
 
@@ -32,6 +33,8 @@ class Command(Value):
         Value of the property `solution`, or a function that computes it on first use.
     softened : bool, optional
         Whether limits, or limits and contacts, were made soft because the QP had no solution.
+    joint_limits : JointLimits, optional
+        Joint limits of the QP.
     """
 
     tau: Array
@@ -40,6 +43,7 @@ class Command(Value):
     contacts: Contacts
     backend: str
     softened: bool
+    joint_limits: JointLimits | None
     _solution: Solution | Callable[[], Solution]
 
     def __init__(
@@ -51,12 +55,13 @@ class Command(Value):
         backend: str,
         solution: Solution | Callable[[], Solution],
         softened: bool = False,
+        joint_limits: JointLimits | None = None,
     ) -> None:
         # writing to the dictionary takes 0.1 µs per control step, a frozen dataclass 0.4 µs more
         values = self.__dict__
         values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
         values["contacts"], values["backend"], values["_solution"] = contacts, backend, solution
-        values["softened"] = softened
+        values["softened"], values["joint_limits"] = softened, joint_limits
 
     @cached_property
     def solution(self) -> Solution:

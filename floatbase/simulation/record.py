@@ -17,6 +17,7 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
+from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -75,6 +76,8 @@ class Rollout(Value):
     planned_qdd : ndarray, shape (n, nv), or None
         Accelerations that the controller planned, as in `Command.qdd` [m/s² or rad/s²]; rows
         without a plan have NaN.
+    joint_limits : JointLimits or None
+        Joint limits in the last plan, as in `Command.joint_limits`.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -94,6 +97,7 @@ class Rollout(Value):
     stances: tuple[Contacts, ...] = ()
     controller_off_time: float | None = None
     planned_qdd: Array | None = None
+    joint_limits: JointLimits | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -273,6 +277,7 @@ class Recorder:
         )
         self._tau_desired = np.empty((ticks, d))
         self._planned_qdd = np.full((ticks, sim.robot.nv), np.nan)
+        self._joint_limits: JointLimits | None = None
         # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
@@ -315,6 +320,7 @@ class Recorder:
         stance: Contacts,
         planned: Array | None,
         planned_qdd: Array | None = None,
+        joint_limits: JointLimits | None = None,
     ) -> None:
         """Complete a row.
 
@@ -328,10 +334,12 @@ class Recorder:
             Forces that the controller planned at the contacts, in the world frame [N].
         planned_qdd : ndarray, shape (nv,), or None
             Accelerations that the controller planned [m/s² or rad/s²].
+        joint_limits : JointLimits or None
+            Limits of these accelerations.
         """
         n = self._n
         if planned_qdd is not None:
-            self._planned_qdd[n] = planned_qdd
+            self._planned_qdd[n], self._joint_limits = planned_qdd, joint_limits
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
@@ -405,6 +413,7 @@ class Recorder:
             else tuple(self._stances),
             controller_off_time=controller_off_time,
             planned_qdd=self._complete_rows(self._planned_qdd),
+            joint_limits=self._joint_limits,
         )
 
     def _complete_rows(self, rows: Array) -> Array:
