@@ -287,9 +287,11 @@ class Limits(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.joint_limits is not None:
-            example = "floatbase.control.JointLimits.of(robot); Limits.of(robot) has them"
-            as_instance("joint_limits", self.joint_limits, JointLimits, example)
+        if self.joint_limits is not None and not isinstance(self.joint_limits, JointLimits):
+            raise InputError(
+                f"joint_limits must be JointLimits or None, not {short_repr(self.joint_limits)}. "
+                f"floatbase.control.Limits.of(robot) has the joint limits of a robot."
+            )
 
     @classmethod
     def of(
