@@ -76,16 +76,11 @@ def lines(figure: Figure) -> set[str]:
     "draw",
     [
         lambda: lesson02.draw_equation(lesson03.standing_go2_eom()),
-        lambda: (
-            lesson02.plot_foot_displacement(
-                {"one": np.ones(9), "other": np.ones(9), "third": np.ones(9)}, 1.0
-            ).figure
-        ),
         lambda: lesson03.matrix_picture(np.eye(4), {"rows": 4}, {"q̈": 1, "λ": 3}),
         lambda: lesson04.cost_slices(bowl=(BOWL, "x", "y", 2.0)),
         lambda: lesson04.effort_picture({name: ([0, 1], [0, 1]) for name in "abc"}),
     ],
-    ids=["equation", "strayed", "matrix", "slices", "effort"],
+    ids=["equation", "matrix", "slices", "effort"],
 )
 def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(
     draw: Callable[[], Figure],

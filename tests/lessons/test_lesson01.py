@@ -114,5 +114,5 @@ def test_the_pressing_panel_names_the_busiest_motor_and_its_limit(arm: Robot) ->
 def test_the_right_width_of_the_plate_is_the_one_from_which_on_the_engine_lets_the_arm_stand(
     pressing: Robot, part: float, expected: str
 ) -> None:
-    assert right("01.5", WIDE_ENOUGH)
+    assert right("01.3", WIDE_ENOUGH)
     assert outcome(pressing, part * WIDE_ENOUGH, 120.0) == expected

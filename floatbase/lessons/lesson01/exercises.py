@@ -8,7 +8,6 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.dynamics import fixed_frame
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
@@ -23,49 +22,23 @@ from floatbase.objectives import centroidal_momentum_rate
 from floatbase.robots import PLATE_SIZE, with_floating_base
 
 
-@cache
-def _pressing_arm() -> tuple[fb.State, Array, Array]:
-    """Return the pressing arm without bolts, the tool's position from the base, and f_r."""
-    state = with_floating_base(fb.load("ur5", posture=PRESSING_POSTURE)).standing()
-    return state, state.point("tool0") - state.point("base_link"), np.array([-60.0, 0.0, 0.0])
+def _actuation_of_solo8(belt: float = 1.0, torque: int = 1) -> Array:
+    """Return S, column by column, from the angles by which the joints turn the motors.
 
+    A joint velocity turns the motor in this joint, and the hip also turns the motor that the belt
+    connects with the knee. By equal power, S is the transpose of this map.
 
-def _bolts_moment() -> Array:
-    """Compute the moment of the bolts from the constraint forces of (7).
-
-    The moment is from the wrench of the welded base with the wall's force, minus that without the
-    force.
+    Parameters
+    ----------
+    belt : float
+        Lever arm of the belt on the hip [-].
+    torque : int
+        Index of the motor with the belt: 1 for the knee of the front left leg.
     """
-    state, _, force = _pressing_arm()
-    J = state.frame_jacobian("tool0")[:3]
-    eom = fb.equations_of_motion(state, fb.Contacts([fixed_frame("base_link")]))
-    wrench = np.linalg.lstsq(eom.J.T, -J.T @ force + eom.S @ (J.T @ force)[6:], rcond=None)[0]
-    return np.asarray(wrench[3:])
-
-
-def _about_the_centre_of_mass() -> Array:
-    state, _, force = _pressing_arm()
-    return -np.cross(state.point("tool0") - state.com, force)
-
-
-def _with_the_weight() -> Array:
-    state, tool, force = _pressing_arm()
-    lever = state.com - state.point("base_link")
-    return -np.cross(tool, force) + np.cross(lever, [0.0, 0.0, state.robot.weight])
-
-
-def _actuation_of_solo8() -> Array:
-    """Return S, column by column: what (3) gives for one torque at a time."""
     robot = fb.load("solo8")
-    columns = [np.concatenate([np.zeros(6), one]) for one in np.eye(robot.d)]
-    return np.column_stack(columns)
-
-
-def _carried_by_friction() -> float:
-    """Return the largest horizontal force on a standing go2 within cones of μ = 0.7."""
-    robot = fb.load("go2")
-    contacts = fb.Contacts.points(robot, mu=0.7)
-    return float(contacts.mus.max()) * sum(inertia.mass for inertia in robot.model.inertias) * 9.81
+    turns = np.hstack([np.zeros((robot.d, 6)), np.eye(robot.d)])
+    turns[torque, 6 + (torque - 1 if torque % 2 else torque + 1)] = belt
+    return turns.T
 
 
 def _held_width() -> float:
@@ -148,7 +121,7 @@ def _judge_thrust(f: Array) -> Verdict:
         return Verdict(
             False,
             f"The force is right, but there is a moment of ({where}) N·m about the centre of mass, "
-            f"which turns the robot.",
+            f"which turns the robot as a whole.",
             "moment",
         )
     return Verdict(
@@ -171,50 +144,11 @@ def _thrusts() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="01.1",
-        statement="The wall pushes on the arm with f_r at `tool`, both given in the frame of "
-        "the base. With which moment, shape (3,), N·m, do the bolts balance it? The weight, "
-        "which the bolts carry anyway, does not count.",
-        stub="bolts_moment = np.zeros(3)  # N·m: replace this, using tool and f_r",
-        solution="bolts_moment = -np.cross(tool, f_r)",
-        judge=NumericJudge(
-            right=_bolts_moment,
-            praise="The bolts balance the wall: force and moment, each with the opposite sign.",
-            mistakes={
-                "walls_moment": lambda: -_bolts_moment(),
-                "about_com": _about_the_centre_of_mass,
-                "weight_too": _with_the_weight,
-                "zero": lambda: np.zeros(3),
-                "height_alone": lambda: np.array([0.0, 60.0 * _pressing_arm()[1][2], 0.0]),
-                "elementwise": lambda: _pressing_arm()[1] * _pressing_arm()[2],
-                "minus_force": lambda: -_pressing_arm()[2],
-                "force_itself": lambda: _pressing_arm()[2],
-            },
-            hints={
-                "walls_moment": "This is the moment of the wall about the base. The bolts "
-                "balance it. Check the sign, or the order of the cross product.",
-                "about_com": "This moment is about the centre of mass, but the bolts are at the "
-                "base.",
-                "weight_too": "This includes the moment of the weight. Only the wall counts here.",
-                "zero": "Zero would mean that nothing balances the wall. Which lever arm and "
-                "which force are needed?",
-                "height_alone": "This uses only the height of the tool. The tool is also 11 cm "
-                "to the side, and that is a lever arm, too.",
-                "elementwise": "* multiplies element by element. A moment is the cross product "
-                "of lever arm and force.",
-                "minus_force": "This is a force. A moment needs a lever arm: how far from the "
-                "base does the force act?",
-                "force_itself": "This is f_r itself. A moment needs a lever arm, and the bolts "
-                "act in the opposite direction.",
-            },
-        ),
-        explanation="At rest, the moments about the base add up to zero: tool × f_r + τ_b = 0.",
-    ),
-    Exercise(
-        name="01.2",
-        statement="solo8 has two joints in each of its four legs. Write its actuation matrix S of "
-        "(3).",
-        stub="S_solo8 = np.eye(8)  # replace this: stack what is missing",
-        solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])",
+        statement="solo8 has a hip and a knee joint in each of its four legs. The knee motor of "
+        "the front left leg sits in the trunk, with a belt past the hip joint. Write S.",
+        stub="S_solo8 = np.eye(8)  # replace this: stack what is missing, and add the belt",
+        solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])\n"
+        "S_solo8[6, 1] = 1.0  # the knee motor also acts on the hip",
         judge=ShapeJudge(
             shapes={
                 (
@@ -238,13 +172,33 @@ EXERCISES = (
             },
             judge=NumericJudge(
                 right=_actuation_of_solo8,
-                praise="Six rows without a motor, then one row for each motor.",
+                praise="Six rows without a motor, then one row for each joint. The belt adds one "
+                "entry.",
                 mistakes={
+                    "no_belt": lambda: _actuation_of_solo8(belt=0.0),
+                    "belt_reversed": lambda: _actuation_of_solo8(torque=0),
+                    "belt_sign": lambda: _actuation_of_solo8(belt=-1.0),
+                    "every_leg": lambda: sum(
+                        (_actuation_of_solo8(torque=knee) for knee in (3, 5, 7)),
+                        _actuation_of_solo8() - 3 * _actuation_of_solo8(belt=0.0),
+                    ),
+                    "moved_to_hip": lambda: (
+                        _actuation_of_solo8() - np.outer(np.eye(14)[7], np.eye(8)[1])
+                    ),
                     "base_last": lambda: np.roll(_actuation_of_solo8(), -6, axis=0),
                     "zeros": lambda: np.zeros((14, 8)),
                     "sign": lambda: -_actuation_of_solo8(),
                 },
                 hints={
+                    "no_belt": "This is S with a motor in every joint. Which other row does the "
+                    "motor with the belt act on?",
+                    "belt_reversed": "Here the hip motor acts on the knee as well. Columns belong "
+                    "to motors, and rows to joints.",
+                    "belt_sign": "The sign of the belt is wrong. The motor turns in the same "
+                    "direction when the hip moves and when the knee moves.",
+                    "every_leg": "Every leg has a belt here. Only the front left leg has one.",
+                    "moved_to_hip": "The belt still drives the knee. Its motor acts on the hip "
+                    "and on the knee.",
                     "base_last": "The base comes first in q, as in (2). Here its rows come last.",
                     "zeros": "All entries are zero, so no motor drives anything. Where does "
                     "each torque act?",
@@ -252,54 +206,16 @@ EXERCISES = (
                 },
             ),
         ),
-        explanation="(2) puts the six numbers of the base before the joints, so (3) puts six zeros "
-        "before the torques.",
+        explanation="(2) puts the six numbers of the base before the joints, so (3) puts six "
+        "zeros before the torques. The knee motor turns when the hip or the knee moves, so its "
+        "column has two ones.",
     ),
     Exercise(
-        name="01.3",
-        statement="go2 stands on a level floor with μ = 0.7 and is pulled sideways, low enough "
-        "not to tip over. What is the largest horizontal force, in N, that the floor can "
-        "balance while the robot stays at rest?",
-        stub="most = 1000.0  # N: replace this number by an expression",
-        solution="most = 0.7 * go2.mass * 9.81",
-        judge=NumericJudge(
-            right=_carried_by_friction,
-            tolerance=2e-3,  # g may be 9.8
-            praise="The force of the bolts had no bound. This force is at most friction times "
-            "weight, as long as the robot does not jump.",
-            mistakes={
-                "g_is_10": lambda: 10 * _carried_by_friction() / 9.81,
-                "weight": lambda: _carried_by_friction() / 0.7,
-                "one_foot": lambda: _carried_by_friction() / 4,
-                "four_weights": lambda: 4 * _carried_by_friction(),
-                "mass": lambda: _carried_by_friction() / 9.81,
-                "divided": lambda: _carried_by_friction() / 0.49,
-                "pyramid": lambda: _carried_by_friction() / np.sqrt(2.0),
-                "mu_twice": lambda: 0.7 * _carried_by_friction(),
-            },
-            hints={
-                "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
-                "weight": "That is the weight. A horizontal force has to come from friction.",
-                "one_foot": "That is the limit of one foot. Four feet share the force.",
-                "four_weights": "All four feet together carry the weight once, not four times.",
-                "mass": "That is the friction coefficient times the mass, in kg. A force needs "
-                "one more factor.",
-                "divided": "Multiply the normal force by μ; do not divide by it.",
-                "pyramid": "That is the limit of the controller's four-sided pyramid. The "
-                "floor's limit is the round cone, which is larger.",
-                "mu_twice": "The friction force is at most μ times the normal force. Multiply "
-                "by μ only once.",
-            },
-        ),
-        examples=lambda: [(0.7 * fb.load("go2").mass * 9.8, "")],
-        explanation="The friction force at each foot is at most μ times its normal force, and "
-        "the normal forces add up to the weight.",
-    ),
-    Exercise(
-        name="01.4",
+        name="01.2",
         statement="A design: go2 floats in its standing posture with a thruster at every foot. "
-        "Choose the forces, shape (4, 3), N, world, in the order of `contacts.names`. Together "
-        "they must push straight up with 200 N, without any moment. Row i of `levers` is x_i - "
+        "Choose the forces, shape (4, 3), N, world, in the order of `contacts.names`. The motors "
+        "hold the joints. Together the forces "
+        " must push straight up with 200 N, without any moment. Row i of `levers` is x_i - "
         "x_c.",
         stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first "
         "guess",
@@ -319,7 +235,7 @@ EXERCISES = (
         "the two halves of this matrix G_f and G_τ, (20) and (21).",
     ),
     Exercise(
-        name="01.5",
+        name="01.3",
         statement="The arm on its plate is to press with 120 N. How wide, in m, must the square "
         'plate be, at least? `at_rest` has .com and .point("tool0"), and `standing.weight` is '
         "the weight. The plate has no weight. Everything else stays the same.",

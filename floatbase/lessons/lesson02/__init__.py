@@ -17,8 +17,6 @@ from floatbase.lessons.lesson02.pictures import (
     parking_panel,
     play_collapse_comparison,
     play_tool_comparison,
-    plot_foot_displacement,
-    plot_vertical_forces,
 )
 
 __all__ = [
@@ -33,8 +31,6 @@ __all__ = [
     "parking_states",
     "play_collapse_comparison",
     "play_tool_comparison",
-    "plot_foot_displacement",
-    "plot_vertical_forces",
     "rolling_wheel",
     "run_constant_torques",
     "tool_displacement",

@@ -29,30 +29,6 @@ def _moving_go2() -> tuple[fb.State, fb.Contacts]:
     return slow.replace(v=8 * slow.v), fb.Contacts.points(robot)
 
 
-def _velocity_of(state: fb.State, foot: str, step: float) -> Array:
-    """Return the velocity of the foot's frame after `step` seconds of the same v."""
-    return state.replace(q=state.integrate(step * state.v)).frame_velocity(foot)[:3]
-
-
-def _drift() -> Array:
-    """Return -J̇ q̇, shape (3,), world frame [m/s²], by differences of the foot's velocity."""
-    state, _ = _moving_go2()
-    h = 1e-5
-    return -(_velocity_of(state, "FL_foot", h) - _velocity_of(state, "FL_foot", -h)) / (2 * h)
-
-
-def _drift_in_the_foots_frame() -> Array:
-    state, _ = _moving_go2()
-    return np.asarray(state.frame_pose("FL_foot").rotation.T @ _drift())
-
-
-def _drift_of_a_spatial_acceleration() -> Array:
-    """Return the drift without ω × v: Pinocchio's spatial acceleration in world axes."""
-    state, _ = _moving_go2()
-    moving = state.frame_velocity("FL_foot")
-    return _drift() + np.cross(moving[3:], moving[:3])
-
-
 def _generalised() -> Array:
     """Return Jᵀ λ by virtual work, with finite differences of the foot's position."""
     state, _ = _moving_go2()
@@ -249,10 +225,10 @@ EXERCISES = (
     Exercise(
         name="02.2",
         statement="`moving` is go2 in a tilted, moving state. The ground pushes on its FL_foot, "
-        "at the origin of the frame, with `push`. Which generalised force, shape (18,), appears "
-        "in (4)?",
-        stub="generalised = np.zeros(18)  # replace this, using moving.frame_jacobian and push",
-        solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ push',
+        "at the origin of the frame, with `ground_force`. Which generalized force, shape (18,), "
+        "appears in (4)?",
+        stub="generalised = np.zeros(18)  # replace this: moving.frame_jacobian, ground_force",
+        solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ ground_force',
         judge=ShapeJudge(
             shapes={
                 (3,): "(4) has a row for each component of the velocity. J maps 18 numbers to "
@@ -302,9 +278,9 @@ EXERCISES = (
                     "eom_standing": "This is the J of `eom`, which is for the standing robot "
                     "and for the points that touch the ground.",
                     "contact_point": "This force acts at the point that touches the ground. "
-                    "`push` acts at the origin of the frame, 2 cm away.",
-                    "turned": "`push` is in world axes, and so are the rows of frame_jacobian. "
-                    "No rotation is needed.",
+                    "`ground_force` acts at the origin of the frame, 2 cm away.",
+                    "turned": "`ground_force` is in world axes, and so are the rows of "
+                    "frame_jacobian. No rotation is needed.",
                     "angular_rows": "These are the angular rows of the Jacobian. For a force at "
                     "a point, use the linear rows, which come first.",
                     "zero": "Zero would mean that the force has no effect.",
@@ -315,42 +291,6 @@ EXERCISES = (
     ),
     Exercise(
         name="02.3",
-        statement="The same state. What must J q̈ be so that the origin of FL_foot does not "
-        "accelerate? Shape (3,), m/s², world.",
-        stub="b_foot = np.zeros(3)  # replace this",
-        solution='b_foot = -moving.frame_drift("FL_foot")[:3]',
-        judge=NumericJudge(
-            right=_drift,
-            praise="Joints and base need this much acceleration just to keep the foot in place.",
-            mistakes={
-                "zero": lambda: np.zeros(3),
-                "sign": lambda: -_drift(),
-                "contact_point": lambda: fb.equations_of_motion(*_moving_go2()).b[:3],
-                "foot_axes": _drift_in_the_foots_frame,
-                "spatial": (_drift_of_a_spatial_acceleration),
-                "velocity": lambda: _velocity_of(_moving_go2()[0], "FL_foot", 0.0),
-                "angular_rows": lambda: -_moving_go2()[0].frame_drift("FL_foot")[3:],
-            },
-            hints={
-                "zero": "This omits the drift. Even with q̈ = 0 the foot accelerates, because J "
-                "changes as the robot moves.",
-                "sign": "This is J̇ q̇ itself. From J q̈ + J̇ q̇ = 0, which sign does b have?",
-                "contact_point": "This b is for the point of a rolling ball that touches the "
-                "ground. The question is about the origin of the frame.",
-                "foot_axes": "This is the right vector in the axes of the foot. (5) uses world "
-                "axes here.",
-                "spatial": "ω × v is missing. The acceleration of a point is not the spatial "
-                "acceleration of its body.",
-                "velocity": "This is the velocity of the foot. The answer is an acceleration.",
-                "angular_rows": "These are the angular rows of the drift. For a point, use the "
-                "linear rows, which come first.",
-            },
-        ),
-        explanation="d²φ/dt² = J q̈ + J̇ q̇ = 0, so b = -J̇ q̇. `frame_drift` is J̇ q̇, with "
-        "the linear rows first.",
-    ),
-    Exercise(
-        name="02.4",
         statement="A design without a controller: find torques and contact forces that keep the "
         "standing go2 still, from (4) with q̈ = 0, which is S τ + Jᵀ λ = h. There are 24 "
         "unknowns and 18 equations.",

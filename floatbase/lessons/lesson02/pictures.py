@@ -7,11 +7,9 @@ from itertools import pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons import props
 from floatbase.lessons.judges import format_vector
@@ -21,7 +19,7 @@ from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, markers, shapes
 from floatbase.viewer.scene import geometry
-from floatbase.viewer.scene.colours import COM, GREYS, MEASURED, PLANNED, hex_code
+from floatbase.viewer.scene.colours import COM, GREYS, PLANNED, hex_code
 
 MOMENT_SCALE = 0.01  # m drawn for a newton metre
 
@@ -133,68 +131,6 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
     panel = slider_panel(view, draw, forwards=(-40.0, 0.0, 40.0, "N"), up=(0.0, 60.0, 80.0, "N"))
     view.camera(View(76.0, 14.0, 1.0, around=((0.0, 0.0, 0.31), 0.47)))
     return panel
-
-
-def plot_vertical_forces(record: Rollout, title: str) -> Axes:
-    """Plot the vertical forces at a front and a rear foot, by (7) and by the physics engine.
-
-    The forces on the left and on the right are equal.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-    title : str
-        Title of the plot.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
-    _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
-    names = list(record.contacts.names)
-    for foot, where in (("FL_foot", "front"), ("RL_foot", "rear")):
-        row = 3 * names.index(foot) + 2
-        (by_equation,) = axis.plot(
-            record.time, record.planned[:, row], color=hex_code(PLANNED), linewidth=4, alpha=0.7
-        )
-        (by_engine,) = axis.plot(record.time, record.measured[:, row], color=hex_code(MEASURED))
-        axis.annotate(
-            f"each {where} foot",
-            (record.time[90], record.measured[90, row]),
-            (0, 8),
-            textcoords="offset points",
-        )
-    axis.set(xlabel="time [s]", ylabel="vertical force [N]", title=title)
-    axis.grid(alpha=0.25)
-    axis.legend([by_equation, by_engine], ["(7)", "MuJoCo"], fontsize="small")
-    return axis
-
-
-def plot_foot_displacement(curves: dict[str, Array], duration: float) -> Axes:
-    """Plot displacements of feet on a logarithmic scale.
-
-    Parameters
-    ----------
-    curves : dict of str to ndarray, shape (n,)
-        For each name: displacements [mm].
-    duration : float
-        Time from the first value to the last [s].
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
-    _, axis = plt.subplots(figsize=(8, 3), layout="constrained")
-    for (name, curve), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
-        time = np.linspace(0.0, duration, len(curve))
-        axis.semilogy(time[1:], curve[1:], style, color=hex_code(colour), linewidth=2.0, label=name)
-    axis.set(xlabel="time [s]", ylabel="largest foot displacement [mm]", ylim=(1e-3, 1e2))
-    axis.grid(alpha=0.25)
-    axis.legend(loc="lower right", fontsize="small")
-    return axis
 
 
 def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> Viewer:

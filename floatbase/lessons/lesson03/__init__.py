@@ -6,7 +6,7 @@ from floatbase.lessons.lesson03.helpers import (
     rising_solo8_eom,
     standing_go2_eom,
     standing_still_beta,
-    tilted_squeeze,
+    tilted_go2_eom,
     upright_solo12,
 )
 from floatbase.lessons.lesson03.pictures import matrix_picture, motion_bars, show_beta, show_knee
@@ -21,6 +21,6 @@ __all__ = [
     "show_knee",
     "standing_go2_eom",
     "standing_still_beta",
-    "tilted_squeeze",
+    "tilted_go2_eom",
     "upright_solo12",
 ]  # fmt: skip

@@ -2,99 +2,66 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-import floatbase as fb
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import NumericJudge, ShapeJudge
 from floatbase.lessons.lesson03.verdicts import (
-    diagonal_stance_eom,
     judge_all_pairs,
     judge_unloading,
     pair_examples,
-    squeeze_mistakes,
-    squeeze_torques,
     standing_forces,
     unloading_examples,
+    zeta_columns,
+    zeta_mistakes,
 )
-from floatbase.linear_algebra import rank
 
 EXERCISES = (
     Exercise(
         name="03.1",
-        statement="go2 stands on FL and RR alone. Of the 12 directions of β, how many move the "
-        "robot?",
-        stub="moving = 12  # replace this number by what you find",
-        solution='two_feet = fb.equations_of_motion(state, contacts.only("FL_foot", "RR_foot"))\n'
-        "moving = dimensions(two_feet).rank_V_qdd",
-        judge=NumericJudge(
-            is_count=True,
-            right=lambda: rank(fb.accelerations_from_torques(diagonal_stance_eom()).A),
-            praise="Two feet have one internal force, along the line between them. Every other "
-            "direction moves something.",
-            mistakes={
-                "all": lambda: 12,
-                "unmoving": lambda: 1,
-                "components": lambda: 6,
-                "three_feet": lambda: 9,
-                "base_alone": lambda: 5,
-                "more_internal": lambda: 10,
-            },
-            hints={
-                "all": "That is all of them. One action between two feet does not move anything.",
-                "unmoving": "That is the number of directions that do not move the robot.",
-                "components": "That is k, the number of force components. The answer is the "
-                "number of directions of β.",
-                "three_feet": "That is the number for three feet.",
-                "base_alone": "That is the number of motions of the base that two feet can "
-                "stop. The legs move, too.",
-                "more_internal": "You have counted more than one internal force. Which pairs of "
-                "forces at two feet have no moment?",
-            },
-        ),
-        explanation="d - r + rank J_b = 12 - 6 + 5. Point feet cannot stop the base from "
-        "turning about the line through both feet, so J_b has rank 5. The remaining 6 - 5 = 1 "
-        "direction is an internal force.",
-    ),
-    Exercise(
-        name="03.2",
-        statement="Which torques make the ground add exactly `squeeze` to the contact forces of "
-        "the tilted robot?",
-        stub="torques = np.zeros(12)  # replace: N·m, from tilted.J and squeeze",
-        solution="torques = -tilted.J[:, 6:].T @ squeeze",
+        statement="Derive λ = z + Z τ for the tilted, moving robot from (7): one matrix of 12 "
+        "rows, first z, then the 12 columns of Z.",
+        stub="z_and_Z = np.zeros((12, 13))  # replace: z, then the 12 columns of Z",
+        solution="J_Minv = tilted.J @ np.linalg.inv(tilted.M)\n"
+        "G = J_Minv @ tilted.J.T\n"
+        "z = np.linalg.solve(G, tilted.b + J_Minv @ tilted.h)\n"
+        "Z = -np.linalg.solve(G, J_Minv @ tilted.S)\n"
+        "z_and_Z = np.column_stack([z, Z])",
         judge=ShapeJudge(
             NumericJudge(
-                right=squeeze_torques,
-                praise="Internal forces are balanced joint by joint, in any posture, at any "
-                "velocity, without M and without h.",
-                mistakes={"zero": lambda: np.zeros(12)} | squeeze_mistakes(),
+                right=zeta_columns,
+                praise="ζ is affine: Z holds the response to the motors, and z holds weight and "
+                "motion.",
+                mistakes=zeta_mistakes(),
                 hints={
-                    "sign": "The sign is wrong: these torques squeeze in the opposite "
-                    "direction. Torques and forces must cancel in the joint rows of (7).",
-                    "transpose": "This uses J instead of its transpose. J maps joint velocities "
-                    "to foot velocities, and Jᵀ maps forces to torques.",
-                    "into_base": "The frame is wrong. J and the forces are both in world axes "
-                    "here, so no rotation of the base is needed.",
-                    "out_of_base": "The frame is wrong. The forces are in world axes already, "
-                    "and the rotation of the base takes them out of these axes.",
-                    "standing": "This is the J of the standing robot. `tilted` has another "
-                    "posture, so J differs.",
-                    "h_too": "This includes h, which would also carry the robot. The answer is "
-                    "only what the squeeze adds.",
-                    "zero": "All torques are zero, so the forces do not change.",
+                    "b_missing": "b is missing in z. The robot moves, and its feet stay in place "
+                    "only with J q̈ = b, not 0.",
+                    "b_sign": "The sign of b is wrong. J q̈ equals b in (7).",
+                    "h_missing": "h is missing in z, so this robot has no weight.",
+                    "h_sign": "The sign of h is wrong. (7) says q̈ = M⁻¹ (S τ + Jᵀ λ - h). What "
+                    "remains on the other side when you solve for λ?",
+                    "constant_missing": "z is zero. With τ = 0, does the ground exert no force?",
+                    "S_missing": "Z is zero, but the motors do change the contact forces.",
+                    "Z_sign": "The sign of Z is wrong. In J q̈ = b, Jᵀ λ and S τ are on the same "
+                    "side. If one grows, the other must shrink.",
+                    "all_signs": "All signs are wrong. Is this the force on the robot?",
+                    "constant_last": "The constant z must be the first column.",
+                    "standing": "This is ζ of the standing robot. `tilted` has another posture and "
+                    "moves.",
+                    "zero": "All entries are zero.",
                 },
             ),
             {
-                (18,): "18 numbers are generalized forces of base and joints. Motors act only on "
-                "the joints: see S.",
-                (6,): "6 numbers are the base columns of J. The base has no motors.",
+                (12,): "12 numbers are one λ. The answer must hold for every τ: z and Z.",
+                (12, 12): "This has the shape of Z alone. Put z in front of it as a column.",
+                (12, 19): "Z has 12 columns, one for each motor. 18 columns act on the generalized "
+                "forces. Which matrix maps τ to them?",
+                (13, 12): "These are rows. z and the columns of Z must be columns here.",
             },
         ),
-        explanation="In (7) only τ and λ may change: 0 = S τ + Jᵀ λ. The base rows say that λ "
-        "is internal, and the joint rows give τ.",
+        explanation="Insert q̈ = M⁻¹ (S τ + Jᵀ λ - h) into J q̈ = b and collect λ on one side: "
+        "J M⁻¹ Jᵀ λ = b + J M⁻¹ h - J M⁻¹ S τ.",
     ),
     Exercise(
-        name="03.3",
+        name="03.2",
         statement="Redistribute the forces of the standing robot so that FL carries 20 N and "
         "the robot does not move.",
         stub="new_forces = forces.copy()  # replace: shape (12,), N",
@@ -108,7 +75,7 @@ EXERCISES = (
         "row x = 20 - λ₀[2].",
     ),
     Exercise(
-        name="03.4",
+        name="03.3",
         statement="Build (11) for a moving solo8: one matrix with 20 rows, first v, then the "
         "columns of V⊥.",
         stub="all_pairs = np.zeros((20, 9))  # replace: v, then V⊥ (8 torques, then 12 forces)",

@@ -27,26 +27,15 @@ def standing_go2_eom() -> EquationsOfMotion:
 
 
 @cache
-def tilted_squeeze() -> tuple[EquationsOfMotion, Array]:
-    """Return go2 tilted and moving, with internal forces that push two feet apart.
-
-    Returns
-    -------
-    EquationsOfMotion
-        The equations of motion, (7).
-    ndarray, shape (12,)
-        Forces that push FL and RR apart with 10 N along the line between them, in the world frame
-        [N].
+def tilted_go2_eom() -> EquationsOfMotion:
+    """Return the equations of motion of go2 on four feet, tilted and moving.
 
     Notes
     -----
     [FBR]_, eq. (7).
     """
     robot = fb.load("go2")
-    eom = fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7))
-    feet = eom.contacts.positions(eom.state)
-    line = (feet[0] - feet[3]) / np.linalg.norm(feet[0] - feet[3])
-    return eom, np.concatenate([10.0 * line, np.zeros(6), -10.0 * line])
+    return fb.equations_of_motion(robot.random_state(4), fb.Contacts.points(robot, mu=0.7))
 
 
 @cache

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import (
     EquationsOfMotion,
@@ -15,51 +14,56 @@ from floatbase.dynamics import (
     torque_force_space,
 )
 from floatbase.lessons.judges import Example, Verdict, array_judge, array_or_verdict
-from floatbase.lessons.lesson03.helpers import rising_solo8_eom, standing_go2_eom, tilted_squeeze
+from floatbase.lessons.lesson03.helpers import rising_solo8_eom, standing_go2_eom, tilted_go2_eom
 from floatbase.linear_algebra import RANK_TOLERANCE, rank
 
 # relative tolerance between two solutions: rounding errors are 1e-12, mistakes 1e-2
 TOLERANCE = 1e-5
 
 
-def diagonal_stance_eom() -> EquationsOfMotion:
-    """Return the equations of motion of go2 standing on two feet.
+def zeta_columns(eom: EquationsOfMotion | None = None) -> Array:
+    """Return the constant and the matrix of ζ side by side, shape (12, 13).
+
+    Parameters
+    ----------
+    eom : EquationsOfMotion, optional
+        Equations of motion; by default, those of the tilted go2.
 
     Notes
     -----
-    [FBR]_, eq. (7).
+    [FBR]_, eq. (9). The optimality conditions of min ½ x M x - x (S τ - h) subject to J x = b are
+    solved, with λ as the multiplier, so this does not repeat the expression that is asked for.
     """
-    standing = standing_go2_eom()
-    return fb.equations_of_motion(standing.state, standing.contacts.only("FL_foot", "RR_foot"))
+    eom = eom or tilted_go2_eom()
+    nv, k = eom.nv, eom.k
+    kkt = np.block([[eom.M, -eom.J.T], [eom.J, np.zeros((k, k))]])
+    constant = np.concatenate([-eom.h, eom.b])[:, None]
+    torques = np.vstack([eom.S, np.zeros((k, eom.d))])
+    return np.linalg.solve(kkt, np.hstack([constant, torques]))[nv:]
 
 
-def squeeze_torques() -> Array:
-    """Compute the torques by the inverse of ζ, without the transpose of J."""
-    eom, squeeze = tilted_squeeze()
-    return np.linalg.solve(fb.forces_from_torques(eom).A, squeeze)
+def zeta_mistakes() -> dict[str, Any]:
+    """Return, for each hint, a function that computes the answer of this mistake."""
 
-
-def _turned(forces: Array, R: Array) -> Array:
-    return (forces.reshape(-1, 3) @ R.T).ravel()
-
-
-def squeeze_mistakes() -> dict[str, Any]:
-    """Return, for each hint, a function that computes the torques of this mistake."""
-
-    def torques(change: Any = lambda eom, f: f, after: Any = lambda eom, tau: tau) -> Any:
-        def value() -> Array:
-            eom, squeeze = tilted_squeeze()
-            return after(eom, -eom.J[:, 6:].T @ change(eom, squeeze))
-
-        return value
+    def columns(b: float = 1.0, h: float = 1.0, tau: float = -1.0) -> Array:
+        eom = tilted_go2_eom()
+        J_Minv = eom.J @ np.linalg.inv(eom.M)
+        constant = b * eom.b + h * J_Minv @ eom.h
+        both = np.column_stack([constant, tau * J_Minv @ eom.S])
+        return np.asarray(np.linalg.solve(J_Minv @ eom.J.T, both))
 
     return {
-        "sign": torques(after=lambda eom, tau: -tau),
-        "transpose": lambda: -tilted_squeeze()[0].J[:, 6:] @ tilted_squeeze()[1],
-        "into_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation.T)),
-        "out_of_base": torques(lambda eom, f: _turned(f, eom.state.frame_pose("base").rotation)),
-        "standing": lambda: -standing_go2_eom().J[:, 6:].T @ tilted_squeeze()[1],
-        "h_too": torques(after=lambda eom, tau: tau + eom.h[6:]),
+        "b_missing": lambda: columns(b=0.0),
+        "b_sign": lambda: columns(b=-1.0),
+        "h_missing": lambda: columns(h=0.0),
+        "h_sign": lambda: columns(h=-1.0),
+        "constant_missing": lambda: columns(b=0.0, h=0.0),
+        "S_missing": lambda: columns(tau=0.0),
+        "Z_sign": lambda: columns(tau=1.0),
+        "all_signs": lambda: -columns(),
+        "constant_last": lambda: np.roll(columns(), -1, axis=1),
+        "standing": lambda: zeta_columns(standing_go2_eom()),
+        "zero": lambda: np.zeros((12, 13)),
     }
 
 
@@ -221,7 +225,7 @@ def _fault_of_directions(V: Array) -> Verdict | None:
 
 
 def judge_all_pairs(answer: Any) -> Verdict:
-    """Judge the matrix of exercise 03.4.
+    """Judge the matrix of exercise 03.3.
 
     The first column must be the shortest pair. The others may be any orthonormal basis of the null
     space.
@@ -254,7 +258,7 @@ def judge_all_pairs(answer: Any) -> Verdict:
 
 
 def unloading_examples() -> list[Example]:
-    """Return examples for exercise 03.3."""
+    """Return examples for exercise 03.2."""
     # forces whose sum and moment are zero
     wobble = np.array([0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 1.0])
     forces, squeezes = standing_forces(), internal_forces(standing_go2_eom())
@@ -270,7 +274,7 @@ def unloading_examples() -> list[Example]:
 
 
 def pair_examples() -> list[Example]:
-    """Return examples for exercise 03.4."""
+    """Return examples for exercise 03.3."""
     C, right_side = torque_force_matrix(rising_solo8_eom())
     (U, s, Vt), r = np.linalg.svd(C), rank(C)
     v, V = Vt[:r].T @ (U[:, :r].T @ right_side / s[:r]), Vt[r:].T

@@ -1,12 +1,12 @@
 """Lesson 04, One cost, many spaces."""
 
+from floatbase.lessons.lesson03 import tilted_go2_eom
 from floatbase.lessons.lesson04.exercises import EXERCISES
 from floatbase.lessons.lesson04.helpers import (
     DESIRED_ACCELERATION,
     MinimumCostController,
     measured_acceleration,
     rescaled_space,
-    tilted_go2_eom,
 )
 from floatbase.lessons.lesson04.pictures import (
     cost_slices,

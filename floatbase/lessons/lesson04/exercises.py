@@ -18,8 +18,8 @@ from floatbase.lessons.judges import (
     Verdict,
     minimiser_or_verdict,
 )
-from floatbase.lessons.lesson03 import standing_go2_eom
-from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, tilted_go2_eom
+from floatbase.lessons.lesson03 import standing_go2_eom, tilted_go2_eom
+from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION
 from floatbase.linear_algebra import rank
 from floatbase.objectives import tangential_bias
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +11,6 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion, FeasibleSpace
 from floatbase.lessons.controllers import TorqueCommand
-from floatbase.lessons.lesson03 import tilted_squeeze
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
 
@@ -86,14 +84,3 @@ def rescaled_space(space: FeasibleSpace, W: npt.ArrayLike) -> FeasibleSpace:
     return FeasibleSpace(
         space.eom, fb.Affine(np.linalg.solve(W, V), np.linalg.solve(W, v), space.map.blocks)
     )
-
-
-@cache
-def tilted_go2_eom() -> EquationsOfMotion:
-    """Return the equations of motion of go2 on four feet, tilted and moving.
-
-    Notes
-    -----
-    [FBR]_, eq. (7).
-    """
-    return tilted_squeeze()[0]
