@@ -13,7 +13,7 @@ from floatbase.lessons.rounding import rounded
 from floatbase.objectives import com_wrench_map
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, markers, plots, prefixed, shapes
-from floatbase.viewer.scene.colours import ALARM, COM, GREYS, hex_code
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 LEAST_FORCE, LEAST_MOMENT = 5e-3, 5e-4  # N, N·m: smaller values are shown as zero
 PLOT_RANGE = (-40.0, 100.0)  # N: after a fall, the planned forces are thousands of newtons
@@ -142,17 +142,18 @@ def plot_constrained_minimum() -> Figure:
     axis.contour(x, y, height, levels=14, colors=[hex_code(GREYS[2])], linewidths=0.8)
     axis.plot(*cost.minimiser(), "x", color=hex_code(GREYS[1]), label="minimum of the cost")
     ends = np.array([line([-3.5]), line([3.5])])
-    axis.plot(*ends.T, color=hex_code(GREYS[0]), linewidth=2.5, label="constraint")
+    axis.plot(*ends.T, color=hex_code(GREYS[1]), linewidth=3.0, label="constraint")
     axis.plot(*best, "o", color=hex_code(GREYS[0]), markersize=9, label="constrained minimum")
-    arrow = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "zorder": 4}
-    for i, point in enumerate((best, best + 1.2 * along)):
-        downhill = -0.45 * (cost.H @ point + cost.g)
-        part = along * (along @ downhill)
-        name = "downhill (minus the slope)" if i == 0 else None
-        axis.quiver(*point, *downhill, color=hex_code(COM), label=name, **arrow)
-        if i:
-            name = "its part along the constraint"
-            axis.quiver(*point, *part, color=hex_code(ALARM), label=name, **arrow)
+    arrow = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.011, "zorder": 4}
+    dark = hex_code(GREYS[0])
+    others = np.array([best, best + 1.2 * along])
+    downhill = -0.45 * (others @ cost.H + cost.g)
+    part = along * (along @ downhill[1])
+    axis.quiver(*others.T, *downhill.T, color=dark, label="downhill (minus the slope)", **arrow)
+    axis.quiver(
+        *others[1], *part, facecolor="white", edgecolor=dark, linewidth=1.2,
+        label="its part along the constraint", **arrow,
+    )  # fmt: skip
     axis.set(xlim=(-2.2, 3.0), ylim=(-1.4, 2.4), aspect="equal", xlabel="β₁", ylabel="β₂")
     axis.legend(loc="lower left", fontsize="small")
     plt.close(figure)
