@@ -16,7 +16,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import floatbase as fb
-from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04
+from floatbase.lessons import ConstantTorques, lesson02, lesson03, lesson04, lesson05
 from floatbase.lessons.publish import NOTEBOOKS, read_notebook
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import (
@@ -78,9 +78,9 @@ def lines(figure: Figure) -> set[str]:
         lambda: lesson02.draw_equation(lesson03.standing_go2_eom()),
         lambda: lesson03.matrix_picture(np.eye(4), {"rows": 4}, {"q̈": 1, "λ": 3}),
         lambda: lesson04.cost_slices(bowl=(BOWL, "x", "y", 2.0)),
-        lambda: lesson04.effort_picture({name: ([0, 1], [0, 1]) for name in "abc"}),
+        lesson05.plot_constrained_minimum,
     ],
-    ids=["equation", "matrix", "slices", "effort"],
+    ids=["equation", "matrix", "slices", "minimum"],
 )
 def test_a_figure_of_anything_but_forces_has_no_colour_of_a_force_or_a_cone(
     draw: Callable[[], Figure],

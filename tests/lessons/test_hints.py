@@ -113,13 +113,12 @@ def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(
     assert NumericJudge(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
 
 
-@pytest.mark.parametrize(("name", "count"), [("04.2", -6), ("02.1", (8, 13))])
+@pytest.mark.parametrize(("name", "count"), [("02.1", (8, 13)), ("02.1", (8.5, 12))])
 def test_a_wrong_count_is_told_to_say_what_it_counts(name: str, count: Any) -> None:
     assert EXERCISES[name].judge(count).hint == "unknown_count"
 
 
-@pytest.mark.parametrize("name", ["04.3", "05.4"])
-def test_a_cost_is_told_from_what_is_none(name: str) -> None:
-    cost = next(answer for answer, hint in examples(name) if not hint)
-    assert EXERCISES[name].judge(cost.minimiser()).hint == "no_cost"
-    assert EXERCISES[name].judge(-1.0 * cost).hint == "no_least_point"
+def test_a_cost_is_told_from_what_is_none() -> None:
+    cost = next(answer for answer, hint in examples("04.3") if not hint)
+    assert EXERCISES["04.3"].judge(cost.minimiser()).hint == "no_cost"
+    assert EXERCISES["04.3"].judge(-1.0 * cost).hint == "no_least_point"

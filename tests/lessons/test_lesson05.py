@@ -9,16 +9,21 @@ import pytest
 from hints import right
 
 import floatbase as fb
+from floatbase.control import AnalyticController
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson05 import (
     ConstantForceController,
     com_in_base,
     friction_ratios,
+    moving_and_goal_state,
+    plot_constrained_minimum,
     show_forces,
     show_moved_com,
     stretched_arm_state,
 )
+from floatbase.lessons.lesson05.verdicts import inclined_design
 from floatbase.objectives import (
+    com_wrench_map,
     normal_bias,
     tangential_bias,
     wrench_objective,
@@ -26,27 +31,35 @@ from floatbase.objectives import (
 
 GO2 = fb.load("go2")
 EOM = standing_go2_eom()
-FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.4
-COST = wrench_objective(EOM.state, EOM.contacts, FORCE, [0.0, 0.0, 0.0])
+FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.3
 ROUNDING = 1e-9  # of forces of 100 N and levers of 1 m
 
 
-def leaning(weight: float = 1e-3, direction: Any = FORCE) -> fb.Quadratic:
-    """The wish, and friction counted from another direction than the ground's normal."""
-    normals = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
-    return COST + weight * tangential_bias(fb.Contacts.points(GO2, normals=normals))
-
-
-def test_05_4_is_out_of_reach_of_weights() -> None:
-    """No α and no weight of (23) keeps both the wish and the lean, whatever the normal force it
-    prefers.
+def test_05_3_is_out_of_reach_of_weights() -> None:
+    """No α and no weight of (23) keeps both the wrench and the friction ratios, whatever the normal
+    force it prefers.
     """
-    tangential = tangential_bias(EOM.contacts)
+    tangential, no_moment = tangential_bias(EOM.contacts), [0.0, 0.0, 0.0]
     for a in (0.0, 20.0, GO2.weight / 4, 60.0):
         normal = normal_bias(EOM.contacts, a)
         for alpha in (0.0, 0.01, 0.1, 1.0, 10.0):
             for weight in 10.0 ** np.arange(-4.0, 2.0, 0.5):
-                assert not right("05.4", COST + weight * (tangential + alpha * normal))
+                preference = weight * (tangential + alpha * normal)
+
+                def design(force: Any, preference: fb.Quadratic = preference) -> fb.Quadratic:
+                    goal = wrench_objective(EOM.state, EOM.contacts, force, no_moment)
+                    return goal + preference
+
+                assert not right("05.3", design)
+
+
+def test_the_wrench_of_05_1_is_that_of_the_controller() -> None:
+    """Its cost on the forces is zero where they give that wrench, but for (23)."""
+    now, goal = moving_and_goal_state()
+    controller = AnalyticController(GO2, EOM.contacts, goal, bias_weight=1e-12)
+    cost = controller.objective(fb.equations_of_motion(now, EOM.contacts))[2]
+    wrench = com_wrench_map(now, EOM.contacts)(cost.minimiser())
+    assert right("05.1", lambda *_: np.split(wrench, 2))
 
 
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
@@ -72,7 +85,7 @@ def test_the_arm_takes_the_centre_of_mass_along() -> None:
 
 
 def test_given_forces_are_measured_on_the_physics() -> None:
-    forces = leaning().minimiser()
+    forces = inclined_design()(FORCE).minimiser()
     record = fb.rollout(
         fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1
     )
@@ -86,7 +99,7 @@ def test_given_forces_are_measured_on_the_physics() -> None:
 def test_the_pictures_are_drawn() -> None:
     view = fb.Viewer(GO2)
     try:
-        forces = leaning().minimiser()
+        forces = inclined_design()(FORCE).minimiser()
         note = show_forces(view, EOM.state, EOM.contacts, forces, wish=[60, 0, 0])
         assert "(60, 0, 0) N" in note and "(0, 0, 0) N·m" in note
         assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.renderer.picture}
@@ -96,6 +109,7 @@ def test_the_pictures_are_drawn() -> None:
         )
     finally:
         view.close()
+    assert len(plot_constrained_minimum().axes) == 1
     arm_view = fb.Viewer(stretched_arm_state(0.0).robot)
     try:
         drawn = show_moved_com(

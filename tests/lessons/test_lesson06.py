@@ -11,11 +11,13 @@ import pytest
 import floatbase as fb
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron, wrench_set
+from floatbase.lessons.lesson04 import measured_acceleration
+from floatbase.lessons.lesson05 import friction_ratios
 from floatbase.lessons.lesson06 import (
     ConeController,
+    accelerate,
     compass_row,
     constrained_minimiser,
-    friction_ratios,
     make_controller,
     region_picture,
     show_force,
@@ -116,10 +118,24 @@ def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
         state_with_feet_at(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
 
 
-def test_lean_is_the_tangent_of_the_angle_to_the_normal() -> None:
+def test_a_slope_has_the_normal_of_its_angle() -> None:
     assert np.allclose(slope_normal(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
-    assert np.allclose(friction_ratios([0, 0, 50.0, 30.0, 0, 40.0], UP), [0.0, 0.75])
-    assert np.allclose(friction_ratios([0, 0, 50.0], slope_normal(20)), np.tan(np.deg2rad(20)))
+
+
+def test_a_limit_of_the_smallest_cost_can_be_any_number() -> None:
+    cost = fb.Quadratic.from_residual(np.eye(2), [3.0, 4.0])
+    found = constrained_minimiser(cost, np.eye(2), [-1.0, 5.0])
+    assert np.allclose(found, [-1.0, 4.0], atol=SOLVED)
+    assert np.allclose(constrained_minimiser(cost, np.eye(2), 2.0), [2.0, 2.0], atol=SOLVED)
+
+
+def test_a_requested_acceleration_is_measured_where_friction_allows_it() -> None:
+    record = accelerate([1.0, 0.0, 0.0])
+    assert measured_acceleration(record)[0] == pytest.approx(1.0, rel=0.05)
+    # the controller believes in more friction than the floor has
+    wet = accelerate([4.0, 0.0, 0.0], mu=0.7, floor=0.2, facets=8)
+    planned = friction_ratios(fb.Contacts.points(wet.robot), wet.planned[0])
+    assert planned.max() > 0.3 and wet.slip().max() > 0.01
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from floatbase.lessons.lesson04.helpers import (
 )
 from floatbase.lessons.lesson04.pictures import (
     cost_slices,
-    effort_picture,
     level_curves,
     show_torques,
 )
@@ -20,7 +19,6 @@ __all__ = [
     "EXERCISES",
     "MinimumCostController",
     "cost_slices",
-    "effort_picture",
     "level_curves",
     "measured_acceleration",
     "rescaled_space",

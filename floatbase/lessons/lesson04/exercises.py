@@ -9,19 +9,23 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.dynamics import EquationsOfMotion, internal_forces
+from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
     NumericJudge,
     ShapeJudge,
     Verdict,
+    array_or_verdict,
+    function_or_verdict,
     minimiser_or_verdict,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom, tilted_go2_eom
-from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION
-from floatbase.linear_algebra import rank
+from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, MinimumCostController
 from floatbase.objectives import tangential_bias
+from floatbase.simulation import Rollout
+
+# 04.1 ---------------------------------------------------------------------------------------------
 
 
 def _gradient_by_newton() -> Array:
@@ -79,37 +83,96 @@ def _gradient_of_standing() -> Array:
     return cost.pullback(fb.accelerations_from_torques(tilted_go2_eom())).g
 
 
-def _flat_on_three_feet() -> int:
-    """Count the flat directions of com + turn on three feet, in τ.
+# 04.2 ---------------------------------------------------------------------------------------------
 
-    β has the same dimension as τ there, since J has full rank.
-    """
-    state = standing_go2_eom().state
-    return _unseen_by(np.vstack([state.com_jacobian, state.frame_jacobian("base")[3:]]))
-
-
-def _flat_for_com() -> int:
-    return _unseen_by(standing_go2_eom().state.com_jacobian)
+TARGET = np.array([0.0, 0.02, 0.0])  # m: from where the centre of mass stands
+RUN, PUSH_START = 2.0, 1.0  # s
+PUSH = 30.0  # N, for 0.1 s
+ARRIVED, AT_REST = 0.001, 0.01  # m and m/s: largest error and speed at the end
 
 
-def _unseen_by(rows: Array) -> int:
-    eta = fb.accelerations_from_torques(_three_feet_eom())
-    return eta.n_in - rank(rows @ eta.A)
+def judge_feedback(answer: Any) -> Verdict:
+    """Judge a function of the state that returns a desired acceleration, in simulation."""
+    program = function_or_verdict(answer)
+    if isinstance(program, Verdict):
+        return program
+    robot, contacts = standing_go2_eom().robot, standing_go2_eom().contacts
+    costs = _lesson_costs()
+
+    def cost(eom: EquationsOfMotion) -> fb.Quadratic:
+        state, eta = eom.state, fb.accelerations_from_torques(eom)
+        a = np.asarray(program(state), dtype=np.float64)
+        com = fb.Quadratic.from_residual(state.com_jacobian, a - state.com_drift)
+        turn = fb.Quadratic.from_residual(
+            state.frame_jacobian("base")[3:], -state.frame_drift("base")[3:]
+        )
+        return (com + turn).pullback(eta) + 1e-4 * costs["effort"]
+
+    controller = MinimumCostController(robot, contacts, cost)
+    push = fb.Push([0.0, PUSH, 0.0], start=PUSH_START, duration=0.1)
+    try:
+        first = array_or_verdict(program(standing_go2_eom().state), (3,))
+        if isinstance(first, Verdict):
+            return first
+        record = fb.rollout(fb.Simulation(robot), controller, RUN, [push], control_period=0.005)
+    except Exception as error:  # whatever a learner's function raises
+        return Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
+    return _parked(record)
 
 
-def _squeezes_on_three_feet() -> int:
-    return internal_forces(_three_feet_eom()).shape[1]
+def _parked(record: Rollout) -> Verdict:
+    """Judge where the centre of mass is at the end of a run."""
+    error = record.final.com - standing_go2_eom().state.com - TARGET
+    missed, speed = np.linalg.norm(error), np.linalg.norm(record.final.com_velocity)
+    if record.outcome != "completed":
+        return Verdict(
+            False,
+            f"go2 falls after {record.time[-1]:.2f} s. Which sign pulls it back to the target, and "
+            f"which sign slows it down?",
+            "falls",
+        )
+    left = f"{1000 * missed:.1f} mm from the target, with {1000 * speed:.0f} mm/s"
+    if speed > AT_REST:
+        return Verdict(
+            False,
+            f"The centre of mass does not come to rest: it is {left}. Add a damper, a term with "
+            f"the velocity.",
+            "swings",
+        )
+    if abs(missed - np.linalg.norm(TARGET)) < ARRIVED:
+        return Verdict(
+            False,
+            "The centre of mass stays where it was. Does your function depend on `target`?",
+            "stays",
+        )
+    if missed > ARRIVED:
+        return Verdict(
+            False,
+            f"At the end the centre of mass is {left}. Use a stiffer spring, or the position "
+            f"relative to `target`.",
+            "misses",
+        )
+    return Verdict(
+        True,
+        f"go2 arrives within {1000 * missed:.2f} mm and comes back after the push. This is a "
+        f"feedback controller.",
+    )
 
 
-def _three_feet_eom() -> EquationsOfMotion:
-    """Return the equations of motion of go2 standing on all feet except FL.
+def _feedbacks() -> list[Example]:
+    """Return examples for exercise 04.2."""
+    start = standing_go2_eom().state.com
 
-    Notes
-    -----
-    [FBR]_, eq. (7).
-    """
-    standing = standing_go2_eom()
-    return fb.equations_of_motion(standing.state, standing.contacts.without("FL_foot"))
+    def feedback(kp: float, kd: float, target: Any = TARGET) -> Callable[[fb.State], Array]:
+        return lambda now: -kp * (now.com - start - target) - kd * now.com_velocity
+
+    return [
+        (feedback(100.0, 20.0), ""), (feedback(60.0, 12.0), ""),
+        (feedback(-100.0, 20.0), "falls"), (feedback(100.0, -20.0), "falls"),
+        (feedback(100.0, 0.0), "swings"), (feedback(100.0, 20.0, np.zeros(3)), "stays"),
+        (feedback(100.0, 20.0, 2.5 * TARGET), "misses"),
+        (lambda now: now.position, "stops"), (lambda now: 0.5, "shape"),
+    ]  # fmt: skip
 
 
 def _lesson_costs() -> dict[str, Any]:
@@ -124,6 +187,9 @@ def _lesson_costs() -> dict[str, Any]:
         "turn": fb.Quadratic.from_residual(J, -drift),
         "effort": fb.Quadratic.from_residual(np.eye(12), np.zeros(12)),
     }
+
+
+# 04.3 ---------------------------------------------------------------------------------------------
 
 
 def _judge_design(answer: Any) -> Verdict:
@@ -237,41 +303,17 @@ EXERCISES = (
     ),
     Exercise(
         name="04.2",
-        statement="On three feet, com + turn has flat directions in β. How many independent "
-        "ones of them move the free foot?",
-        stub="moving = 6  # replace this number by what you find",
-        solution="three = fb.feasible_space(fb.equations_of_motion(state, "
-        'contacts.without("FL_foot")))\n'
-        "flat = null_space((com + turn).pullback(three.qdd).H)\n"
-        'moving = rank(state.frame_jacobian("FL_foot")[:3] @ three.qdd.A @ flat)',
-        judge=NumericJudge(
-            is_count=True,
-            right=lambda: _flat_on_three_feet() - _squeezes_on_three_feet(),
-            praise="Three feet have three internal forces. The other three flat directions move "
-            "the free foot wherever you like.",
-            mistakes={
-                "all_flat": _flat_on_three_feet,
-                "com_alone": _flat_for_com,
-                "none": lambda: 0,
-                "one": lambda: 1,
-                "two": lambda: 2,
-                "all": lambda: _three_feet_eom().d,
-            },
-            hints={
-                "all_flat": "Those are all flat directions. Do three feet still have internal "
-                "forces, and what do these move?",
-                "com_alone": "That is the number of flat directions for `com` alone, or with "
-                "internal forces counted twice. For com + turn it is six.",
-                "none": "Does a free foot have to stay in place? Neither cost depends on it.",
-                "one": "It is one foot, but a foot can move in more than one direction.",
-                "two": "Upwards is a direction, too: the ground is not in the way.",
-                "all": "That is all of β. Directions along which the costs are curved do not "
-                "count.",
-            },
-        ),
-        explanation="Three feet have 9 force components, and 9 - 6 = 3 directions are internal "
-        "forces. They are flat and move nothing. The other 3 move the free foot wherever you "
-        "like. Base and legs follow, so that both goals are still met.",
+        statement="A function of the state that returns the desired acceleration of the centre of "
+        "mass, shape (3,), m/s², world, which brings it to `target` and keeps it there.",
+        stub="def go_and_stay(now):\n"
+        "    return np.array([0, 0.5, 0])  # m/s², world; change it, with now and target",
+        solution="def go_and_stay(now):\n"
+        "    return -100 * (now.com - target) - 20 * now.com_velocity",
+        judge=judge_feedback,
+        namespace=lambda: {"target": standing_go2_eom().state.com + TARGET},
+        examples=_feedbacks,
+        explanation="A spring pulls the centre of mass to the target, and a damper brings it to "
+        "rest. With 100 1/s², 20 1/s is the least damping without oscillation.",
     ),
     Exercise(
         name="04.3",

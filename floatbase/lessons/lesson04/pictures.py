@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
@@ -133,30 +131,3 @@ def level_curves(
     drawn += svg.text((130, 278), f"{x_name}, ± {half:g}")
     drawn += svg.upright_text((-10, 130), f"{y_name}, ± {half:g}")
     return svg.drawing(drawn, 310, "-40 0 310 290")
-
-
-def effort_picture(curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]]) -> Figure:
-    """Plot the effort against the acceleration to the left.
-
-    Parameters
-    ----------
-    curves : mapping of str to tuple
-        For each name: accelerations [m/s²] and efforts [(N·m)²].
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
-    figure, ax = plt.subplots(figsize=(6.5, 3.6), layout="constrained")
-    for (name, (x, y)), colour, style in zip(curves.items(), GREYS, ("-", "--", ":"), strict=False):
-        ax.plot(x, y, style, color=hex_code(colour), label=name, linewidth=2)
-    ax.set(
-        xlabel="acceleration of the base to the left [m/s²]",
-        ylabel="½‖τ‖² [(N·m)²]",
-        ylim=(0, None),
-    )
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure

@@ -7,12 +7,18 @@ from floatbase.lessons.lesson05.helpers import (
     com_in_base,
     friction_ratios,
     make_controller,
+    moving_and_goal_state,
+    rotation_error,
     squeeze_forces,
     squeezed_standing_forces,
     stretched_arm_state,
-    three_feet_eom,
 )
-from floatbase.lessons.lesson05.pictures import plot_planned_pull, show_forces, show_moved_com
+from floatbase.lessons.lesson05.pictures import (
+    plot_constrained_minimum,
+    plot_planned_pull,
+    show_forces,
+    show_moved_com,
+)
 
 __all__ = [
     "EXERCISES",
@@ -21,11 +27,13 @@ __all__ = [
     "com_in_base",
     "friction_ratios",
     "make_controller",
+    "moving_and_goal_state",
+    "plot_constrained_minimum",
     "plot_planned_pull",
+    "rotation_error",
     "show_forces",
     "show_moved_com",
     "squeeze_forces",
     "squeezed_standing_forces",
     "stretched_arm_state",
-    "three_feet_eom",
 ]  # fmt: skip

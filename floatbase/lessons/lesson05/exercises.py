@@ -10,88 +10,38 @@ from floatbase.lessons.lesson05.helpers import (
 )
 from floatbase.lessons.lesson05.verdicts import (
     design_examples,
-    force_by_momentum,
-    force_mistakes,
     judge_design,
-    moment_mistakes,
-    moments_by_jacobian,
+    judge_wrench,
     smallest_by_zeta,
     stub_names,
     torque_mistakes,
+    wrench_examples,
 )
 
 EXERCISES = (
     Exercise(
         name="05.1",
-        statement="G_τ of (21) for three feet, shape (3, 9), from `x_feet` (3, 3) and `x_com` "
-        "(3,), m, world.",
-        stub="G_three = np.zeros((3, 9))  # replace: from x_feet and x_com",
-        solution="x_feet = three_feet_eom().contacts.positions(three_feet_eom().state)\n"
-        "x_com = three_feet_eom().state.com\n"
-        "levers = x_feet - x_com\n"
-        "G_three = np.hstack([np.cross(lever, np.eye(3)).T for lever in levers])",
-        judge=ShapeJudge(
-            NumericJudge(
-                right=moments_by_jacobian,
-                praise="One block for each foot. The base rows of J give the same matrix.",
-                mistakes=moment_mistakes(),
-                hints={
-                    "zero": "There is no answer yet. A foot beside the centre of mass has a "
-                    "lever arm.",
-                    "sign": "This is the opposite moment. The lever arm points from x_c to the "
-                    "foot, and r × x, r × y, r × z are columns, not rows.",
-                    "about_base": "These are moments about the base's origin, but x_c is "
-                    "another point.",
-                    "about_origin": "These are moments about the world's origin. Subtract x_c.",
-                    "millimetres": "The unit is wrong: this is in N·mm. Lengths are in m.",
-                    "reversed": "The blocks are right, but in the opposite order. λ begins with "
-                    "the first row of `x_feet`.",
-                    "order": "The blocks are right, but in the wrong order. λ has the feet in "
-                    "the order of `x_feet`.",
-                },
-            ),
-            {
-                (3, 12): "Twelve columns are for four feet. FL is in the air.",
-                (9, 3): "The blocks must be side by side, not below each other: use `np.hstack`.",
-                (
-                    3,
-                    3,
-                ): "The blocks must be side by side. Their sum would mean one common force for "
-                "all feet.",
-                (3,): "That is a moment. G_τ is the matrix that maps λ to the moment.",
-            },
-        ),
-        explanation="In (21) the columns of a block are r × x, r × y and r × z with r = x_i - x_c.",
+        statement="The desired wrench of a controller: a function of the actual and the desired "
+        "state that returns f̃_c [N] and τ̃_c [N·m], each of shape (3,), world frame.",
+        stub="def desired_wrench(now, goal):\n"
+        "    force = np.array([0, 0, robot.weight])  # change both\n"
+        "    moment = np.zeros(3)\n"
+        "    return force, moment",
+        solution="def desired_wrench(now, goal):\n"
+        "    weight = np.array([0, 0, robot.weight])\n"
+        "    a = -100 * (now.com - goal.com) - 20 * now.com_velocity\n"
+        '    omega = now.frame_velocity("base")[3:]\n'
+        "    turn = -100 * rotation_error(now, goal) - 20 * omega\n"
+        "    return robot.mass * a + weight, centroidal_inertia(now) @ turn",
+        judge=judge_wrench,
+        namespace=lambda: {"robot": standing_go2_eom().robot},
+        examples=wrench_examples,
+        explanation="By Newton's law, m a = f_c + m g with g pointing down. The moment is the rate "
+        "of the angular momentum, for locked joints and slow rotation. `desired_wrench(state, a, "
+        "rate)` of floatbase.objectives computes both.",
     ),
     Exercise(
         name="05.2",
-        statement="f̃_c, shape (3,), N, world, for go2 to accelerate by 0.5 m/s² forwards and 1 "
-        "m/s² upwards.",
-        stub="f_wish = np.array([0, 0, robot.weight])  # replace",
-        solution="f_wish = robot.mass * np.array([0.5, 0, 1.0]) + np.array([0, 0, robot.weight])",
-        judge=NumericJudge(
-            right=force_by_momentum,
-            praise="m a plus m g: gravity is the only external force that is not in λ.",
-            mistakes=force_mistakes(),
-            hints={
-                "weight_alone": "That holds the robot still. Add the force that accelerates it.",
-                "no_gravity": "Gravity is missing. The ground must carry the weight, too.",
-                "gravity_sign": "The sign of gravity is wrong. Gravity pulls down, so the "
-                "ground must push up harder.",
-                "weight_twice": "The weight is counted twice.",
-                "no_mass": "The mass is missing: these are m/s², not N.",
-                "no_mass_on_a": "The mass is missing in one of the two terms.",
-                "g_without_mass": "9.81 is an acceleration. Multiply it by the mass to get a "
-                "force.",
-                "weight_times_a": "This is weight times acceleration. The weight already is m g.",
-            },
-        ),
-        namespace=lambda: {"robot": standing_go2_eom().robot},
-        explanation="By Newton's law, m a = f_c + m g with g pointing down. "
-        "`desired_wrench(state, a)` of floatbase.objectives computes f_c.",
-    ),
-    Exercise(
-        name="05.3",
         statement="The smallest torques, shape (18,), N·m, that give anymal_kinova's feet the "
         "contact forces `pressed`.",
         stub="tau_pressed = np.zeros(18)  # replace: from C_tau, C_forces, a and pressed",
@@ -133,20 +83,24 @@ EXERCISES = (
         "is not needed.",
     ),
     Exercise(
-        name="05.4",
-        statement="A cost on λ for a force of 60 N forwards in addition to the weight, within 1 "
-        "N and 0.1 N·m. At every foot the tangential force must be at most 0.5 times the normal "
-        "force.",
-        stub="design = cost60 + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
-        solution="whole = np.array([60, 0, robot.weight])  # where all forces together point\n"
-        "leaning = fb.Contacts.points(robot, normals=whole / np.linalg.norm(whole))\n"
-        "design = cost60 + 1e-3 * tangential_bias(leaning)",
+        name="05.3",
+        statement="A function of the desired total force [N] that returns a cost on λ. At its "
+        "minimum, the wrench is that force within 1 N and 0.1 N·m, and at every foot the "
+        "tangential force is at most 0.5 times the normal force.",
+        stub="def design(force):  # N, world, with the weight\n"
+        "    goal = wrench_objective(state, contacts, force, np.zeros(3))\n"
+        "    return goal + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
+        solution="def design(force):  # N, world, with the weight\n"
+        "    goal = wrench_objective(state, contacts, force, np.zeros(3))\n"
+        "    direction = force / np.linalg.norm(force)  # of all forces together\n"
+        "    inclined = fb.Contacts.points(robot, normals=direction)\n"
+        "    return goal + 1e-3 * tangential_bias(inclined)",
         judge=judge_design,
         namespace=stub_names,
         examples=design_examples,
         explanation="(23) prefers forces without friction, and distributes the friction "
         "equally. Where friction is the goal, the direction of the total force is a better "
         "preference. Then the force at each foot has the same direction as the sum, with a "
-        "ratio of 60 / 158.",
+        "ratio of 60 / 158 in the first case.",
     ),
 )

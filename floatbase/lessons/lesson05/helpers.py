@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 import floatbase as fb
 from floatbase._validation import Array, as_array, as_forces
@@ -129,18 +130,31 @@ class ConstantForceController:
         return TorqueCommand(torques_from_forces(eom).torque(self.forces), self.forces)
 
 
-@cache
-def three_feet_eom() -> EquationsOfMotion:
-    """Return the equations of motion of go2, tilted and moving, on all feet except FL.
+def rotation_error(now: fb.State, goal: fb.State) -> Array:
+    """Return the rotation vector from the base's orientation in one state to that in another.
 
-    Notes
-    -----
-    [FBR]_, eq. (7).
+    Parameters
+    ----------
+    now, goal : State
+        The actual and the desired state.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Rotation vector θ of the actual orientation relative to the desired one, in the world frame
+        [rad].
     """
-    robot = fb.load("go2")
-    return fb.equations_of_motion(
-        robot.random_state(4), fb.Contacts.points(robot, mu=0.7).without("FL_foot")
-    )
+    R, R_goal = (state.frame_pose("base").rotation for state in (now, goal))
+    return np.asarray(pin.log3(R @ R_goal.T))
+
+
+@cache
+def moving_and_goal_state() -> tuple[fb.State, fb.State]:
+    """Return go2 displaced, tilted and moving, and its standing state: test case of 05.1."""
+    goal = fb.load("go2").standing()
+    displacement, v = np.random.default_rng(5).normal(size=(2, goal.robot.nv))
+    q = pin.integrate(goal.robot.model, goal.q, 0.1 * displacement)
+    return fb.State(goal.robot, q, 0.3 * v), goal
 
 
 @cache
@@ -156,7 +170,7 @@ def arm_robot_eom() -> EquationsOfMotion:
 
 
 def squeezed_standing_forces() -> Array:
-    """Return the contact forces of exercise 05.3, shape (12,), world frame [N].
+    """Return the contact forces of exercise 05.2, shape (12,), world frame [N].
 
     The forces are those of standing still, with an internal force of 20 N between the front feet.
     """

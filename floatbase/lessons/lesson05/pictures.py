@@ -118,3 +118,43 @@ def plot_planned_pull(record: Rollout, until: float) -> Figure:
     axis.legend(loc="lower left", fontsize="small")
     plt.close(figure)
     return figure
+
+
+def plot_constrained_minimum() -> Figure:
+    """Plot a cost of two variables, a linear constraint, and the slope at two of its points.
+
+    At the constrained minimum, the downhill direction is along the normal of the constraint. At
+    every other point of the constraint, a part of the downhill direction is along the constraint.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
+    cost = fb.Quadratic.from_residual([[1.0, 0.3], [0.0, 1.4]], [1.6, 2.4])
+    normal, along = np.array([1.0, 1.0]) / np.sqrt(2), np.array([1.0, -1.0]) / np.sqrt(2)
+    line = fb.Affine(along[:, None], 0.4 * normal)  # distance along the constraint -> point
+    best = line(cost.pullback(line).minimiser())
+    figure, axis = plt.subplots(figsize=(6.0, 4.4), layout="constrained")
+    x, y = np.meshgrid(np.linspace(-2.2, 3.0, 80), np.linspace(-1.4, 2.4, 80))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    height = np.array([cost(point) for point in points]).reshape(x.shape)
+    axis.contour(x, y, height, levels=14, colors=[hex_code(GREYS[2])], linewidths=0.8)
+    axis.plot(*cost.minimiser(), "x", color=hex_code(GREYS[1]), label="minimum of the cost")
+    ends = np.array([line([-3.5]), line([3.5])])
+    axis.plot(*ends.T, color=hex_code(GREYS[1]), linewidth=3.0, label="constraint")
+    axis.plot(*best, "o", color=hex_code(GREYS[0]), markersize=9, label="constrained minimum")
+    arrow = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.011, "zorder": 4}
+    dark = hex_code(GREYS[0])
+    others = np.array([best, best + 1.2 * along])
+    downhill = -0.45 * (others @ cost.H + cost.g)
+    part = along * (along @ downhill[1])
+    axis.quiver(*others.T, *downhill.T, color=dark, label="downhill (minus the slope)", **arrow)
+    axis.quiver(
+        *others[1], *part, facecolor="white", edgecolor=dark, linewidth=1.2,
+        label="its part along the constraint", **arrow,
+    )  # fmt: skip
+    axis.set(xlim=(-2.2, 3.0), ylim=(-1.4, 2.4), aspect="equal", xlabel="β₁", ylabel="β₂")
+    axis.legend(loc="lower left", fontsize="small")
+    plt.close(figure)
+    return figure

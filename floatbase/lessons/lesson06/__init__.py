@@ -3,6 +3,7 @@
 from floatbase.lessons.lesson06.exercises import EXERCISES, stance_on_hill
 from floatbase.lessons.lesson06.helpers import (
     ConeController,
+    accelerate,
     com_beside_feet,
     constrained_minimiser,
     make_controller,
@@ -10,9 +11,7 @@ from floatbase.lessons.lesson06.helpers import (
 )
 from floatbase.lessons.lesson06.pictures import (
     SINGLE_FOOT_VIEW,
-    TOP_VIEW,
     compass_row,
-    friction_ratios,
     region_picture,
     show_force,
     show_polyhedron,
@@ -24,12 +23,11 @@ from floatbase.lessons.lesson06.pictures import (
 __all__ = [
     "EXERCISES",
     "SINGLE_FOOT_VIEW",
-    "TOP_VIEW",
     "ConeController",
+    "accelerate",
     "com_beside_feet",
     "compass_row",
     "constrained_minimiser",
-    "friction_ratios",
     "make_controller",
     "region_picture",
     "show_force",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
 
 import floatbase as fb
 from floatbase._validation import Array
@@ -25,10 +26,27 @@ from floatbase.objectives import com_wrench_map
 # of exercise 06.1: normal, not a unit vector; μ; number of facets
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5
 FACETS, MU = 8, 0.7  # of exercise 06.2
-LOSS = 0.05  # of exercise 06.3
-HILL, MARGIN = 20.0, 3.0  # of exercise 06.4: degrees; N
-BALANCE = 0.1  # N, and N·m: tolerance of the balance in exercise 06.4
-SOLVED = 1e-3  # N: tolerance of the margin in exercise 06.4, for any solver
+HILL, MARGIN = 20.0, 9.0  # of exercise 06.3: degrees; N
+BALANCE = 0.1  # N, and N·m: tolerance of the balance in exercise 06.3
+SOLVED = 1e-3  # N: tolerance of the margin in exercise 06.3, for any solver
+
+
+class _HalfSpaceJudge(NumericJudge):
+    """Judge of half-spaces rows @ f ≤ 0, whatever their order and the scale of each row."""
+
+    def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
+        a, b = (self._of_unit_tangents(np.asarray(x, dtype=np.float64)) for x in (a, b))
+        if a.shape != b.shape:
+            return False
+        distances = np.max(np.abs(a[:, None] - b[None]), axis=2)
+        return bool(np.max(distances[linear_sum_assignment(distances)]) <= max(tolerance, 1e-3))
+
+    @staticmethod
+    def _of_unit_tangents(rows: Array) -> Array:
+        """Scale each row so that its part along the surface has length one, if there is one."""
+        n = BANK / np.linalg.norm(BANK)
+        lengths = np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)
+        return rows / np.where(lengths > 1e-9, lengths, 1.0)[:, None]
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
@@ -56,38 +74,16 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
     return low
 
 
-def _fewest(lost: Any) -> int:
-    """Return the smallest number of facets that loses less than `LOSS`.
-
-    lost: number of facets -> fraction that is lost.
-    """
-    return next(n for n in range(3, 100) if lost(n) < LOSS)
-
-
-def _lost_force(facets: int, inside: bool = True) -> float:
-    """Return the fraction of μ that is lost in the middle of a facet.
-
-    The result follows from the largest tangential force along t1.
-    """
-    cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets, inside)
-    leans = np.linalg.norm(cone.rays[0, :2]) if not inside else 1.0 + cone.margin([1.0, 0.0, 1.0])
-    return abs(1.0 - float(leans))
-
-
-def _lost_area(facets: int) -> float:
-    return 1.0 - FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), 1.0, facets).area_ratio
-
-
 @cache
 def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
-    """Return go2 standing on the slope of exercise 06.4, and its contacts."""
+    """Return go2 standing on the slope of exercise 06.3, and its contacts."""
     robot, n = fb.load("go2"), slope_normal(HILL)
     return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
 
 
 @array_judge((12,))
 def _judge_forces(given: Array) -> Verdict:
-    """Judge forces for exercise 06.4 by their sum, moment and margins."""
+    """Judge forces for exercise 06.3 by their sum, moment and margins."""
     f = given.reshape(4, 3)
     return _out_of_balance(f) or _judge_margins(f)
 
@@ -144,6 +140,13 @@ def _judge_margins(f: Array) -> Verdict:
             True,
             f"The forces are balanced. The smallest margin is {margins.min():.1f} N.",
         )
+    if np.abs(f[:, :2]).max() < BALANCE and margins.min() >= -BALANCE:
+        return Verdict(
+            False,
+            f"Vertical forces are balanced and inside their cones, but {least} only. Internal "
+            f"forces can give some of the front feet's tangential force to the rear feet.",
+            "upright",
+        )
     if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
         return Verdict(
             False,
@@ -176,6 +179,16 @@ def _in_balance(facets: int, room: float) -> Array:
     return fb.solve(fb.QP(np.eye(12), np.zeros(12), *balance, rows, np.full(len(rows), -room))).x
 
 
+def _vertical() -> Array:
+    """Return vertical forces that carry go2 on the hill, equal at both feet of a pair."""
+    state, contacts = stance_on_hill()
+    x = contacts.positions(state)[:, 0] - state.com[0]
+    front = state.robot.weight / 2 * x[2] / (x[2] - x[0])
+    forces = np.zeros((4, 3))
+    forces[:, 2] = front, front, state.robot.weight / 2 - front, state.robot.weight / 2 - front
+    return forces.ravel()
+
+
 def _forces() -> list[Example]:
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
@@ -184,13 +197,14 @@ def _forces() -> list[Example]:
     squeeze = np.zeros(12)
     squeeze[[7, 10]] = 1.0, -1.0
     return [
-        *((_in_balance(facets, room), "") for facets, room in ((8, 3.0), (16, 3.0), (16, 4.0))),
+        *((_in_balance(facets, room), "") for facets, room in ((8, 9.0), (16, 9.0), (16, 10.0))),
         (np.zeros(12), "no_force"), (-smallest, "sign"),
         (np.tile(weight * n[2] * n / 4, 4), "slides"),
         (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
         (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"),
         (smallest + squeeze, "vertical_cones"),
-        (_in_balance(16, 0.1), "in_cones"), (smallest + 40 * squeeze, "outside"),
+        (_in_balance(16, 0.1), "in_cones"), (_vertical(), "upright"),
+        (smallest + 40 * squeeze, "outside"),
     ]  # fmt: skip
 
 
@@ -208,7 +222,7 @@ EXERCISES = (
         "directions = np.outer(np.cos(turns), t1) + np.outer(np.sin(turns), t2)\n"
         "rows = directions - 0.5 * np.cos(np.pi / 5) * n_bank",
         judge=ShapeJudge(
-            NumericJudge(
+            _HalfSpaceJudge(
                 right=_rows_from_edges,
                 praise="Five half-spaces. Two of them meet at an edge, and the edges lie on the "
                 "cone.",
@@ -216,9 +230,6 @@ EXERCISES = (
                     "zero": lambda: np.zeros((5, 3)),
                     "outside": partial(_rows_from_edges, BANK_MU / np.cos(np.pi / 5)),
                     "not_unit": lambda: _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK),
-                    "scale": lambda: (
-                        _rows_from_edges() / np.linalg.norm(_rows_from_edges(), axis=1)[:, None]
-                    ),
                     "sign": lambda: -_rows_from_edges(),
                     "normal_sign": lambda: _with_tangents(-BANK_MU * np.cos(np.pi / 5)),
                     "no_mu": lambda: _rows_from_edges(1.0),
@@ -231,8 +242,6 @@ EXERCISES = (
                     "in their middle.",
                     "not_unit": "The normal is not a unit vector. Normalize it before you use "
                     "it for the friction term.",
-                    "scale": "These are the right half-spaces with another scale. Without its "
-                    "normal component, each row must have length one.",
                     "sign": "The sign is wrong. rows @ f ≤ 0 must hold for forces inside.",
                     "normal_sign": "The sign of the normal component is wrong. With a plus, the "
                     "constraints forbid pushing.",
@@ -247,6 +256,10 @@ EXERCISES = (
                 (5,): "There are five numbers, but each facet needs a row of three.",
             },
         ),
+        examples=lambda: [
+            (2.0 * _rows_from_edges()[::-1], ""),
+            (_rows_from_edges()[[1, 0, 2, 4, 3]], ""),
+        ],
         explanation="The row of a facet takes the force along d_i and subtracts what friction "
         "allows in the middle of the facet, μ cos(π/5) nᵀf.",
     ),
@@ -292,56 +305,24 @@ EXERCISES = (
     ),
     Exercise(
         name="06.3",
-        statement="The smallest number of facets inside the cone with which the middle of a "
-        "facet loses less than 5 % of the tangential force.",
-        stub="fewest = 4  # replace this number",
-        solution="fewest = min(n for n in range(3, 50) if 1 - np.cos(np.pi / n) < 0.05)",
-        judge=NumericJudge(
-            is_count=True,
-            right=partial(_fewest, _lost_force),
-            praise="With 10 facets, 4.9 % is lost in the middle of a facet and nothing at the "
-            "edges.",
-            mistakes={
-                "area": partial(_fewest, _lost_area),
-                "outside": lambda: _fewest(partial(_lost_force, inside=False)),
-                "one_too_few": lambda: _fewest(_lost_force) - 1,
-                "four": lambda: 4,
-                "eight": lambda: 8,
-                "not_fewest": lambda: 16,
-            },
-            hints={
-                "area": "That number is needed to lose less than 5 % of the area. The question "
-                "is about the force.",
-                "outside": "That is for a polyhedron outside the cone: how much its edges allow "
-                "in excess.",
-                "one_too_few": "That is one facet too few: it loses 6 %.",
-                "four": "Four facets lose 29 %.",
-                "eight": "Eight facets lose 7.6 %.",
-                "not_fewest": "That is enough, but not the smallest number.",
-            },
-        ),
-        explanation="1 - cos(π/n) < 0.05. For small angles, 1 - cos(π/n) is about 5 / n².",
-    ),
-    Exercise(
-        name="06.4",
         statement="Forces on a slope of 20°, shape (12,), N, world, that are balanced and each "
-        "have a margin of 3 N to their round cone.",
+        "have a margin of 9 N to their round cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
-        "from floatbase.objectives import com_wrench_map\n\n"
-        "state_on_hill, contacts_on_hill = stance_on_hill()\n"
-        "G_hill = com_wrench_map(state_on_hill, contacts_on_hill).A\n"
-        "carry = np.array([0, 0, robot.weight, 0, 0, 0])\n"
-        "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in contacts_on_hill.normals]\n"
+        "from floatbase.objectives import wrench_objective\n\n"
+        "hill_state, hill_contacts = stance_on_hill()\n"
+        "carry = wrench_objective(hill_state, hill_contacts, [0, 0, robot.weight], np.zeros(3))\n"
+        "small = fb.Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-6)\n"
+        "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in hill_contacts.normals]\n"
         "rows_on_hill = block_diag(*facets)\n"
-        "room = np.full(len(rows_on_hill), -3.0)  # N: each facet with 3 N to spare\n"
-        "least = (np.eye(12), np.zeros(12))\n"
-        "forces_on_hill = fb.solve(fb.QP(*least, G_hill, carry, rows_on_hill, room)).x",
+        "# each facet with 9 N to spare\n"
+        "forces_on_hill = constrained_minimiser(carry + small, rows_on_hill, -9)",
         judge=_judge_forces,
-        namespace=lambda: {"robot": fb.load("go2"), "on_hill": stance_on_hill},
+        namespace=lambda: {"robot": fb.load("go2")},
         examples=_forces,
-        explanation="The constraints of all feet with -3 on the right-hand side, the balance as "
-        "equality constraints, and the smallest forces as the objective.",
+        explanation="The constraints of all feet have -9 on the right-hand side, and the cost is "
+        "the desired wrench with a small weight on the size of the forces. An internal force "
+        "moves tangential force from the front feet to the rear feet, which carry more.",
     ),
 )
 

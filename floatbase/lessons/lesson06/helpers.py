@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,8 +87,8 @@ class ConeController:
         return desired_wrench(now, a, centroidal_inertia(now) @ turn)
 
 
-def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
-    """Minimise a cost subject to G x ≤ 0.
+def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike, h: npt.ArrayLike = 0.0) -> Array:
+    """Minimise a cost subject to G x ≤ h.
 
     Parameters
     ----------
@@ -95,6 +96,8 @@ def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
         The cost.
     G : array_like, shape (m, n)
         Matrix of the inequality constraints.
+    h : array_like, shape (m,), or float, optional
+        Right-hand side of the inequality constraints; one number is for all of them.
 
     Returns
     -------
@@ -102,9 +105,54 @@ def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike) -> Array:
         The minimizer.
     """
     matrix = np.asarray(G)
-    return fb.solve(
-        fb.QP(cost.H, cost.g, np.zeros((0, cost.n)), np.zeros(0), matrix, np.zeros(len(matrix)))
-    ).x
+    bounds = np.broadcast_to(np.asarray(h, dtype=np.float64), len(matrix))
+    none = np.zeros((0, cost.n)), np.zeros(0)
+    return fb.solve(fb.QP(cost.H, cost.g, *none, matrix, bounds)).x
+
+
+def accelerate(
+    acceleration: npt.ArrayLike,
+    mu: float = 0.7,
+    start: fb.State | None = None,
+    duration: float = 0.1,
+    floor: float | None = None,
+    **polyhedra: Any,
+) -> fb.Rollout:
+    """Run go2 with a controller that requests an acceleration of the centre of mass.
+
+    Orientation and posture are further objectives of the controller.
+
+    Parameters
+    ----------
+    acceleration : array_like, shape (3,)
+        Desired acceleration of the centre of mass in the world frame [m/s²].
+    mu : float, optional
+        Friction coefficient that the controller assumes [-].
+    start : State, optional
+        State at the start, by default standing.
+    duration : float, optional
+        Duration of the run [s].
+    floor : float, optional
+        Actual friction coefficient of the floor [-], by default `mu`.
+    **polyhedra
+        Options of the friction polyhedra: `facets`, `inner_approximation` and `facet_rotation`.
+
+    Returns
+    -------
+    Rollout
+        The record.
+    """
+    robot = fb.load("go2")
+    start = robot.standing() if start is None else start
+    # no stiffness and no damping: nothing draws the centre of mass back to where it was
+    com = fb.CoMTask(start.com, acceleration=acceleration, kp=0, kd=0)
+    tasks = [com, *fb.standing_tasks(start)[1:]]
+    stance = fb.Contacts.points(robot, mu=mu)
+    # the crouching robot is near its joint limits; this lesson is about friction
+    controller = fb.WholeBodyController(robot, stance, tasks, joint_limits=None, **polyhedra)
+    sim = fb.Simulation(robot, ground=mu if floor is None else floor)
+    sim.reset(start)
+    return fb.rollout(sim, controller, duration)
 
 
 def make_controller() -> ConeController:

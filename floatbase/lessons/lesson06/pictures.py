@@ -12,6 +12,7 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, WrenchSet, decompose, wrench_set
 from floatbase.lessons import svg
+from floatbase.lessons.lesson05 import friction_ratios
 from floatbase.viewer import View, Viewer, prefixed, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
@@ -19,7 +20,6 @@ from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
 FORCE_SCALE = 0.01  # m drawn for 1 N at a single foot
 CONE_HEIGHT = 0.7  # m: height of a single cone
 SINGLE_FOOT_VIEW = View(25.0, 20.0, 1.0, around=((0.0, 0.0, 0.36), 0.52))  # of a single foot
-TOP_VIEW = View(180.0, 89.0, 1.0)  # forwards is up, as in the plots
 DRAWING_SIZE = (250, 250)  # pixels of a drawing from above
 
 
@@ -164,14 +164,11 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
     contacts = fb.Contacts.points(robot, normals=slope_normal(believed))
-    controller = fb.WholeBodyController(
-        robot, contacts, fb.standing_tasks(start), facets=facets, joint_limits=None
-    )
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start), facets=facets)
     planned = controller(start.q, start.v).forces
-    front, rear = friction_ratios(planned, n)[[0, 2]]
-    picture = view.painter.picture(
-        start, fb.Contacts.points(robot, normals=n), planned=planned, cones=False
-    )
+    actual = fb.Contacts.points(robot, normals=n)
+    front, rear = friction_ratios(actual, planned)[[0, 2]]
+    picture = view.painter.picture(start, actual, planned=planned, cones=False)
     drawn = view.painter.picture(start, contacts, planned=planned)
     view.draw(
         picture | {path: item for path, item in drawn.items() if path.split("/")[0] == "cone"}
@@ -215,15 +212,6 @@ def slope_normal(degrees: float) -> Array:
     """Return the unit normal of a slope [°] that rises towards x, shape (3,)."""
     angle = np.deg2rad(degrees)
     return np.array([-np.sin(angle), 0.0, np.cos(angle)])
-
-
-def friction_ratios(forces: npt.ArrayLike, normal: npt.ArrayLike) -> Array:
-    """Return α_∥ / α_⊥ of the force at each point, shape (n,) [-].
-
-    The ratio equals μ on the surface of the cone.
-    """
-    parts = [decompose(f, normal) for f in np.reshape(forces, (-1, 3))]
-    return np.array([part.alpha_par / part.alpha_perp for part in parts])
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:
