@@ -9,6 +9,7 @@ from floatbase.lessons.lessonB.helpers import (
 )
 from floatbase.lessons.lessonB.pictures import (
     JOINT_VIEW,
+    draw_cylinder,
     plot_com_sway,
     plot_lever,
     plot_power,
@@ -21,6 +22,7 @@ __all__ = [
     "EXERCISES",
     "JOINT_VIEW",
     "Bench",
+    "draw_cylinder",
     "hold_then_turn",
     "plot_com_sway",
     "plot_lever",

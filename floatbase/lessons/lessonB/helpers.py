@@ -245,7 +245,7 @@ def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
     robot = fb.load("go2")
     state = robot.standing()
     tasks = [replace(task, kp=kp, kd=kd) for task in fb.standing_tasks(state)]  # type: ignore[type-var]
-    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks, joint_limits=None)
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
     sim = fb.Simulation(robot)
     fb.rollout(sim, controller, SETTLE)
     oil = HydraulicActuators(robot, Hydraulics(loop_bandwidth=bandwidth))
