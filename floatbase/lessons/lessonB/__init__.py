@@ -6,12 +6,12 @@ from floatbase.lessons.lessonB.helpers import (
     hold_then_turn,
     push_response,
     run_force_loop,
+    squat,
 )
 from floatbase.lessons.lessonB.pictures import (
     JOINT_VIEW,
     draw_cylinder,
     plot_com_sway,
-    plot_lever,
     plot_power,
     plot_torques,
     show_crank,
@@ -25,11 +25,11 @@ __all__ = [
     "draw_cylinder",
     "hold_then_turn",
     "plot_com_sway",
-    "plot_lever",
     "plot_power",
     "plot_torques",
     "push_response",
     "run_force_loop",
     "show_crank",
     "show_torque_step",
+    "squat",
 ]  # fmt: skip

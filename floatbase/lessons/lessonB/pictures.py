@@ -1,4 +1,4 @@
-"""Lesson B: a cylinder with its valve and on its crank, torques on the bench, sway of go2, and powers."""
+"""Lesson B: a cylinder with its valve and crank, torques on the bench, sway of go2, and powers."""
 
 from __future__ import annotations
 
@@ -177,14 +177,6 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
     )
     a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
-
-
-def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
-    """Plot a lever [mm] over the joint angle relative to the angle of the longest lever [°]."""
-    axis = _axes("joint angle, relative to the longest lever [°]", "lever [mm]")
-    axis.plot(angles, levers, color=hex_code(GREYS[0]), linewidth=2.0)
-    axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
-    return axis
 
 
 def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0) -> Axes:
