@@ -91,7 +91,7 @@ def draw_cylinder(u: float) -> str:
     first, second, way = ("A", "B", "out") if u > 0.0 else ("B", "A", "in")
     return (
         f"{picture}<div>u = {u:.2f}: oil flows from the supply into {first}, and from {second} to "
-        f"the tank; the force on the rod grows towards <b>{way}</b></div>"
+        f"the tank; the rod is pushed <b>{way}</b></div>"
     )
 
 
