@@ -277,7 +277,10 @@ class _Metered(HydraulicActuators):
     ) -> Array:
         tau = super().step(tau_desired, q_joints, v_joints, dt)
         p = self.cylinders.power(
-            self.state.opening, self.state.pressures, self.cylinders.geometry(q_joints), v_joints
+            self.state.opening,
+            self.state.pressures,
+            self.cylinders.geometry(q_joints),
+            np.asarray(v_joints, dtype=np.float64),
         )
         parts = (p.pump, p.joint, p.valve, p.leakage, p.stored)
         self.powers.append([float(part.sum()) for part in parts])
