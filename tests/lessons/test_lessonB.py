@@ -15,9 +15,9 @@ import floatbase as fb
 from floatbase.actuators import VACUUM, Cylinders, HydraulicActuators, Hydraulics
 from floatbase.lessons.lessonB import (
     Bench,
+    draw_cylinder,
     hold_then_turn,
     plot_com_sway,
-    plot_lever,
     plot_power,
     plot_torques,
     push_response,
@@ -135,6 +135,14 @@ def test_the_crank_is_drawn_with_its_lever_and_what_is_out_of_reach_is_said(
     )  # N·m: bars are rounded
 
 
+def test_the_valve_joins_each_chamber_to_supply_or_tank_or_to_neither() -> None:
+    out, back, shut = (draw_cylinder(u) for u in (0.4, -1.0, 0.0))
+    assert "into A" in out and "<b>out</b>" in out
+    assert "into B" in back and "<b>in</b>" in back and "trapped" in shut
+    widths = [set(re.findall(r'stroke-width="([\d.]+)"', text)) for text in (out, back, shut)]
+    assert "3.8" in widths[0] and "8.0" in widths[1] and not {"3.8", "8.0"} & widths[2]
+
+
 def test_the_step_response_tells_when_the_torque_comes_and_when_oil_boils() -> None:
     quick, slow, torn = (
         show_torque_step(50.0, 160.0, 0.0),
@@ -160,13 +168,9 @@ def test_plots_show_what_they_are_given() -> None:
     record = fb.rollout(fb.Simulation(ROBOT), judges.controller_of("go2"), 0.02)
     gone = 1000 * (record.com - record.com[0])[:, 1]
     torques, sways = plot_torques(runs), plot_com_sway({"perfect": record}, side=-1)
-    levers, watts = (
-        plot_lever([0, 1], [36, 0]),
-        plot_power(np.arange(6.0).reshape(3, 2), ("pump", "joint")),
-    )
+    watts = plot_power(np.arange(6.0).reshape(3, 2), ("pump", "joint"))
     assert np.allclose(torques.lines[1].get_ydata(), [row.torque for row in bench.samples])
     assert np.allclose(sways.lines[0].get_ydata(), -gone) and "right" in sways.get_ylabel()
-    assert np.allclose(levers.lines[0].get_ydata(), [36, 0])
     assert np.allclose(watts.lines[1].get_ydata(), [1, 3, 5])
     for axis, names in ((torques, ["one", "two"]), (watts, ["pump", "joint"])):
         legend = axis.get_legend()

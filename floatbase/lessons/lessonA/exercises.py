@@ -117,6 +117,7 @@ EXERCISES = (
                 "inwards_sign": _walker(1.0, -1.0),
                 "sideways_sign": _walker(-1.0, 1.0),
                 "no_mass": _walker(1.0, 1.0, 1.0),
+                "weight": lambda: _walker(1.0, 1.0)() + [0.0, 0.0, 9.81 * CHILD_MASS],
             },
             hints={
                 "zero": "Without a force, the child would move straight in the world frame, and "
@@ -134,6 +135,8 @@ EXERCISES = (
                 "sideways_sign": "The inward part is right, but the sideways part has the wrong "
                 "sign. The order in ω × ṗ matters.",
                 "no_mass": "That is an acceleration, m/s². The mass is missing.",
+                "weight": "Only the horizontal force is asked for. The floor also carries the "
+                "weight, but that is not part of the answer.",
             },
         ),
         explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious "

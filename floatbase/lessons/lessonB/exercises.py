@@ -110,7 +110,7 @@ EXERCISES = (
     Exercise(
         name="B.1",
         statement="The torque of an excavator's cylinder on its arm, N·m.",
-        stub="torque = piston * b  # N·m, if crank and cylinder were square; replace",
+        stub="torque = piston * b  # N·m, if crank and cylinder were perpendicular; replace",
         namespace=lambda: {"piston": PISTON, "b": CRANK},
         solution="length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(gamma))\ntorque = piston * a * "
         "b * np.sin(gamma) / length",

@@ -1,4 +1,4 @@
-"""Lesson B: a cylinder on its crank, torques on the bench, sway of go2, and powers."""
+"""Lesson B: a cylinder with its valve and crank, torques on the bench, sway of go2, and powers."""
 
 from __future__ import annotations
 
@@ -30,6 +30,69 @@ DASHES = ("-", "--", ":", "-.")
 # px: width and height of a plot in the panel, and space on its left and below it
 WIDTH, HEIGHT, LEFT, GAP = 620.0, 150.0, 58.0, 34.0
 RUN_DURATION = 0.4  # s: duration of the run in the panel
+
+
+def draw_cylinder(u: float) -> str:
+    """Draw a cylinder with its valve: which chamber is joined to the supply, and which to the tank.
+
+    Parameters
+    ----------
+    u : float
+        Command to the valve, from -1 to 1 [-].
+
+    Returns
+    -------
+    str
+        The drawing as SVG, and a line of text.
+    """
+    top, bottom, left, right, piston = 40.0, 120.0, 60.0, 420.0, 230.0
+    thick = {"stroke_width": "2.5"}
+    body = {"fill": "none", "stroke": "currentColor", **thick}
+    dark = hex_code(GREYS[1])
+    chambers = ((left, piston, "A", u > 0.0), (piston + 16, right, "B", u < 0.0))
+    drawn = ""
+    for start, end, name, supplied in chambers:
+        corners = np.array([[start, top], [end, top], [end, bottom], [start, bottom]])
+        opacity = "0.45" if supplied else "0.12" if u else "0.25"
+        drawn += svg.polygon(corners, fill=dark, opacity=opacity)
+        drawn += svg.text(((start + end) / 2, top + 24), name, 16)
+    corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    drawn += svg.polygon(corners, **body)
+    middle = (top + bottom) / 2
+    for start, end, half in ((piston, piston + 16, 39.0), (piston + 16, right + 90, 9.0)):
+        corners = np.array(
+            [
+                [start, middle - half],
+                [end, middle - half],
+                [end, middle + half],
+                [start, middle + half],
+            ]
+        )
+        drawn += svg.polygon(corners, fill=hex_code(GREYS[2]), stroke="currentColor")
+    drawn += svg.text((piston + 8, top - 10), "piston") + svg.text((right + 60, middle - 18), "rod")
+    low, supply, tank = 190.0, 140.0, 330.0  # the valve's box, and where its lines begin below
+    box = np.array([[100.0, low], [370.0, low], [370.0, low + 70], [100.0, low + 70]])
+    drawn += svg.polygon(box, **body) + svg.text((390, low + 40), "valve", anchor="start")
+    ports = {"A": 140.0, "B": 330.0}
+    for x in ports.values():
+        drawn += svg.line((x, bottom), (x, low), **thick)
+    for x, name in ((supply, "supply, 160 bar"), (tank, "tank, 2 bar")):
+        drawn += svg.line((x, low + 70), (x, low + 110), **thick) + svg.text((x, low + 128), name)
+    opened = {"A": supply, "B": tank} if u > 0.0 else {"A": tank, "B": supply} if u < 0.0 else {}
+    width = {"stroke_width": f"{1.0 + 7.0 * abs(u):.1f}"}
+    for name, x in opened.items():
+        drawn += svg.line((ports[name], low), (x, low + 70), **width)
+    for x in () if opened else (*ports.values(), supply, tank):
+        y = low if x in ports.values() else low + 70
+        drawn += svg.line((x - 12, y), (x + 12, y), stroke_width="5")
+    picture = svg.drawing(drawn, 560, "40 10 500 320")
+    if not opened:
+        return f"{picture}<div>u = 0: the valve is shut, and the oil is trapped</div>"
+    first, second, way = ("A", "B", "out") if u > 0.0 else ("B", "A", "in")
+    return (
+        f"{picture}<div>u = {u:.2f}: oil flows from the supply into {first}, and from {second} to "
+        f"the tank; the rod is pushed <b>{way}</b></div>"
+    )
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
@@ -114,14 +177,6 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
     )
     a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
-
-
-def plot_lever(angles: npt.ArrayLike, levers: npt.ArrayLike) -> Axes:
-    """Plot a lever [mm] over the joint angle relative to the angle of the longest lever [°]."""
-    axis = _axes("joint angle, relative to the longest lever [°]", "lever [mm]")
-    axis.plot(angles, levers, color=hex_code(GREYS[0]), linewidth=2.0)
-    axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
-    return axis
 
 
 def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0) -> Axes:

@@ -104,7 +104,8 @@ def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
         )
         return Verdict(False, known, "innocent")
     if said != fault:
-        return Verdict(False, f"not {said}: {COUNTER_EVIDENCE[said]}", f"not {said}")
+        start = "there is a fault" if said == NOTHING else f"it is not {said}"
+        return Verdict(False, f"{start}: {COUNTER_EVIDENCE[said]}", f"not {said}")
     if said == NOTHING:
         return _RIGHT
     if said == "swapped motors":
