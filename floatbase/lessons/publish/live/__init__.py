@@ -1,0 +1,1 @@
+"""Robots that live in a web page: the compiled tick as WebAssembly, and robots as data."""
