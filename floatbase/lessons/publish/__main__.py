@@ -52,6 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "push-recovery", help="measure the push-recovery maps of lessons, such as 05, again"
     )
     measured.add_argument("lessons", nargs="+", metavar="LESSON")
+    commands.add_parser("live", help="compile the controller for web pages again (needs wasm-ld)")
     keys = commands.add_parser(
         "solutions", help="write the lessons with solutions in place of exercises, for teachers"
     )
@@ -98,6 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _site(given.lessons or None, given.to, given.stored)
         elif given.command == "push-recovery":
             _roses(given.lessons)
+        elif given.command == "live":
+            _live()
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
@@ -140,6 +143,13 @@ def _roses(lessons: Sequence[str]) -> None:
 
     for lesson in lessons:
         print(f"{lesson}: {measure_push_recovery(lesson)}")
+
+
+def _live() -> None:
+    from floatbase.lessons.publish.live import wasm
+
+    size = wasm.MODULE.stat().st_size if wasm.is_current() else wasm.build()
+    print(f"{wasm.MODULE} is up to date: {size / 1000:.0f} kB.")
 
 
 def _solutions(folder: Path) -> None:

@@ -160,7 +160,9 @@ def _for_wasm(code: str, entry: str) -> str:
     code = re.sub(r"= common (local_unnamed_addr )?global", "= internal global", code)
     # reference counts are atomic on x86. Only code that allocates has them: see `engine.js`
     code = code.replace("@llvm.x86.", "@x86_")
-    code = re.sub(r"^declare.*@x86_.*$", lambda found: found[0].replace("immarg", ""), code, flags=re.M)
+    code = re.sub(
+        r"^declare.*@x86_.*$", lambda found: found[0].replace("immarg", ""), code, flags=re.M
+    )
     code = re.sub(r"^declare i32 @numba_attempt_nocopy_reshape\(.*$", "", code, flags=re.M)
     return code.replace(f"@{entry}(", f"@{ENTRY}(") + _RESHAPE
 
