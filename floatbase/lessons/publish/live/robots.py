@@ -238,7 +238,7 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
             "baseMass": 1 + 4,
             **places,
         },
-        "comTarget": _com_target(made),
+        "comTarget": inputs.packed[places["com"]].tolist(),
     }
 
 
