@@ -8,7 +8,7 @@ that value.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -111,21 +111,24 @@ def robot_data(robot: Robot) -> dict[str, Any]:
     }
 
 
-def robot_json(robot: Robot) -> str:
+def robot_json(robot: Robot, more: Mapping[str, Any] | None = None) -> str:
     """Return `robot_data` as JSON text that JavaScript reads, infinite numbers included.
 
     Parameters
     ----------
     robot : Robot
         A floating-base robot with feet that stands on level ground.
+    more : mapping, optional
+        Further data.
 
     Returns
     -------
     str
         The text.
     """
+    text = json.dumps(robot_data(robot) | dict(more or {}), separators=(",", ":"))
     # JSON has no infinity, but JavaScript reads a number that is too large as one
-    return json.dumps(robot_data(robot), separators=(",", ":")).replace("Infinity", "1e999")
+    return text.replace("Infinity", "1e999")
 
 
 def controller(

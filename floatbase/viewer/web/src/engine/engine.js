@@ -172,6 +172,7 @@ export function createEngine(mj, module, robot) {
     // "" while the controller runs, then why it does not: "fell", "infeasible", "no answer"
     get outcome() { return outcome; },
     get pushes() { return pushes; },
+    get lifted() { return stance.lifted; },
     set(changes) {
       settings = {...settings, ...changes};
       apply();
