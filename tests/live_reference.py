@@ -59,6 +59,7 @@ def write(folder: Path) -> None:
     (folder / "states.bin").write_bytes(np.concatenate(numbers).tobytes())
     (folder / "states.json").write_text(json.dumps(index))
     (folder / "runs.json").write_text(json.dumps([_run(*given) for given in RUNS]))
+    (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
 
 
 def _random_state(robot: fb.Robot, rng: Any, violent: bool) -> tuple[Any, Any]:
@@ -105,6 +106,17 @@ def _run(name: str, given: dict[str, float], force: Any, duration: float) -> dic
     com = [pin.centerOfMass(model, data, np.array(q)).tolist() for q in run.q]
     return {"robot": name, "settings": given, "force": force, "duration": duration,
             "start": PUSH_TIME, "time": RUN_TIME, "outcome": run.outcome, "com": com}  # fmt: skip
+
+
+def _recovery(name: str) -> dict[str, Any]:
+    """Largest survived pushes in three directions."""
+    robot = fb.load(name)
+    found = fb.push_recovery(
+        lambda: (fb.Simulation(robot, robots.MU), robots.controller(robot)),
+        directions=3, resolution=1.0, workers=1, progress=False,
+    )  # fmt: skip
+    return {"robot": name, "directions": found.directions.tolist(), "duration": found.duration,
+            "resolution": found.resolution, "pushes": found.pushes.tolist()}  # fmt: skip
 
 
 def _with_payload(robot: fb.Robot, payload: float) -> fb.Robot:

@@ -59,6 +59,13 @@ def test_runs_follow_those_of_the_library(found: dict[str, Any]) -> None:
         assert run["moved"] > 0.0
 
 
+def test_a_push_recovery_map_is_that_of_the_library(found: dict[str, Any]) -> None:
+    """Within a step of the bisection."""
+    recovery = found["recovery"]
+    for push, expected in zip(recovery["pushes"], recovery["python"], strict=True):
+        assert expected > 0.0 and abs(push - expected) <= recovery["resolution"], recovery
+
+
 def _compare(folder: Path, module: Path) -> dict[str, Any]:
     node = shutil.which("node")
     if node is None or not (WEB / "node_modules" / "@mujoco").is_dir():

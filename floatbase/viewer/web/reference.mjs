@@ -5,6 +5,7 @@ import {readFileSync} from "node:fs";
 import process from "node:process";
 import loadMujoco from "@mujoco/mujoco";
 import {createEngine, defaults} from "./src/engine/engine.js";
+import {pushRecovery} from "./src/engine/recovery.js";
 
 const NO_FORCE = 1e-6; // N
 
@@ -119,4 +120,13 @@ function compareRuns() {
   });
 }
 
-console.log(JSON.stringify({states: compareStates(), runs: compareRuns()}, null, 1));
+async function compareRecovery() {
+  const given = read("recovery.json"), robot = robots[given.robot], pushes = [];
+  for await (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
+    pushes.push(push);
+  }
+  return {pushes, python: given.pushes, resolution: given.resolution};
+}
+
+const recovery = await compareRecovery();
+console.log(JSON.stringify({states: compareStates(), runs: compareRuns(), recovery}, null, 1));

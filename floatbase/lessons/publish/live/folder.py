@@ -23,7 +23,8 @@ _INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>floatbase: live robots</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<style>body {{ font-family: system-ui, sans-serif; margin: 1em auto; max-width: 60em; padding: 0 1em; }}
+<style>
+body {{ font-family: system-ui, sans-serif; margin: 1em auto; max-width: 60em; padding: 0 1em; }}
 floatbase-robot {{ height: 60vh; margin: 1em 0; }}</style>
 <script src="floatbase-live.js"></script></head>
 <body><h1>Live robots</h1>

@@ -16,9 +16,9 @@ from floatbase.friction import FrictionPolyhedron
 from floatbase.lessons.publish.live.robots import FACETS
 from floatbase.robots import Robot
 from floatbase.viewer.export import thumbnail
-from floatbase.viewer.scene import colours, protocol, shapes
+from floatbase.viewer.scene import colours, geometry, protocol, shapes, threejs, unit_shapes
 from floatbase.viewer.scene.painter import MIN_FORCE, Painter
-from floatbase.viewer.scene.shapes import Picture, path_part, prefixed
+from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
 
 IMAGE_HEIGHT = 480  # pixels
 
@@ -50,9 +50,9 @@ def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
             standing, contacts, weight_share, weight_share, com=True, cones=False
         )
         picture |= _cones(view.painter, contacts)
-        picture["push/arrow"] = shapes.arrow(
-            standing.com, [0.1, 0.0, 0.0], colours.PUSH, view.painter.size
-        )
+        outline = geometry.surface_of_revolution(unit_shapes.ARROW)
+        push = threejs.mesh(*outline, colours.PUSH, on_top=True)
+        picture["push/arrow"] = Item(push, shapes.transform(standing.com, scale=0.1))
         view.draw(picture)
         # the camera follows the base
         view.camera(follow=True)

@@ -8,6 +8,7 @@ import {make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {controlsOf} from "./live/controls.js";
 import {createPainter} from "./live/painter.js";
+import {createRecoveryMap} from "./live/recovery_map.js";
 import {createVoice, limitOf, multiplierText} from "./live/words.js";
 import {unpack} from "./loader.js";
 import {detachGifWorker, findNode} from "./meshcat.js";
@@ -17,6 +18,7 @@ const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
+const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -60,6 +62,9 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const force = Number(given.get("push")) || 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
   const push = {force, towards: 90, duration: 0.1};
   const painter = createPainter(scene, drawing, robot);
+  const drawMap = createRecoveryMap(scene.viewer, {
+    scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
+  });
   const newtons = make("output", {className: "newtons"});
   document.body.append(newtons);
   const hasPanel = given.get("panel") !== "0";
@@ -84,6 +89,10 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       isPaused = true;
       return {pause: true, step: true};
     },
+    "push-recovery map"() {
+      const {settings: present, com} = frame;
+      drawMap({...present, lifted: null}, com);
+    },
   };
   if (hasPanel) {
     for (const key of Object.keys(buttons)) {
@@ -92,6 +101,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     for (const {command} of controls) scene.handle(command);
   }
   scene.onMessage(({name: key, value}) => {
+    if (frame === null) return;
     const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
     if (message) send(message);
   });
@@ -170,7 +180,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   }
   function text(key, content) {
     scene.handle({type: "set_text", path: "", name: key, text: content,
-      section: key === "active" ? "constraints" : undefined});
+      section: key === "active" ? "constraints" : ""});
   }
 
   worker.onmessage = ({data}) => {

@@ -1,14 +1,15 @@
 // A real-time clock for a simulation that advances only when a picture is wanted. If the machine is
 // too slow, it does not catch up: the simulation is in slow motion, and `factor` says how slow.
 
-const LONGEST = 250; // ms between two pictures that are simulated; a page that rested stood still
+const LONGEST = 400; // ms between two pictures that are simulated, at most
+const RESTED = 2000; // ms without a picture, after which the page was not in sight
 const BUSY = 0.85; // fraction of the time between two pictures that steps may take
 const SMOOTHING = 0.05; // weight of the newest picture in `factor`
 
 // step: s. All times in ms.
 export function createClock(step) {
   let last = null, scale = 1, isPaused = false, single = 0, rest = 0, factor = 1, elapsed = 0;
-  let stepTime = 0;
+  let stepTime = 0, passed = 0;
   return {
     reset() { [last, rest, factor] = [null, 0, 1]; },
     setScale(value) { scale = value; },
@@ -16,7 +17,8 @@ export function createClock(step) {
     single() { single++; },
     // The number of steps until `now`.
     steps(now) {
-      elapsed = last === null ? 0 : Math.min(LONGEST, now - last);
+      passed = last === null || now - last > RESTED ? 0 : now - last;
+      elapsed = Math.min(LONGEST, passed);
       last = now;
       if (isPaused) {
         const count = single;
@@ -35,7 +37,7 @@ export function createClock(step) {
     done(count, time) {
       if (count > 0) stepTime = time / count;
       if (isPaused || elapsed === 0) return;
-      const now = count * step * 1000 / elapsed / scale;
+      const now = count * step * 1000 / passed / scale;
       factor += SMOOTHING * (Math.min(1, now) - factor);
     },
     get factor() { return factor * scale; },

@@ -95,12 +95,12 @@ export function createPainter(scene, drawing, robot) {
       points.forEach((_, i) => drawContact(i, frame));
       drawCom(frame.com);
     },
-    // The push of `force`, N, at a point, or none.
+    // The push of `force`, N, as an arrow that begins where it acts, or none.
     drawPush(at, force) {
       set("push/arrow", "visible", force !== null);
       if (force === null) return;
       const vector = force.map((x) => scale * x);
-      place("push/arrow", arrowMatrix(at.map((x, i) => x - vector[i]), vector, drawing));
+      place("push/arrow", arrowMatrix(at, vector, drawing));
     },
   };
 }
