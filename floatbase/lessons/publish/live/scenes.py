@@ -44,10 +44,16 @@ def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
     try:
         standing, contacts = robot.standing(), Contacts.feet(robot, 0.7)
         weight_share = np.tile([0.0, 0.0, robot.weight / contacts.n_points], contacts.n_points)
-        view.show(standing, contacts, weight_share, com=True)
+        view.show(standing, contacts, weight_share, com=True, joint_limits=False)
         image = thumbnail.render_png(view.renderer.picture, view.window.scene, IMAGE_HEIGHT)
         picture = view.painter.picture(
-            standing, contacts, weight_share, weight_share, com=True, cones=False
+            standing,
+            contacts,
+            weight_share,
+            weight_share,
+            com=True,
+            cones=False,
+            joint_limits=False,
         )
         picture |= _cones(view.painter, contacts)
         outline = geometry.surface_of_revolution(unit_shapes.ARROW)

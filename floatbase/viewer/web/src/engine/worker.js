@@ -11,6 +11,7 @@ import {pushRecovery} from "./recovery.js";
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
 const clock = createClock(STEP);
+const seen = new Map(); // constraints that were active at any time since the last picture
 
 async function fetchOk(name) {
   const response = await fetch(name);
@@ -52,12 +53,14 @@ function frame() {
   const count = clock.steps(performance.now());
   const begin = performance.now();
   let done = 0;
+  seen.clear();
   for (; done < count; done++) {
     if (engine.isAtRest) {
       engine.reset();
       postMessage({stoodUp: true});
     }
     engine.step();
+    for (const one of engine.activeConstraints()) seen.set(one.slice(0, 3).join(), one);
     if (done % 16 === 15 && performance.now() - begin > clock.budget) {
       done++;
       break;
@@ -83,7 +86,8 @@ function picture() {
   return {
     rotations, positions, contacts, com: engine.com(), time: engine.time,
     measured: engine.measuredForces(), planned: engine.plannedForces(),
-    active: engine.activeConstraints(), outcome: engine.outcome, pushes: engine.pushes,
+    active: engine.activeConstraints(), seen: [...seen.values()],
+    outcome: engine.outcome, pushes: engine.pushes,
     lifted: engine.lifted, settings: engine.settings, factor: clock.factor,
     stepTime: clock.stepTime,
   };

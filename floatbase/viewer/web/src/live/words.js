@@ -2,6 +2,7 @@
 
 const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "hind"};
 const SLIPPING = 0.97; // fraction of the actual friction limit
+const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
 const MISSED = 0.25; // fraction of the weight on one foot: a smaller difference is contact softness
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
@@ -58,7 +59,8 @@ export function limitOf(frame, robot) {
     return {rank: 1, text: `${subject(slipping)} slipping: the ground gives less friction than ` +
       "the controller plans with."};
   }
-  const owners = (part) => frame.active.filter(([kind]) => kind.includes(part))
+  const owners = (part) => frame.seen
+    .filter(([kind, , , multiplier]) => kind.includes(part) && multiplier > WEAK)
     .map(([, owner]) => owner);
   const motors = owners("torque limit").map(jointName);
   if (motors.length) {
