@@ -91,7 +91,7 @@ def robot_element(robot: LessonRobot) -> str:
     """
     attributes = {"name": robot.name} | robot.attributes
     written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
-    style = f"display: block; height: {_HEIGHT}"
+    style = f"display: block; margin: 1rem 0; height: {_HEIGHT}"
     words = "A live robot appears here in a browser with WebAssembly, if the page is on a server."
     return f'<floatbase-robot {written} style="{style}"><p>{words}</p></floatbase-robot>'
 

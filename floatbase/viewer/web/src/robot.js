@@ -100,6 +100,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     }
     for (const {command} of controls) scene.handle(command);
   }
+  else document.body.append(pushButton());
   scene.onMessage(({name: key, value}) => {
     if (frame === null) return;
     const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
@@ -107,6 +108,13 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   });
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
 
+  // Without the panel, a button pushes, also for those who use no mouse.
+  function pushButton() {
+    return make("button", {
+      type: "button", className: "push", textContent: `push ${push.force} N`,
+      onclick: () => send(buttons.push()),
+    });
+  }
   const tell = createVoice((text) => {
     scene.handle({type: "set_title", path: "", text});
     parent.postMessage({floatbase: "limit", text}, "*");
@@ -163,7 +171,8 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     ));
   }
   function report() {
-    if (frame.time >= plotted + PLOT_PERIOD) {
+    // at the first picture there are no measured forces yet
+    if (frame.time >= plotted + PLOT_PERIOD && frame.time > 0) {
       plotted = frame.time;
       const away = frame.planned.map((x, i) => x - frame.measured[i]);
       scene.handle({type: "add_plot_point", path: "", name: "planned minus measured force",
