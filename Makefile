@@ -9,7 +9,7 @@
 #   LOCK_ARGS=…    further options for `uv pip compile`, such as --upgrade
 
 .DEFAULT_GOAL := help
-.PHONY: help lab test test-all site setup lock web clean python
+.PHONY: help lab test test-all site setup lock live web clean python
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -53,6 +53,7 @@ help:
 	@echo "make setup   only create .venv"
 	@echo "make lock    update environment.txt from pyproject.toml"
 	@echo "make web     check and build the pages' JavaScript (needs node 20 or later)"
+	@echo "make live    compile the controller for web pages again (needs lld)"
 	@echo "make clean   remove .venv and all built files"
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
@@ -116,6 +117,10 @@ lock: | python
 # floatbase/viewer/web/dist is committed, so Node.js is needed only to change the JavaScript
 web:
 	cd floatbase/viewer/web && npm ci --no-audit --no-fund && npm run lint && npm test && npm run build
+
+# floatbase/viewer/web/live/tick.wasm is committed, so wasm-ld is needed only after a change of control/tick
+live: $(VENV)/ready-$(KEY)
+	$(BIN)/python -m floatbase.lessons.publish live
 
 clean:
 	rm -rf $(VENV) build dist floatbase/viewer/web/node_modules .ci/proxy/node_modules .mypy_cache .pytest_cache .ruff_cache .hypothesis

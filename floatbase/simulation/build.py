@@ -129,6 +129,33 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     SimulationError
         If MuJoCo cannot build the model.
     """
+    try:
+        model = build_spec(robot, ground, timestep).compile()
+    except ValueError as error:
+        raise SimulationError(
+            f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
+        ) from None
+    if model.nv != robot.nv:
+        raise SimulationError(
+            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
+            f"robot has {robot.nv}. Its model was changed after it was read from the URDF; load "
+            f"the robot again."
+        )
+    return model
+
+
+def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
+    """Write the description from which `build_model` builds the model; same parameters and errors.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    ground : Ground
+        The ground.
+    timestep : float
+        Timestep of the simulation [s].
+    """
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -163,19 +190,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
         _add_foot_balls(spec, foot, contact_of_foot.point_names)
     _add_link_hulls(spec, robot)
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise SimulationError(
-            f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
-        ) from None
-    if model.nv != robot.nv:
-        raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
-            f"robot has {robot.nv}. Its model was changed after it was read from the URDF; load "
-            f"the robot again."
-        )
-    return model
+    return spec
 
 
 def body_name(link: str) -> str:

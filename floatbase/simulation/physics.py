@@ -32,8 +32,8 @@ from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.push import Push, as_pushes
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
-_FALLEN_HEIGHT_FRACTION = 0.4
-_FALLEN_COSINE = float(
+FALLEN_HEIGHT_FRACTION = 0.4
+FALLEN_COSINE = float(
     np.cos(np.deg2rad(60.0))
 )  # of the base's tilt since the last reset: no leg can recover from more
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
@@ -220,9 +220,9 @@ class Simulation:
             return False
         sunk = (
             self._start_height - self._base_height()
-            > (1.0 - _FALLEN_HEIGHT_FRACTION) * self._nominal_height
+            > (1.0 - FALLEN_HEIGHT_FRACTION) * self._nominal_height
         )
-        return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < _FALLEN_COSINE
+        return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < FALLEN_COSINE
 
     @property
     def link_collisions(self) -> bool:

@@ -12,8 +12,9 @@ WEB = pages.DIST.parent
 def test_the_built_pages_are_up_to_date() -> None:
     """As build.mjs computes it."""
     digest = hashlib.sha256()
-    sources = sorted(path.name for path in (WEB / "src").iterdir())
-    for name in ("build.mjs", "package-lock.json", *(f"src/{name}" for name in sources)):
+    files = (path for path in (WEB / "src").rglob("*") if path.is_file())
+    sources = sorted(path.relative_to(WEB).as_posix() for path in files)
+    for name in ("build.mjs", "package-lock.json", *sources):
         data = (WEB / name).read_bytes()
         digest.update(f"{name} {len(data)}\n".encode() + data)
     is_current = (pages.DIST / "sources.sha256").read_text().strip() == digest.hexdigest()

@@ -53,6 +53,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "push-recovery", help="measure the push-recovery maps of lessons, such as 05, again"
     )
     measured.add_argument("lessons", nargs="+", metavar="LESSON")
+    living = commands.add_parser(
+        "live", help="compile the controller for web pages again, if it has changed (needs wasm-ld)"
+    )
+    living.add_argument(
+        "--to",
+        type=Path,
+        metavar="FOLDER",
+        help="also write all files of the live robots there (needs npm)",
+    )
     keys = commands.add_parser(
         "solutions", help="write the lessons with solutions in place of exercises, for teachers"
     )
@@ -99,6 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _site(given.lessons or None, given.to, given.stored)
         elif given.command == "push-recovery":
             _roses(given.lessons)
+        elif given.command == "live":
+            _live(given.to)
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
@@ -142,6 +153,17 @@ def _roses(lessons: Sequence[str]) -> None:
 
     for lesson in lessons:
         print(f"{lesson}: {measure_push_recovery(lesson)}")
+
+
+def _live(folder: Path | None) -> None:
+    from floatbase.lessons.publish.live import folder as live_folder
+    from floatbase.lessons.publish.live import wasm
+
+    size = wasm.MODULE.stat().st_size if wasm.is_current() else wasm.build()
+    print(f"{wasm.MODULE} is up to date: {size / 1000:.0f} kB.")
+    if folder is not None:
+        live_folder.write(folder)
+        print(f"The live robots are in {folder}; serve it with `python -m http.server`.")
 
 
 def _solutions(folder: Path) -> None:

@@ -17,13 +17,20 @@ const bundles = await Promise.all([
     globalName: "floatbase"}),
   build({...common, entryPoints: ["src/widget.js"], outdir: "dist", format: "esm"}),
   build({...common, entryPoints: ["src/pictures.js", "src/page.css"], outdir: "dist"}),
+  build({...common, entryPoints: ["src/robot.js"], outdir: "dist", format: "iife",
+    globalName: "floatbaseRobot"}),
+  build({...common, entryPoints: {"floatbase-live": "src/embed.js"}, outdir: "dist"}),
+  // the worker loads MuJoCo, which is not part of dist/
+  build({...common, entryPoints: {engine: "src/engine/worker.js"}, outdir: "dist", format: "esm",
+    external: ["./mujoco.js"], target: "es2022"}),
 ]);
 const built = Object.fromEntries(bundles.flatMap(({outputFiles}) => outputFiles)
   .map(({path, text}) => [path.split("/").at(-1), text]));
 built["page.html"] = readFileSync("src/page.html", "utf8");
 
 const digest = createHash("sha256");
-const sources = readdirSync("src").sort().map((name) => `src/${name}`);
+const sources = readdirSync("src", {recursive: true, withFileTypes: true})
+  .filter((entry) => entry.isFile()).map(({parentPath, name}) => `${parentPath}/${name}`).sort();
 for (const name of ["build.mjs", "package-lock.json", ...sources]) {
   const data = readFileSync(name);
   digest.update(`${name} ${data.length}\n`).update(data);

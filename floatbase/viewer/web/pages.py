@@ -1,9 +1,9 @@
-"""The page in its four modes, assembled from the built files in `dist`.
+"""The page in its five modes, assembled from the built files in `dist`.
 
 The live page and the notebook page follow a window. The file page contains a scene and needs no
-server. The embedded page shows scenes that the surrounding page gives it, one after the other. All
-load meshcat's viewer and draw the same frames (see `protocol.frame`). `make web` builds `dist` from
-`src`; page.js describes the modes.
+server. The embedded page shows scenes that the surrounding page gives it, one after the other. The
+robot page runs a robot in the browser. All load meshcat's viewer and draw the same frames (see
+`protocol.frame`). `make web` builds `dist` from `src`; page.js and robot.js describe the modes.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import BACKGROUNDS, DARK_SHADES, hex_code
@@ -96,6 +97,25 @@ def notebook_page() -> str:
 
 
 @cache
+def robot_page(robots: tuple[str, ...]) -> str:
+    """Return the page with a live robot. It loads its other files from its own folder.
+
+    Parameters
+    ----------
+    robots : tuple of str
+        Names of the robots to choose from; the first is the default.
+
+    Returns
+    -------
+    str
+        HTML of the page.
+    """
+    scripts = '<script src="meshcat.js"></script><script src="robot.js"></script>'
+    page = _page("robot", scripts, "live robot", {"robots": robots})
+    return page.replace("<body>", '<body class="robot">')
+
+
+@cache
 def asset(name: str) -> str:
     """Return the text of a built file.
 
@@ -124,10 +144,13 @@ def _embedded_data(name: str, data: bytes) -> str:
     return f'<script type="text/plain" id="{name}">{packed}</script>'
 
 
-def _page(mode: str, data: str = "", title: str = "floatbase") -> str:
+def _page(
+    mode: str, data: str = "", title: str = "floatbase", more: dict[str, Any] | None = None
+) -> str:
     """Return the page in one of its modes, with script elements `data` before its own."""
     config = {
         "mode": mode,
+        **(more or {}),
         "backgrounds": {name: [*map(hex_code, colours)] for name, colours in BACKGROUNDS.items()},
         "shades": {hex_code(colour): hex_code(shade) for colour, shade in DARK_SHADES.items()},
     }
@@ -135,6 +158,8 @@ def _page(mode: str, data: str = "", title: str = "floatbase") -> str:
         "title": html.escape(title),
         "style": asset("page.css"),
         "data": data,
-        "script": f"{asset('page.js')}floatbase.open({json.dumps(config)});",
+        "script": f"floatbaseRobot.open({json.dumps(config)});"
+        if mode == "robot"
+        else f"{asset('page.js')}floatbase.open({json.dumps(config)});",
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], asset("page.html"))

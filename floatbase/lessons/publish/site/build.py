@@ -16,10 +16,17 @@ from floatbase._files import write_whole
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
 from floatbase.lessons.publish.contents import equation_ranges, title_of
+from floatbase.lessons.publish.live import folder as live_folder
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import mathml, reference
 from floatbase.lessons.publish.site.addresses import addresses
+from floatbase.lessons.publish.site.live_robots import (
+    LESSON_ROBOTS,
+    LIVE_FOLDER,
+    add_robot,
+    robot_script,
+)
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, anchor_of
 from floatbase.lessons.publish.workspace import NOTEBOOKS
@@ -34,6 +41,7 @@ _MOVED = {
     "../benchmarks/": "benchmarks/",
     "../CHANGELOG.md": "changelog.md",
 }
+_NO_LIVE = "This build has no live robots, because npm could not install MuJoCo for JavaScript."
 _FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
 _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
@@ -72,18 +80,26 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
     *notebooks, scene = run_lessons(
         [*([] if stored else shown), _front_page_notebook()], RUN_FOLDER
     ).values()
+    has_live = live_folder.install_mujoco() is not None
+    if not has_live:
+        print(_NO_LIVE)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         source, built = Path(place) / "source", Path(place) / "site"
         pictures = Pictures(built / "_static")
         shutil.copytree(DOCS, source)
         (source / "benchmarks").mkdir()
         _write_lessons(
-            source, dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)), pictures
+            source,
+            dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)),
+            pictures,
+            has_live,
         )
-        _write_texts(source, shown, _first_picture(scene, pictures))
+        _write_texts(source, shown, _first_picture(scene, pictures), has_live)
         _write_reference(source / "api")
         _run_sphinx(source, built)
         pictures.write()
+        if has_live:
+            live_folder.write(built / "_static" / LIVE_FOLDER)
         pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
         mathml.write_font(pages, built / "_static" / mathml.FONT)
         replace_site(built, folder)
@@ -126,18 +142,22 @@ def _front_page_notebook() -> Path:
     return path
 
 
-def _write_lessons(source: Path, notebooks: dict[Path, Any], pictures: Pictures) -> None:
+def _write_lessons(
+    source: Path, notebooks: dict[Path, Any], pictures: Pictures, has_live: bool
+) -> None:
     """Write the page of each lesson."""
     addresses = {path.name.split("_")[0]: path.name for path in notebooks}
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
-        nbformat.write(
-            prepare_lesson(notebook, pictures, addresses), source / "lessons" / path.name
-        )
+        prepared = prepare_lesson(notebook, pictures, addresses)
+        number = path.name.split("_")[0]
+        if has_live and number in LESSON_ROBOTS:
+            add_robot(prepared, number)
+        nbformat.write(prepared, source / "lessons" / path.name)
 
 
 def _first_picture(notebook: Any, pictures: Pictures) -> str:
-    """Return the first picture of a notebook as Markdown, or as an image."""
+    """Return the first picture of a notebook as HTML."""
     data = next(
         output.data for cell in notebook.cells for output in cell.outputs if "data" in output
     )
@@ -145,7 +165,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
     image = (
         f'<img alt="go2 steps after a push" src="data:image/png;base64,{data.get("image/png")}">'
     )
-    return f"```{{raw}} html\n{placed or image}\n```"
+    return placed or image
 
 
 def _toctrees(lessons: Sequence[Path]) -> str:
@@ -174,8 +194,11 @@ def _lesson_table(known: Iterable[Path]) -> str:
     return "\n".join(["| lesson | equations |", "|---|---|", *rows])
 
 
-def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
+def _write_texts(source: Path, lessons: Sequence[Path], scene: str, has_live: bool) -> None:
     """Write all pages that are not lessons, with their links, and copy the benchmark figures."""
+    script, missing = ("", f"\n<p>{_NO_LIVE}</p>\n")
+    if has_live:
+        script, missing = robot_script("_static/"), ""
     made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
@@ -197,8 +220,9 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str) -> None:
             "scene": scene,
             "lessons": _lesson_table(lessons),
             "toctrees": _toctrees(lessons),
+            "live script": script + missing,
         }.items():
-            text = text.replace(f"{{{name}}}", part) if path == source / "index.md" else text
+            text = text.replace(f"{{{name}}}", part) if path.parent == source else text
         way = (
             ""
             if path.parent.name == "lessons"

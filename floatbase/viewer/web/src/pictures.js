@@ -39,7 +39,7 @@ async function contents(name) {
 function startScene(place, {keys, commands}) {
   const frame = make("iframe", {title: place.querySelector("img").alt});
   let isReady = false, now = new Map(), goal = null, isSeen = true;
-  const post = (message, ...more) => frame.contentWindow.postMessage(message, "*", ...more);
+  const post = (message, ...more) => frame.contentWindow?.postMessage(message, "*", ...more);
   const send = () => {
     const {ended, gone, commands: numbers} = difference(now, goal, keys);
     const joined = joinFrame(numbers.map((number) => commands[number]));

@@ -3,7 +3,7 @@
 import {createAddress} from "./address.js";
 import {createCamera} from "./camera.js";
 import {element} from "./dom.js";
-import {createDrag} from "./drag.js";
+import {createDrag, sliderDrag} from "./drag.js";
 import {createInteraction} from "./interaction.js";
 import {createLegend} from "./legend.js";
 import {splitFrame} from "./loader.js";
@@ -31,7 +31,7 @@ export function createScene(config) {
   const legend = createLegend(camera, theme.colour);
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
-  createDrag(viewer, panel.controls);
+  if (config.mode !== "robot") createDrag(viewer, sliderDrag(panel.controls));
   new ResizeObserver(([{target}]) => {
     element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
   }).observe(element("title"));
@@ -69,6 +69,7 @@ export function createScene(config) {
   viewer.gui_controllers = panel.controls; // for programs that control the page from outside
   return {
     viewer,
+    controls: panel.controls,
     // Draw a frame. A command that fails is reported; the others are still executed.
     apply(frame) {
       for (const command of splitFrame(frame)) {

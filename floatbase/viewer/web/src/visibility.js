@@ -9,7 +9,7 @@ const REST_AFTER = 1000; // ms out of sight
 const UNSEEN = 500; // ms; a picture that is never scrolled to is not drawn at all
 
 // changed(isSeen) is called initially and whenever the page enters or leaves the visible area.
-function watchSight(changed) {
+export function watchSight(changed) {
   if (window.top === window) return changed(true);
   const observer = new IntersectionObserver((entries) => changed(entries.at(-1).isIntersecting));
   observer.observe(document.documentElement);

@@ -1,0 +1,323 @@
+"""Robots as data for a web page: the model of the physics, and the problem arrays of the tick.
+
+Everything that a control of the page changes has its name and its place in the arrays. The places
+are found by comparison: the arrays are packed again with another value, and what differs depends on
+that value.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import floatbase as fb
+from floatbase._validation import Array
+from floatbase.control import WholeBodyController
+from floatbase.control.limits import force_rows
+from floatbase.control.problem import Problem
+from floatbase.control.tick import tick
+from floatbase.control.tick.compiled import CompiledTick
+from floatbase.control.tick.problem_arrays import pack_problem
+from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
+from floatbase.objectives import CoMTask, FrameTask, Task
+from floatbase.robots import Robot, State
+from floatbase.simulation import Simulation
+from floatbase.simulation.after_fall import joint_damping
+from floatbase.simulation.build import build_spec
+from floatbase.simulation.physics import FALLEN_COSINE, FALLEN_HEIGHT_FRACTION
+
+ROBOTS = ("go2", "solo12", "talos")
+MU = 0.7  # friction coefficient, assumed and actual, before anything is changed
+FACETS = (4, 8, 16)
+TIMESTEP = 1e-3  # s
+LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
+# the fraction of the way from the middle of all feet to that of three feet that the centre of mass
+# moves before the fourth foot is lifted
+_SHIFT_FRACTION = 0.8
+# fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
+# hulls of the links have them, on which a fallen robot lies
+_ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
+_TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
+
+
+def robot_data(robot: Robot) -> dict[str, Any]:
+    """Return a robot and the problems of its stances as data for the page's engine.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating-base robot with feet that stands on level ground.
+
+    Returns
+    -------
+    dict
+        Plain lists and numbers, for JSON. Floating-point numbers keep all their digits.
+
+    Raises
+    ------
+    InputError
+        If the robot has a fixed base or joints without limits.
+    """
+    if not robot.is_floating or robot.nq != robot.nv + 1:
+        raise InputError(
+            f"{robot.name} has a fixed base, or joints without limits. The page needs a floating "
+            f"base and joints with limits."
+        )
+    standing, sim = robot.standing(), Simulation(robot, MU, TIMESTEP)
+    sim.reset(standing)
+    xml = build_spec(robot, sim.ground, TIMESTEP).to_xml()
+    model, conversion = sim.model, sim._conversion
+    joints = [model.joint(name) for name in robot.joint_names]
+    return {
+        "name": robot.name,
+        "xml": xml,
+        "overrides": _lost_digits(model, xml),
+        "nq": robot.nq,
+        "nv": robot.nv,
+        "d": robot.d,
+        "mass": robot.mass,
+        "weight": robot.weight,
+        "gravity": robot.gravity,
+        "mu": MU,
+        "facets": FACETS,
+        "fallenHeight": FALLEN_HEIGHT_FRACTION,
+        "fallenCosine": FALLEN_COSINE,
+        "home": {"qpos": sim.data.qpos.tolist(), "com": standing.com.tolist()},
+        # in the package's order: entries of qpos and qvel, bodies that joints move, joints
+        "qposOfQ": conversion._qpos_of_q.tolist(),
+        "qvelOfV": conversion._qvel_of_v.tolist(),
+        "bodies": [0, 1, *(int(joint.bodyid[0]) for joint in joints)],
+        "joints": [int(joint.id) for joint in joints],
+        "motors": sim._actuator_ids.tolist(),
+        "jointNames": list(robot.joint_names),
+        "torqueLimits": robot.torque_limits.tolist(),
+        "damping": joint_damping(sim, TIMESTEP).tolist(),
+        "hulls": sim._hull_geoms.tolist(),
+        "hullBodies": sim._hull_bodies.tolist(),
+        "points": [
+            {"name": name, "geom": int(geom), "radius": float(model.geom_size[geom, 0])}
+            for name, geom in zip(sim.point_names, sim.foot_contacts.geoms, strict=True)
+        ],
+        "problems": {
+            name: _problem_data(robot, standing, lifted, facets)
+            for name, lifted, facets in _variants(robot)
+        },
+    }
+
+
+def robot_json(robot: Robot, more: Mapping[str, Any] | None = None) -> str:
+    """Return `robot_data` as JSON text that JavaScript reads, infinite numbers included.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating-base robot with feet that stands on level ground.
+    more : mapping, optional
+        Further data.
+
+    Returns
+    -------
+    str
+        The text.
+    """
+    text = json.dumps(robot_data(robot) | dict(more or {}), separators=(",", ":"))
+    # JSON has no infinity, but JavaScript reads a number that is too large as one
+    return text.replace("Infinity", "1e999")
+
+
+def controller(
+    robot: Robot,
+    mu: float = MU,
+    lifted: str | None = None,
+    facets: int = FACETS[0],
+    torque_fraction: float = 1.0,
+) -> WholeBodyController:
+    """Make the controller that the page runs, in Python.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    mu : float, optional
+        Assumed friction coefficient [-].
+    lifted : str, optional
+        Name of a foot that is lifted; None to stand on all feet.
+    facets : int, optional
+        Number of facets of the friction polyhedra.
+    torque_fraction : float, optional
+        Fraction of the torque limits that is used [-].
+
+    Returns
+    -------
+    WholeBodyController
+        The controller.
+    """
+    standing = robot.standing()
+    tasks: list[Any] = list(fb.standing_tasks(standing))
+    if lifted is not None:
+        tasks[0] = replace(tasks[0], position=_three_feet_com(standing, lifted))
+        tasks.append(FrameTask(lifted, standing.point(lifted) + [0.0, 0.0, LIFT_HEIGHT]))
+    return WholeBodyController(
+        robot,
+        _stance(robot, mu, lifted),
+        tasks,
+        facets=facets,
+        torque_limits=torque_fraction * robot.torque_limits,
+    )
+
+
+def _variants(robot: Robot) -> Iterator[tuple[str, str | None, int]]:
+    """Yield name, lifted foot and number of facets of each problem."""
+    three = [foot.frame for foot in robot.feet] if len(robot.feet) == 4 else []
+    for lifted in (None, *three):
+        for facets in FACETS:
+            yield f"{lifted or 'all'}/{facets}", lifted, facets
+
+
+def _stance(robot: Robot, mu: float, lifted: str | None) -> Contacts:
+    """Return the contacts of all feet, without a lifted one."""
+    feet = Contacts.feet(robot, mu)
+    return feet if lifted is None else feet.without(lifted)
+
+
+def _three_feet_com(standing: State, lifted: str) -> Array:
+    """Return the target of the centre of mass with one foot lifted, shape (3,) [m]."""
+    feet = Contacts.feet(standing.robot)
+    middle = feet.positions(standing).mean(axis=0)
+    shift = feet.without(lifted).positions(standing).mean(axis=0) - middle
+    return standing.com + _SHIFT_FRACTION * shift * [1.0, 1.0, 0.0]
+
+
+def _lost_digits(model: mujoco.MjModel, xml: str) -> dict[str, list[float]]:
+    """Return the fields of a model that its XML file does not hold to the last digit."""
+    read, lost = mujoco.MjModel.from_xml_string(xml), {}
+    for name in dir(model):
+        exact: Any = getattr(model, name) if name.startswith(_ROUNDED_FIELDS) else None
+        is_real = isinstance(exact, np.ndarray) and exact.dtype.kind == "f"
+        if is_real and not np.array_equal(exact, getattr(read, name)):
+            lost[name] = exact.ravel().tolist()
+    return lost
+
+
+def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int) -> dict[str, Any]:
+    """Return the problem arrays of one stance, and the places of what controls change."""
+    made = controller(robot, lifted=lifted, facets=facets)
+    compiled = made.compiled
+    assert compiled is not None  # all of its objects are built in
+    sizes, ints, floats, *_ = pack_problem(made.problem)
+    inputs = compiled.default_inputs
+    n_floats, n_ints = tick.workspace_sizes(sizes, 0)
+    places = _target_places(made.problem, compiled)
+
+    def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
+        limits = replace(
+            made.limits, torque_limits=torque_fraction * np.array(made.limits.torque_limits)
+        )
+        contacts = _stance(robot, mu, lifted)
+        return pack_problem(replace(made.problem, contacts=contacts, limits=limits))[2]
+
+    return {
+        "lifted": lifted,
+        "facets": facets,
+        "sizes": sizes.tolist(),
+        "ints": ints.tolist(),
+        "floats": floats.tolist(),
+        "inputs": inputs.packed.tolist(),
+        "workspace": [n_floats, n_ints],
+        "resultSize": compiled.empty_result(inputs).size,
+        "k": made.contacts.k,
+        "points": list(made.contacts.point_names),
+        "rows": _row_names(made),
+        "parameters": {
+            "mu": _friction_places(packed_with, MU),
+            "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
+            # the tables begin with a counter and the mass of joint 0, the world, and its position
+            "baseMass": 1 + 4,
+            **places,
+        },
+        "comTarget": inputs.packed[places["com"]].tolist(),
+    }
+
+
+def _row_names(made: WholeBodyController) -> list[tuple[str, str, int]]:
+    """Return kind, owner and number of the rows that the tick numbers, as `Inequalities` has them.
+
+    Rows beyond the last one here do not occur in these problems.
+    """
+    labels = force_rows(made.contacts, made.limits)[1]
+    rows = [
+        (label.kind, label.owner, int(str(label).split()[-1]) if label.kind == "friction" else 0)
+        for label in labels
+    ]
+    rows += [("largest normal force", name, 0) for name in made.contacts.point_names]
+    joints = made.robot.joint_names
+    rows += [(f"{side} torque limit", name, 0) for side in ("upper", "lower") for name in joints]
+    rows += [(f"{side} joint limit", name, 0) for side in ("upper", "lower") for name in joints]
+    return rows
+
+
+def _linear_places(packed: Callable[[float], Array], value: float) -> dict[str, Any]:
+    """Return where numbers depend linearly on a value, and how: base + slope × value."""
+    at, first, second, third = _three_packed(packed, value)
+    slope = (second - first) / (0.5 * value)
+    base = first - slope * value
+    _check(base + slope * 2.0 * value, third)
+    return {"at": at.tolist(), "base": base.tolist(), "slope": slope.tolist()}
+
+
+def _friction_places(packed: Callable[[float], Array], mu: float) -> dict[str, Any]:
+    """Return where numbers depend on μ: linear ones, and lengths √(base + slope μ²) of rows."""
+    at, first, second, third = _three_packed(packed, mu)
+    slope = (second - first) / (0.5 * mu)
+    base = first - slope * mu
+    linear = np.isclose(base + slope * 2.0 * mu, third, rtol=_TOLERANCE, atol=_TOLERANCE)
+    squared_slope = (second**2 - first**2) / (1.25 * mu**2)
+    squared = first**2 - squared_slope * mu**2
+    _check(np.sqrt(squared + squared_slope * 4.0 * mu**2)[~linear], third[~linear])
+    return {
+        "at": at[linear].tolist(),
+        "base": base[linear].tolist(),
+        "slope": slope[linear].tolist(),
+        "lengthAt": at[~linear].tolist(),
+        "lengthBase": squared[~linear].tolist(),
+        "lengthSlope": squared_slope[~linear].tolist(),
+    }
+
+
+def _three_packed(packed: Callable[[float], Array], value: float) -> tuple[Any, ...]:
+    """Return which numbers depend on a value, and these numbers at 1, 1.5 and 2 times the value."""
+    first, second, third = (packed(factor * value) for factor in (1.0, 1.5, 2.0))
+    at = np.flatnonzero(first != third)
+    return at, first[at], second[at], third[at]
+
+
+def _check(found: Array, expected: Array) -> None:
+    """Assert that numbers follow the rule by which the page will compute them."""
+    assert np.allclose(found, expected, rtol=_TOLERANCE, atol=_TOLERANCE)
+
+
+def _target_places(problem: Problem, compiled: CompiledTick) -> dict[str, Any]:
+    """Return where the targets of the centre of mass and of a lifted foot are among the inputs."""
+    inputs = compiled.default_inputs.packed
+
+    def places(kind: type[CoMTask] | type[FrameTask]) -> tuple[Task, list[int]]:
+        tasks = list(problem.tasks)
+        (index,) = [i for i, task in enumerate(tasks) if isinstance(task, kind)]
+        task: Any = tasks[index]
+        tasks[index] = replace(task, position=np.array(task.position) + 1.0)
+        targets = pack_problem(replace(problem, tasks=tasks))[3]
+        at = np.flatnonzero(targets != inputs[: targets.size])
+        assert len(at) == 3
+        return task, [int(i) for i in at]
+
+    found: dict[str, Any] = {"com": places(CoMTask)[1]}
+    if any(isinstance(task, FrameTask) for task in problem.tasks):
+        _, (_, _, found["lift"]) = places(FrameTask)
+        found["liftedHeight"] = float(inputs[found["lift"]])
+    return found

@@ -1,0 +1,171 @@
+"""The compiled tick as WebAssembly: one module that serves every robot, built from the same Python.
+
+numba compiles `control.tick` to LLVM's intermediate code. llvmlite turns that code into an object
+file for WebAssembly, and the linker wasm-ld makes a module of it. The module is kept beside the
+pages' JavaScript with a digest of its sources, so that only a change of the tick needs the linker.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from hashlib import sha256
+from pathlib import Path
+
+from floatbase.control.tick.jit import source_digest
+from floatbase.errors import InputError
+from floatbase.viewer.web import pages
+
+MODULE = pages.DIST.parent / "live" / "tick.wasm"
+DIGEST = MODULE.with_suffix(".sha256")
+ENTRY = "tick"  # name of the exported function
+
+_LINKERS = ("wasm-ld", *(f"wasm-ld-{version}" for version in range(25, 13, -1)))
+# numba's helper that checks whether an array can be reshaped without a copy. The tick reshapes
+# only contiguous arrays, whose new strides follow from the new shape: (ndim, shape, strides, new
+# ndim, new shape, new strides, item size, is Fortran order) -> 1 if possible
+_RESHAPE = """
+define i32 @numba_attempt_nocopy_reshape(
+    i64 %nd, ptr %dims, ptr %strides, i64 %n, ptr %shape, ptr %result, i64 %item, i32 %fortran) {
+entry:
+  br label %test
+test:
+  %i = phi i64 [ %n, %entry ], [ %at, %step ]
+  %stride = phi i64 [ %item, %entry ], [ %next, %step ]
+  %more = icmp sgt i64 %i, 0
+  br i1 %more, label %step, label %end
+step:
+  %at = sub i64 %i, 1
+  %index = trunc i64 %at to i32
+  %place = getelementptr i64, ptr %result, i32 %index
+  store i64 %stride, ptr %place, align 8
+  %from = getelementptr i64, ptr %shape, i32 %index
+  %length = load i64, ptr %from, align 8
+  %next = mul i64 %stride, %length
+  br label %test
+end:
+  ret i32 1
+}
+"""
+
+
+def linker() -> str | None:
+    """Return the path of the linker for WebAssembly, or None if there is none."""
+    return next((path for name in _LINKERS if (path := shutil.which(name))), None)
+
+
+def current_digest() -> str:
+    """Return the digest of all sources of the module: those of the tick, and this file."""
+    own = Path(__file__).read_bytes()
+    return sha256(f"{source_digest()} ".encode() + own).hexdigest()
+
+
+def is_current() -> bool:
+    """Return whether the module on disk was built from the present sources."""
+    return DIGEST.is_file() and DIGEST.read_text().strip() == current_digest()
+
+
+def build(module: Path = MODULE) -> int:
+    """Compile the tick to WebAssembly, and write the module and the digest of its sources.
+
+    Parameters
+    ----------
+    module : Path
+        Where to write the module. The digest is written beside it.
+
+    Returns
+    -------
+    int
+        Size of the module [bytes].
+
+    Raises
+    ------
+    InputError
+        If there is no linker for WebAssembly.
+    """
+    program = linker()
+    if program is None:
+        raise InputError(
+            "The linker wasm-ld is missing, which makes the WebAssembly module of the controller. "
+            "Install it (on Debian and Ubuntu: apt install lld)."
+        )
+    with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
+        compiled = Path(place) / "tick.o"
+        # numba reads the target from the environment when it is imported. A generic processor
+        # leaves no instructions in the code that WebAssembly does not have
+        target = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": place}
+        subprocess.run(
+            [sys.executable, "-m", __name__, str(compiled)], env=os.environ | target, check=True
+        )
+        module.parent.mkdir(parents=True, exist_ok=True)
+        exports = [f"--export={name}" for name in (ENTRY, "__heap_base", "__stack_pointer")]
+        options = ["--no-entry", "--allow-undefined", "--gc-sections", "--strip-all", *exports]
+        subprocess.run([program, *options, "-o", str(module), str(compiled)], check=True)
+    module.with_suffix(".sha256").write_text(f"{current_digest()}\n")
+    return module.stat().st_size
+
+
+def _write_object(path: Path) -> None:
+    """Write the tick as an object file for WebAssembly."""
+    import llvmlite.binding as llvm
+    import numba
+    import numpy as np
+
+    import floatbase as fb
+    from floatbase.control.tick import jit, tick
+    from floatbase.control.tick.compiled import CompiledTick
+
+    robot = fb.load("go2")  # the types of the arguments are the same for every robot
+    tasks = fb.standing_tasks(robot.standing())
+    contacts = fb.Contacts.feet(robot)
+    controller = fb.WholeBodyController(robot, contacts, tasks, backend="reference")
+    compiled = CompiledTick(controller.problem)
+    inputs = compiled.default_inputs
+    arguments = (
+        np.array(robot.standing().q),
+        np.zeros(robot.nv),
+        inputs.packed,
+        *compiled.arguments,
+        compiled.empty_result(inputs),
+        tick.N_STAGES,
+    )
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    function = jit.jit(tick.tick.py_func)
+    function.compile(signature)
+    name = function.overloads[function.signatures[0]].fndesc.llvm_func_name
+    code = _for_wasm(function.inspect_llvm(function.signatures[0]), name)
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    machine = llvm.Target.from_triple("wasm32-unknown-unknown").create_target_machine(
+        opt=3, features="+simd128,+bulk-memory", reloc="static"
+    )
+    parsed = llvm.parse_assembly(f'target datalayout = "{machine.target_data}"\n{code}')
+    parsed.verify()
+    path.write_bytes(machine.emit_object(parsed))
+
+
+def _for_wasm(code: str, entry: str) -> str:
+    """Return LLVM's intermediate code without what is special about the processor it was made for.
+
+    entry: name of the function that is exported.
+    """
+    code = re.sub(r'target triple = ".*"', 'target triple = "wasm32-unknown-unknown"', code)
+    code = re.sub(r'target datalayout = ".*"', "", code)
+    code = re.sub(r'"target-(cpu|features)"="[^"]*"', "", code)
+    # WebAssembly has no common symbols
+    code = re.sub(r"= common (local_unnamed_addr )?global", "= internal global", code)
+    # reference counts are atomic on x86. Only code that allocates has them: see `engine.js`
+    code = code.replace("@llvm.x86.", "@x86_")
+    code = re.sub(
+        r"^declare.*@x86_.*$", lambda found: found[0].replace("immarg", ""), code, flags=re.M
+    )
+    code = re.sub(r"^declare i32 @numba_attempt_nocopy_reshape\(.*$", "", code, flags=re.M)
+    return code.replace(f"@{entry}(", f"@{ENTRY}(") + _RESHAPE
+
+
+if __name__ == "__main__":
+    _write_object(Path(sys.argv[1]))

@@ -1,0 +1,115 @@
+"""Live robots in the pages of the site: their script, and the robots of lessons."""
+
+from __future__ import annotations
+
+import html
+from typing import Any, NamedTuple
+
+from nbformat.v4 import new_markdown_cell
+
+LIVE_FOLDER = "live"  # in the site's static files
+_HEIGHT = "26rem"
+
+
+class LessonRobot(NamedTuple):
+    """A live robot in a lesson.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    attributes : dict
+        Attributes of the element, as the page *Embed* lists them.
+    text : str
+        What to try, in Markdown.
+    """
+
+    name: str
+    attributes: dict[str, str]
+    text: str
+
+
+# number of a lesson -> its live robot, at the end of the lesson
+LESSON_ROBOTS = {
+    "00": LessonRobot("go2", {}, "Push go2 where you like, and find a push that makes it fall."),
+    "05": LessonRobot(
+        "go2",
+        {"panel": "1"},
+        "Push the centre of mass. *push-recovery map* computes the largest push that go2 survives "
+        "in each direction. Open *where it stands*, move the centre of mass, and compute the map "
+        "again.",
+    ),
+    "06": LessonRobot(
+        "go2",
+        {"panel": "1", "mu": "0.3"},
+        "The friction coefficient is 0.3, so a moderate push brings forces to the facets of their "
+        "cones. Open *ground and load*, and let the controller assume more friction than there is.",
+    ),
+    "07": LessonRobot(
+        "go2",
+        {"panel": "1"},
+        "Open *constraints*, and read the multipliers of the active constraints while you push. "
+        "Open *gravity and motors*, and lower the torque limits until one becomes active.",
+    ),
+    "09": LessonRobot(
+        "talos",
+        {"panel": "1"},
+        "Talos stands on two flat feet, with four forces at each. Push it, and see which corners "
+        "of its feet lose their force first.",
+    ),
+}  # fmt: skip
+
+
+def robot_script(static: str) -> str:
+    """Return the element that loads the script of live robots.
+
+    Parameters
+    ----------
+    static : str
+        Address of the site's static files, relative to the page.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    return f'<script src="{static}{LIVE_FOLDER}/floatbase-live.js"></script>'
+
+
+def robot_element(robot: LessonRobot) -> str:
+    """Return the element of a live robot.
+
+    Parameters
+    ----------
+    robot : LessonRobot
+        The robot.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    attributes = {"name": robot.name} | robot.attributes
+    written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
+    style = f"display: block; margin: 1rem 0; height: {_HEIGHT}"
+    words = "A live robot appears here in a browser with WebAssembly, if the page is on a server."
+    return f'<floatbase-robot {written} style="{style}"><p>{words}</p></floatbase-robot>'
+
+
+def add_robot(notebook: Any, number: str) -> None:
+    """Add the live robot of a lesson to its end, in place.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The lesson, prepared for the site.
+    number : str
+        Number of the lesson.
+    """
+    robot = LESSON_ROBOTS[number]
+    raw = f"{robot_script('../_static/')}\n{robot_element(robot)}"
+    text = (
+        f"## Live: push {robot.name}\n\n{robot.text}\n\n```{{raw}} html\n{raw}\n```\n\n"
+        "[All controls and robots](../live.md)"
+    )
+    notebook.cells.append(new_markdown_cell(text))

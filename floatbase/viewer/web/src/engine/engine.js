@@ -1,0 +1,224 @@
+// A robot with its controller in MuJoCo: one control step per millisecond. Deterministic: the same
+// settings and pushes give the same run. It needs neither a page nor a clock.
+
+import {createDynamics} from "./dynamics.js";
+import {contactForces, makeModel} from "./model.js";
+import {NO_ANSWER, createTick, setParameter} from "./tick.js";
+
+export const STEP = 1e-3; // s
+const REST = 1.5; // s that a fallen robot lies before it is put on its feet again
+const TARGET_SPEED = 0.1; // m/s with which a target moves to where a control sets it
+const SHIFT_TIME = 2; // s, at most, until the centre of mass is over three feet
+const SHIFTED = 0.01; // m: near enough to its target to lift a foot
+const LOWER_SPEED = 0.05; // m/s of a foot that is set down
+const LOWER_TIME = 2; // s, at most
+
+// Settings before anything is changed. Friction, payload: the controller assumes one value, the
+// other is actual.
+export const defaults = (robot) => ({
+  mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
+  height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
+});
+
+// mj: MuJoCo. module: the control step's WebAssembly module. robot: its data.
+export function createEngine(mj, module, robot) {
+  const actual = makeModel(mj, robot), assumed = makeModel(mj, robot);
+  const {d, nv, points, bodies} = robot, base = bodies[1];
+  const tick = createTick(module, robot), {views} = tick;
+  const buffer = new mj.DoubleBuffer(6);
+  const updateDynamics = createDynamics(mj, assumed.model, assumed.data, robot, views);
+  let settings = defaults(robot), pushes = [], outcome = "", active = 0, steps = 0, offAt = -1;
+  let target = [0, 0, 0], shift = [0, 0, 0]; // m, of the centre of mass from its place at rest
+  let stance = {lifted: null, since: 0, lower: 0}; // the foot that is in the air
+  let startHeight = 0, startAxis = [0, 0, 1], qpos = null, qvel = null, ctrl = null;
+
+  // MuJoCo's memory may move when it grows; views into it are then empty.
+  function refresh() {
+    ({qpos, qvel, ctrl} = actual.data);
+  }
+  function select() {
+    tick.select(`${stance.lifted ?? "all"}/${settings.facets}`);
+    const {parameters} = tick.problem;
+    setParameter(views.floats, parameters.mu, settings.mu);
+    setParameter(views.floats, parameters.torque, settings.torque);
+    views.floats[parameters.baseMass] = assumed.baseMass + settings.payload;
+    placeTargets();
+  }
+  function placeTargets() {
+    const {parameters} = tick.problem;
+    for (let i = 0; i < 3; i++) views.inputs[parameters.com[i]] = robot.home.com[i] + target[i];
+    if (stance.lifted) {
+      views.inputs[parameters.lift] = parameters.liftedHeight - stance.lower;
+    }
+  }
+  function apply() {
+    assumed.change(settings);
+    actual.change({payload: settings.actualPayload, gravity: settings.gravity});
+    actual.setFriction(settings.actualMu);
+    actual.setTorque(settings.torque);
+    select();
+  }
+  function reset() {
+    actual.setHulls(false);
+    mj.mj_resetData(actual.model, actual.data);
+    refresh();
+    qpos.set(robot.home.qpos);
+    mj.mj_forward(actual.model, actual.data);
+    pushes = [];
+    [outcome, active, steps, offAt] = ["", 0, 0, -1];
+    stance = {lifted: null, since: 0, lower: 0};
+    [target, shift] = [[0, 0, 0], [0, 0, 0]];
+    startHeight = actual.data.xpos[3 * base + 2];
+    startAxis = [2, 5, 8].map((i) => actual.data.xmat[9 * base + i]);
+    apply();
+  }
+
+  // Move a number towards another by at most `most`.
+  const towards = (from, to, most) => from + Math.max(-most, Math.min(most, to - from));
+  function moveTargets() {
+    const wanted = [settings.forward, settings.left, settings.height];
+    const name = settings.lifted ?? stance.lifted;
+    const isOver = settings.lifted && (!stance.lifted || stance.lifted === settings.lifted);
+    const place = name && isOver ? robot.problems[`${name}/${settings.facets}`].comTarget : null;
+    let hasMoved = false;
+    for (let i = 0; i < 3; i++) {
+      // the foot must be on the ground before the centre of mass leaves the other three
+      if (!stance.lifted || isOver) shift[i] = place ? place[i] - robot.home.com[i] : 0;
+      const next = towards(target[i], wanted[i] + shift[i], TARGET_SPEED * STEP);
+      hasMoved ||= next !== target[i];
+      target[i] = next;
+    }
+    return hasMoved;
+  }
+  // Lift a foot once the centre of mass is over the others; set it down before it carries again.
+  function moveFeet() {
+    const time = (steps - stance.since) * STEP;
+    if (stance.lifted === settings.lifted) {
+      stance.since = steps;
+      if (stance.lower === 0) return false;
+      stance.lower = Math.max(0, stance.lower - LOWER_SPEED * STEP);
+      return true;
+    }
+    if (stance.lifted === null) {
+      const com = actual.data.subtree_com.subarray(3 * base, 3 * base + 3);
+      const place = robot.problems[`${settings.lifted}/${settings.facets}`].comTarget;
+      const away = Math.hypot(com[0] - place[0] - settings.forward,
+        com[1] - place[1] - settings.left);
+      if (away > SHIFTED && time < SHIFT_TIME) return false;
+      stance = {lifted: settings.lifted, since: steps, lower: 0};
+    } else {
+      stance.lower += LOWER_SPEED * STEP;
+      const isDown = points.some(({name, geom, radius}) => name === stance.lifted
+        && actual.data.geom_xpos[3 * geom + 2] < radius);
+      if (!isDown && time < LOWER_TIME) return true;
+      stance = {lifted: null, since: steps, lower: 0};
+    }
+    select();
+    return false;
+  }
+
+  function command() {
+    if (moveFeet() | moveTargets()) placeTargets();
+    assumed.data.qpos.set(qpos);
+    assumed.data.qvel.set(qvel);
+    updateDynamics();
+    active = tick.run();
+    if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
+    for (let i = 0; i < d; i++) ctrl[robot.motors[i]] = views.result[nv + i];
+  }
+  // The controller ends; the joints are damped, and the robot comes to lie on its links.
+  function stop(why) {
+    outcome = why;
+    offAt = steps;
+    actual.setHulls(true);
+    damp();
+  }
+  function damp() {
+    const {motors, damping, qvelOfV} = robot;
+    for (let i = 0; i < d; i++) ctrl[motors[i]] = -damping[i] * qvel[qvelOfV[6 + i]];
+  }
+  function applyPushes() {
+    const forces = actual.data.xfrc_applied;
+    forces.fill(0);
+    const time = steps * STEP;
+    for (const {body, at, force, start, duration} of pushes) {
+      const share = (Math.min(start + duration, time + STEP) - Math.max(start, time)) / STEP;
+      if (share < 1e-6) continue;
+      const {xpos, xmat, xipos} = actual.data, f = force.map((x) => share * x);
+      const r = [0, 1, 2].map((i) => xpos[3 * body + i] - xipos[3 * body + i]
+        + [0, 1, 2].reduce((sum, c) => sum + xmat[9 * body + 3 * i + c] * at[c], 0));
+      const moment = [r[1] * f[2] - r[2] * f[1], r[2] * f[0] - r[0] * f[2],
+        r[0] * f[1] - r[1] * f[0]];
+      [...f, ...moment].forEach((x, i) => { forces[6 * body + i] += x; });
+    }
+    pushes = pushes.filter(({start, duration}) => start + duration > time);
+  }
+  function isFallen() {
+    const {xpos, xmat} = actual.data;
+    const axis = [2, 5, 8].reduce((sum, at, i) => sum + xmat[9 * base + at] * startAxis[i], 0);
+    const sunk = startHeight - xpos[3 * base + 2];
+    return sunk > (1 - robot.fallenHeight) * startHeight || axis < robot.fallenCosine;
+  }
+
+  reset();
+  return {
+    tick,
+    updateDynamics,
+    actual,
+    assumed,
+    reset,
+    get settings() { return settings; },
+    get time() { return steps * STEP; },
+    // "" while the controller runs, then why it does not: "fell", "infeasible", "no answer"
+    get outcome() { return outcome; },
+    get pushes() { return pushes; },
+    get lifted() { return stance.lifted; },
+    set(changes) {
+      settings = {...settings, ...changes};
+      apply();
+    },
+    // Push with a force, world frame [N], at a point of a body, in the body's frame [m].
+    push({body = base, at = [0, 0, 0], force, start = steps * STEP, duration}) {
+      pushes.push({body, at, force, start, duration});
+    },
+    step() {
+      if (qpos.length === 0) refresh();
+      if (outcome === "") command();
+      else damp();
+      applyPushes();
+      mj.mj_step(actual.model, actual.data);
+      steps++;
+      if (outcome === "" && isFallen()) stop("fell");
+      return outcome;
+    },
+    // Whether a robot that fell has lain long enough.
+    get isAtRest() { return offAt >= 0 && (steps - offAt) * STEP > REST; },
+    com: () => [...actual.data.subtree_com.subarray(3 * base, 3 * base + 3)],
+    measuredForces: () => contactForces(mj, actual, robot, buffer),
+    // Planned forces of all contact points, zero for those of a lifted foot.
+    plannedForces() {
+      const forces = new Float64Array(3 * points.length);
+      if (outcome !== "") return forces;
+      tick.problem.points.forEach((name, i) => {
+        const point = points.findIndex((one) => one.name === name);
+        forces.set(views.result.subarray(nv + d + 3 * i, nv + d + 3 * i + 3), 3 * point);
+      });
+      return forces;
+    },
+    torques: () => [...views.result.subarray(nv, nv + d)],
+    // Active constraints: [kind, owner, number, multiplier].
+    activeConstraints() {
+      if (outcome !== "" || active <= 0) return [];
+      const {k, rows} = tick.problem, first = nv + d + k, n = nv + k;
+      return Array.from({length: active}, (_, i) => [
+        ...(rows[views.result[first + n + i]] ?? ["other", "", 0]),
+        Math.max(0, views.result[first + i]),
+      ]);
+    },
+    free() {
+      actual.free();
+      assumed.free();
+      buffer.delete();
+    },
+  };
+}

@@ -1,0 +1,59 @@
+// MuJoCo's models of a robot: one for the physics, one for what the controller assumes.
+
+// Make a model and its data, with all digits. mj: MuJoCo. robot: its data.
+export function makeModel(mj, robot) {
+  const model = mj.MjModel.from_xml_string(robot.xml);
+  for (const [name, values] of Object.entries(robot.overrides)) model[name]?.set(values);
+  const base = robot.bodies[1], baseMass = model.body_mass[base];
+  const data = new mj.MjData(model), scratch = new mj.MjData(model);
+  return {
+    model, data, baseMass,
+    // payload: kg at the base's centre of mass. gravity: m/s², downwards.
+    change({payload, gravity}) {
+      model.opt.gravity[2] = -gravity;
+      if (model.body_mass[base] === baseMass + payload) return;
+      model.body_mass[base] = baseMass + payload;
+      mj.mj_setConst(model, scratch);
+    },
+    setFriction(mu) {
+      const friction = model.geom_friction;
+      for (let i = 0; i < friction.length; i += 3) friction[i] = mu;
+    },
+    // Scale the motors' limits.
+    setTorque(fraction) {
+      const range = model.actuator_ctrlrange;
+      robot.motors.forEach((motor, i) => {
+        range[2 * motor] = -fraction * robot.torqueLimits[i];
+        range[2 * motor + 1] = fraction * robot.torqueLimits[i];
+      });
+    },
+    // Switch collisions between the ground and the links' hulls on or off.
+    setHulls(isOn) {
+      for (const geom of robot.hulls) model.geom_conaffinity[geom] = Number(isOn);
+      for (const body of robot.hullBodies) model.body_conaffinity[body] = Number(isOn);
+    },
+    free() {
+      for (const one of [scratch, data, model]) one.delete();
+    },
+  };
+}
+
+// Forces of the ground on the robot's contact points in the last step, world frame, 3 numbers each.
+export function contactForces(mj, {model, data}, robot, buffer) {
+  const forces = new Float64Array(3 * robot.points.length);
+  const pointOf = new Map(robot.points.map(({geom}, i) => [geom, i]));
+  const contacts = data.contact;
+  for (let i = 0; i < data.ncon; i++) {
+    const contact = contacts.get(i), point = pointOf.get(contact.geom2);
+    if (point !== undefined) {
+      mj.mj_contactForce(model, data, i, buffer);
+      const force = buffer.GetView(), frame = contact.frame; // axes of the contact, row by row
+      for (let r = 0; r < 3; r++) {
+        for (let c = 0; c < 3; c++) forces[3 * point + c] += force[r] * frame[3 * r + c];
+      }
+    }
+    contact.delete();
+  }
+  contacts.delete();
+  return forces;
+}

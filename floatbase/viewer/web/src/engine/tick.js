@@ -1,0 +1,123 @@
+// The compiled control step: the WebAssembly module that `make live` builds from
+// floatbase/control/tick. All tasks, constraints and the solver are in the module.
+
+// names and numbers of dimensions of the arguments of `tick` in floatbase/control/tick/tick.py
+const ARGUMENTS = [
+  ["q", 1], ["v", 1], ["inputs", 1], ["M", 2], ["h", 1], ["J", 2], ["Ag", 2], ["oMi", 2],
+  ["sizes", 1], ["ints", 1], ["floats", 1], ["floatWork", 1], ["intWork", 1], ["result", 1],
+];
+const INTEGERS = new Set(["sizes", "ints", "intWork"]);
+const N_STAGES = 4n;
+const ITEM = 8; // bytes of a number
+const PAGE = 65536; // bytes of a page of memory
+export const NO_ANSWER = {invalid: -1, inaccurate: -2, infeasible: -3};
+
+class Unavailable extends Error {}
+
+// What the module imports. Code that allocates memory, such as a singular value decomposition for
+// nearly redundant contacts, is not available: the tick then has no answer.
+function imports(module, memory) {
+  const env = {
+    atan2: Math.atan2,
+    log10: Math.log10,
+    __multi3(result, aLow, aHigh, bLow, bHigh) { // 128-bit product
+      const mask = (1n << 64n) - 1n;
+      const product = ((aHigh << 64n) | (aLow & mask)) * ((bHigh << 64n) | (bLow & mask));
+      const view = new BigInt64Array(memory().buffer, result, 2);
+      view[0] = BigInt.asIntN(64, product);
+      view[1] = BigInt.asIntN(64, product >> 64n);
+    },
+  };
+  for (const {name} of WebAssembly.Module.imports(module)) {
+    env[name] ??= () => { throw new Unavailable(name); };
+  }
+  return {env};
+}
+
+// The control step of a robot. module: the compiled WebAssembly module. robot: its data, see
+// floatbase/lessons/publish/live/robots.py. `views` are its inputs and outputs, to be filled and
+// read in place; matrices are stored as in Pinocchio.
+export function createTick(module, robot) {
+  let memory = null;
+  const {exports} = new WebAssembly.Instance(module, imports(module, () => memory));
+  memory = exports.memory;
+  const problems = Object.values(robot.problems);
+  const most = (get) => Math.max(...problems.map(get));
+  const {nq, nv, bodies} = robot, n = bodies.length;
+  const lengths = {
+    q: nq, v: nv, M: nv * nv, h: nv, J: 6 * nv, Ag: 6 * nv, oMi: 12 * n,
+    inputs: most((one) => one.inputs.length), sizes: most((one) => one.sizes.length),
+    ints: most((one) => one.ints.length), floats: most((one) => one.floats.length),
+    floatWork: most((one) => one.workspace[0]), intWork: most((one) => one.workspace[1]),
+    result: most((one) => one.resultSize),
+  };
+  let at = (exports.__heap_base.value + 63) & ~63;
+  const place = (bytes) => {
+    const begin = at;
+    at += (bytes + 63) & ~63;
+    return begin;
+  };
+  const returned = place(ITEM), exception = place(ITEM);
+  const begins = Object.fromEntries(
+    ARGUMENTS.map(([name]) => [name, place(ITEM * lengths[name])]),
+  );
+  memory.grow(Math.max(0, Math.ceil((at - memory.buffer.byteLength) / PAGE)));
+  const views = Object.fromEntries(ARGUMENTS.map(([name]) => {
+    const kind = INTEGERS.has(name) ? BigInt64Array : Float64Array;
+    return [name, new kind(memory.buffer, begins[name], lengths[name])];
+  }));
+  const status = new BigInt64Array(memory.buffer, returned, 1);
+  const stack = exports.__stack_pointer.value;
+  const columns = {M: [nv, nv], J: [6, nv], Ag: [6, nv]}; // stored column by column
+  let args = [], problem = null;
+
+  // numba's form of an array: owner, parent, items, bytes of an item, address, shape, strides
+  function asArgument([name, dimensions]) {
+    const shape = columns[name] ?? (dimensions === 2 ? [n, 12] : [sizeOf(name)]);
+    const strides = name in columns ? [ITEM, ITEM * shape[0]]
+      : dimensions === 2 ? [ITEM * shape[1], ITEM] : [ITEM];
+    const count = shape.reduce((a, b) => a * b, 1);
+    return [0, 0, BigInt(count), BigInt(ITEM), begins[name], ...shape.map(BigInt),
+      ...strides.map(BigInt)];
+  }
+  function sizeOf(name) {
+    if (name === "floatWork") return problem.workspace[0];
+    if (name === "intWork") return problem.workspace[1];
+    if (name === "result") return problem.resultSize;
+    return problem[name]?.length ?? lengths[name];
+  }
+  return {
+    views,
+    get problem() { return problem; },
+    // Solve another of the robot's problems from now on.
+    select(name) {
+      problem = robot.problems[name];
+      views.sizes.set(problem.sizes.map(BigInt));
+      views.ints.set(problem.ints.map(BigInt));
+      views.floats.set(problem.floats);
+      views.inputs.set(problem.inputs);
+      args = [returned, exception, ...ARGUMENTS.flatMap(asArgument), N_STAGES];
+    },
+    // Compute the command for the present contents of `views`. Returns the number of active
+    // constraints, or one of NO_ANSWER.
+    run() {
+      try {
+        return exports.tick(...args) === 0 ? Number(status[0]) : NO_ANSWER.inaccurate;
+      } catch (error) {
+        if (!(error instanceof Unavailable)) throw error;
+        exports.__stack_pointer.value = stack;
+        return NO_ANSWER.inaccurate;
+      }
+    },
+  };
+}
+
+// Set the numbers of a problem that depend on a value: base + slope × value, and the lengths of
+// rows, √(base + slope × value²). parameter: as in a robot's data.
+export function setParameter(numbers, parameter, value) {
+  const {at, base, slope, lengthAt = [], lengthBase, lengthSlope} = parameter;
+  for (let i = 0; i < at.length; i++) numbers[at[i]] = base[i] + slope[i] * value;
+  for (let i = 0; i < lengthAt.length; i++) {
+    numbers[lengthAt[i]] = Math.sqrt(lengthBase[i] + lengthSlope[i] * value * value);
+  }
+}

@@ -1,0 +1,123 @@
+// The worker of a page with a live robot: it holds the engine, and steps it when the page asks for
+// a picture. A page that draws nothing lets the robot rest.
+//
+// From the page: {start}, {set}, {push}, {reset}, {pause}, {step}, {timeScale}, {frame},
+// {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp}, {recovery}, {error}.
+
+import {createEngine, STEP} from "./engine.js";
+import {createClock} from "./clock.js";
+import {pushRecovery} from "./recovery.js";
+
+const WARM_UP = 800; // steps, after which a browser has optimised the code
+let mj = null, module = null, robot = null, engine = null, stop = false;
+const clock = createClock(STEP);
+const seen = new Map(); // constraints that were active at any time since the last picture
+
+async function fetchOk(name) {
+  const response = await fetch(name);
+  if (!response.ok) throw new Error(`${name} cannot be loaded (${response.status}).`);
+  return response;
+}
+
+async function load() {
+  const [{default: loadMujoco}, compiled] = await Promise.all([
+    import("./mujoco.js"),
+    fetchOk("tick.wasm").then((response) => response.arrayBuffer())
+      .then((bytes) => WebAssembly.compile(bytes)),
+  ]);
+  module = compiled;
+  mj = await loadMujoco({locateFile: (name) => name});
+}
+
+async function start({name, settings}) {
+  const data = fetchOk(`${name}.json`).then((response) => response.json());
+  if (mj === null) await load();
+  robot = await data;
+  engine?.free();
+  engine = createEngine(mj, module, robot);
+  for (let i = 0; i < WARM_UP; i++) engine.step();
+  engine.set(settings);
+  engine.reset();
+  clock.reset();
+  const {drawing} = robot;
+  postMessage({ready: {name, drawing, settings: engine.settings, robot: summary()}});
+}
+
+const summary = () => ({
+  weight: robot.weight, bodies: robot.bodies, points: robot.points.map(({name}) => name),
+  facets: robot.facets, lifted: [...new Set(Object.values(robot.problems)
+    .map(({lifted}) => lifted).filter(Boolean))],
+});
+
+function frame() {
+  const count = clock.steps(performance.now());
+  const begin = performance.now();
+  let done = 0;
+  seen.clear();
+  for (; done < count; done++) {
+    if (engine.isAtRest) {
+      engine.reset();
+      postMessage({stoodUp: true});
+    }
+    engine.step();
+    for (const one of engine.activeConstraints()) seen.set(one.slice(0, 3).join(), one);
+    if (done % 16 === 15 && performance.now() - begin > clock.budget) {
+      done++;
+      break;
+    }
+  }
+  clock.done(done, performance.now() - begin);
+  postMessage({frame: picture()});
+}
+
+// What the page draws of the present state.
+function picture() {
+  const {data} = engine.actual, {bodies, points} = robot;
+  const rotations = new Float64Array(9 * bodies.length);
+  const positions = new Float64Array(3 * bodies.length);
+  const {xmat, xpos, geom_xpos: places} = data;
+  bodies.forEach((body, i) => {
+    rotations.set(xmat.subarray(9 * body, 9 * body + 9), 9 * i);
+    positions.set(xpos.subarray(3 * body, 3 * body + 3), 3 * i);
+  });
+  const contacts = points.flatMap(({geom, radius}) => [
+    places[3 * geom], places[3 * geom + 1], places[3 * geom + 2] - radius,
+  ]);
+  return {
+    rotations, positions, contacts, com: engine.com(), time: engine.time,
+    measured: engine.measuredForces(), planned: engine.plannedForces(),
+    active: engine.activeConstraints(), seen: [...seen.values()],
+    outcome: engine.outcome, pushes: engine.pushes,
+    lifted: engine.lifted, settings: engine.settings, factor: clock.factor,
+    stepTime: clock.stepTime,
+  };
+}
+
+const handlers = {
+  start: (given) => start(given),
+  set: (changes) => engine?.set(changes),
+  push: (push) => engine?.push(push),
+  reset: () => engine?.reset(),
+  pause: (isPaused) => clock.pause(isPaused),
+  step: () => clock.single(),
+  timeScale: (scale) => clock.setScale(scale),
+  frame: () => { if (engine) frame(); },
+  stop: () => { stop = true; },
+  async recovery(given) {
+    stop = false;
+    if (mj === null) await load();
+    const data = await (await fetchOk(`${given.name}.json`)).json();
+    for await (const found of pushRecovery({mj, module, robot: data, ...given})) {
+      if (stop) return;
+      postMessage({recovery: found});
+    }
+  },
+};
+
+onmessage = async ({data}) => {
+  try {
+    for (const [key, value] of Object.entries(data)) await handlers[key](value);
+  } catch (error) {
+    postMessage({error: String(error?.message ?? error)});
+  }
+};

@@ -1,0 +1,106 @@
+// Draws a live robot: it moves, colours, shows and hides the items of its scene.
+
+// m: matrix of an arrow from `start` along `vector`, column by column. wide: factor of its width.
+export function arrowMatrix(start, vector, {size, slenderness, arrowLength}, wide = 1) {
+  const length = Math.max(Math.hypot(...vector), 1e-9), z = vector.map((x) => x / length);
+  const helper = Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
+  const x = unit(cross(helper, z)), y = cross(z, x);
+  const width = Math.min(slenderness * Math.sqrt(length * arrowLength * size), 0.35 * length);
+  const half = wide * width / 2;
+  return [
+    ...x.map((c) => c * half), 0, ...y.map((c) => c * half), 0, ...vector, 0, ...start, 1,
+  ];
+}
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
+];
+const unit = (a) => a.map((c) => c / Math.hypot(...a));
+const scaled = ([x, y, z], [sx, sy, sz]) => [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, sz, 0, x, y, z, 1];
+
+// How a force lies in the cone with friction coefficient mu, as the viewer colours it.
+export function coneStatus([x, y, z], mu, least) {
+  const across = Math.hypot(x, y);
+  if (Math.hypot(across, z) < least) return "idle";
+  return z > 0 && across <= mu * z * (1 + 0.02) ? "inside" : "outside";
+}
+
+// scene: of the page. drawing: sizes and paths, see floatbase/lessons/publish/live/scenes.py.
+export function createPainter(scene, drawing, robot) {
+  const path = (item) => `/meshcat/${item}`;
+  const place = (item, matrix) => scene.handle(
+    {type: "set_transform", path: path(item), matrix},
+  );
+  const known = new Map(); // item and property -> text of its value; only changes are sent
+  function set(item, property, value) {
+    const key = `${item} ${property}`, text = String(value);
+    if (known.get(key) === text) return;
+    known.set(key, text);
+    scene.handle({type: "set_property", path: path(item), property, value});
+  }
+  const {links, points, scale, coneHeight, patchRadius, leastForce} = drawing;
+
+  function drawLinks({rotations: R, positions: p}) {
+    for (const [joint, item] of links) {
+      const r = 9 * joint, t = 3 * joint;
+      place(item, [
+        R[r], R[r + 3], R[r + 6], 0, R[r + 1], R[r + 4], R[r + 7], 0,
+        R[r + 2], R[r + 5], R[r + 8], 0, p[t], p[t + 1], p[t + 2], 1,
+      ]);
+    }
+  }
+  function drawForce(kind, i, at, force, wide) {
+    const item = `${kind}/${points[i]}`, isShown = Math.hypot(...force) > leastForce;
+    set(item, "visible", isShown);
+    if (!isShown) return;
+    place(item, arrowMatrix(at, force.map((x) => scale * x), drawing, wide));
+  }
+  function drawContact(i, frame) {
+    const three = (values) => [...values.slice(3 * i, 3 * i + 3)];
+    const at = three(frame.contacts), {mu, actualMu, facets} = frame.settings;
+    const measured = three(frame.measured), name = points[i];
+    const isLifted = frame.lifted === robot.points[i];
+    const ground = [at[0], at[1], 0];
+    set(`patch/${name}`, "visible", !isLifted);
+    place(`patch/${name}`, scaled(ground, [patchRadius, patchRadius, 0.12 * patchRadius]));
+    drawForce("measured", i, at, measured, 1);
+    drawForce("planned", i, at, three(frame.planned), 1.8);
+    const lit = new Set(frame.active
+      .filter(([kind, owner]) => kind === "friction" && owner === robot.points[i])
+      .map(([, , facet]) => facet));
+    const status = coneStatus(measured, actualMu, leastForce);
+    const matrix = scaled(ground, [mu * coneHeight, mu * coneHeight, coneHeight]);
+    for (const count of robot.facets) {
+      const isShown = count === facets && !isLifted, sides = `cone/${name}/${count}/sides`;
+      set(sides, "visible", isShown);
+      for (let facet = 0; facet < count; facet++) {
+        const item = `cone/${name}/${count}/facet ${facet}`;
+        const isLit = isShown && lit.has(facet) && status !== "idle";
+        set(item, "visible", isLit);
+        if (isLit) place(item, matrix);
+      }
+      if (!isShown) continue;
+      set(sides, "color", drawing.coneColours[status]);
+      place(sides, matrix);
+    }
+  }
+  function drawCom([x, y, z]) {
+    const r = drawing.comRadius;
+    place("com/ball", scaled([x, y, z], [r, r, r]));
+    place("com/line", scaled([x, y, 0], [0.1 * r, 0.1 * r, Math.max(z, 1e-4)]));
+    place("com/projection", scaled([x, y, 0], [0.8 * r, 0.8 * r, 0.12 * r]));
+  }
+  return {
+    draw(frame) {
+      drawLinks(frame);
+      points.forEach((_, i) => drawContact(i, frame));
+      drawCom(frame.com);
+    },
+    // The push of `force`, N, as an arrow that begins where it acts, or none.
+    drawPush(at, force) {
+      set("push/arrow", "visible", force !== null);
+      if (force === null) return;
+      const vector = force.map((x) => scale * x);
+      place("push/arrow", arrowMatrix(at, vector, drawing));
+    },
+  };
+}

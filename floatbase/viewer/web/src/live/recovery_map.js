@@ -1,0 +1,90 @@
+// A push-recovery map for the present settings: the largest push that the robot survives in each
+// direction, computed by a few workers and drawn on the ground as it grows. The map before it stays
+// visible in grey.
+
+import {three} from "../meshcat.js";
+
+const DIRECTIONS = 16, DURATION = 0.1, RESOLUTION = 5; // -, s, N: those of `fb.push_recovery`
+const MOST_WORKERS = 4;
+const HEIGHT = 0.004; // m above the ground
+const NOW = 0x0072b2, BEFORE = 0x888888;
+
+// Angles of the directions, rad, dealt to workers like cards: {worker: [direction, …], …}.
+export function deal(count, workers) {
+  const hands = Array.from({length: workers}, () => []);
+  for (let i = 0; i < count; i++) hands[i % workers].push(2 * Math.PI * i / count);
+  return hands;
+}
+
+// Points of a map around a centre, [x, y, z] each, m. found: {direction, push}, rad and N; scale:
+// m/N. The map is closed once it is complete.
+export function outline(found, centre, scale, isComplete) {
+  const sorted = [...found].sort((a, b) => a.direction - b.direction);
+  const points = sorted.map(({direction, push}) => [
+    centre[0] + scale * push * Math.cos(direction),
+    centre[1] + scale * push * Math.sin(direction), HEIGHT,
+  ]);
+  return isComplete ? [...points, points[0]] : points;
+}
+
+const degrees = (angle) => Math.round(angle * 180 / Math.PI);
+
+export function mapText(found, seconds) {
+  if (!found.length) return "Computing the push-recovery map.";
+  const sorted = [...found].sort((a, b) => a.push - b.push), [least, most] = [sorted[0],
+    sorted.at(-1)];
+  const state = found.length < DIRECTIONS ? `${found.length} of ${DIRECTIONS} directions`
+    : `${DIRECTIONS} directions in ${seconds.toFixed(1)} s`;
+  return `Largest push of ${DURATION} s that it survives: ${least.push} N towards ` +
+    `${degrees(least.direction)}°, ${most.push} N towards ${degrees(most.direction)}° (${state}).`;
+}
+
+// viewer: meshcat's. say(text): writes a text into the panel. name: of the robot.
+export function createRecoveryMap(viewer, {scale, name, say}) {
+  let workers = [], shown = null, before = null;
+  function line(colour) {
+    const {BufferGeometry, Line, LineBasicMaterial} = three();
+    const made = new Line(new BufferGeometry(), new LineBasicMaterial({color: colour}));
+    made.frustumCulled = false;
+    viewer.scene.add(made);
+    return made;
+  }
+  function remove(one) {
+    if (one === null) return;
+    viewer.scene.remove(one);
+    one.geometry.dispose();
+    one.material.dispose();
+  }
+  function end() {
+    for (const worker of workers) worker.terminate();
+    workers = [];
+  }
+  // settings: those of the page. centre: below the robot, [x, y].
+  return function start(settings, centre) {
+    end();
+    remove(before);
+    before = shown;
+    before?.material.color.setHex(BEFORE);
+    shown = line(NOW);
+    const {Vector3} = three(), found = [], begun = performance.now(), mine = shown;
+    const count = Math.max(1, Math.min(MOST_WORKERS, (navigator.hardwareConcurrency || 2) - 1));
+    say(mapText(found, 0));
+    workers = deal(DIRECTIONS, count).map((directions) => {
+      const worker = new Worker("engine.js", {type: "module"});
+      worker.onmessage = ({data}) => {
+        if (data.error) return say(data.error);
+        found.push(data.recovery);
+        const isComplete = found.length === DIRECTIONS;
+        const points = outline(found, centre, scale, isComplete);
+        mine.geometry.setFromPoints(points.map((point) => new Vector3(...point)));
+        viewer.set_dirty();
+        say(mapText(found, (performance.now() - begun) / 1000));
+        if (isComplete) end();
+      };
+      worker.postMessage({recovery: {
+        name, settings, directions, duration: DURATION, resolution: RESOLUTION,
+      }});
+      return worker;
+    });
+  };
+}

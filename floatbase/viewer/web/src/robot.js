@@ -1,0 +1,239 @@
+// The page with a live robot: `floatbaseRobot.open(config)`. The physics and the controller run in
+// a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
+//
+// config: as for the viewer, with `robots`, the names to choose from. The address may have
+// ?name=…&mu=…&push=…&panel=0.
+
+import {make, showNotice} from "./dom.js";
+import {createDrag} from "./drag.js";
+import {controlsOf} from "./live/controls.js";
+import {createPainter} from "./live/painter.js";
+import {createRecoveryMap} from "./live/recovery_map.js";
+import {createVoice, limitOf, multiplierText} from "./live/words.js";
+import {unpack} from "./loader.js";
+import {detachGifWorker, findNode} from "./meshcat.js";
+import {startWhenSeen, watchSight} from "./visibility.js";
+
+const PLOT_PERIOD = 0.05; // s
+const TEXT_PERIOD = 250; // ms
+const DEFAULT_PUSH = 0.25; // times the weight
+const STEPS_BY = 5; // N, of a push that is dragged
+const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
+const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
+
+export function open(config) {
+  detachGifWorker();
+  const given = new URLSearchParams(location.search);
+  const name = config.robots.includes(given.get("name")) ? given.get("name") : config.robots[0];
+  document.body.style.setProperty("--first", `url("${name}.png")`);
+  if (typeof WebAssembly === "undefined" || location.protocol === "file:") {
+    return showNotice("A live robot needs WebAssembly, and a page that comes from a server. " +
+      "`python -m http.server` in this folder starts one.");
+  }
+  const worker = new Worker("engine.js", {type: "module"});
+  let isSeen = true;
+  startWhenSeen(config, (scene) => start(scene, worker, {config, given, name, sight: () => isSeen}),
+    (changed) => watchSight((now) => {
+      isSeen = now;
+      changed(now);
+    }));
+}
+
+async function start(scene, worker, {config, given, name, sight}) {
+  const send = (message) => worker.postMessage(message);
+  const mu = Number(given.get("mu")), hasMu = mu > 0;
+  send({start: {name, settings: hasMu ? {mu, actualMu: mu} : {}}});
+  const ready = new Promise((resolve, reject) => {
+    worker.onmessage = ({data}) => data.error ? reject(new Error(data.error))
+      : data.ready && resolve(data.ready);
+    worker.onerror = () => reject(new Error("The controller could not be started."));
+  });
+  try {
+    const response = await fetch(`${name}.scene`);
+    scene.apply(await unpack(new Uint8Array(await response.arrayBuffer())));
+    scene.fit();
+    live(scene, worker, send, await ready, {config, given, name, sight});
+  } catch (error) {
+    showNotice(error.message);
+  }
+}
+
+function live(scene, worker, send, {drawing, settings, robot}, {config, given, name, sight}) {
+  const force = Number(given.get("push")) || 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
+  const push = {force, towards: 90, duration: 0.1};
+  const painter = createPainter(scene, drawing, robot);
+  const drawMap = createRecoveryMap(scene.viewer, {
+    scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
+  });
+  const newtons = make("output", {className: "newtons"});
+  document.body.append(newtons);
+  const hasPanel = given.get("panel") !== "0";
+  let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
+
+  const controls = controlsOf(robot, settings, push, {
+    names: config.robots, name,
+    open(other) {
+      given.set("name", other);
+      location.search = given;
+    },
+  });
+  const changes = new Map(controls.map(({command, change}) => [command.name, change]));
+  const buttons = {
+    push: () => ({push: {force: vector(push), duration: push.duration}}),
+    "stand up": () => ({reset: true}),
+    pause() {
+      isPaused = !isPaused;
+      return {pause: isPaused};
+    },
+    step() {
+      isPaused = true;
+      return {pause: true, step: true};
+    },
+    "push-recovery map"() {
+      const {settings: present, com} = frame;
+      drawMap({...present, lifted: null}, com);
+    },
+  };
+  if (hasPanel) {
+    for (const key of Object.keys(buttons)) {
+      scene.handle({type: "set_control", path: "", name: key});
+    }
+    for (const {command} of controls) scene.handle(command);
+  }
+  else document.body.append(pushButton());
+  scene.onMessage(({name: key, value}) => {
+    if (frame === null) return;
+    const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
+    if (message) send(message);
+  });
+  scene.handle({type: "set_legend", path: "", items: drawing.legend});
+
+  // Without the panel, a button pushes, also for those who use no mouse.
+  function pushButton() {
+    return make("button", {
+      type: "button", className: "push", textContent: `push ${push.force} N`,
+      onclick: () => send(buttons.push()),
+    });
+  }
+  const tell = createVoice((text) => {
+    scene.handle({type: "set_title", path: "", text});
+    parent.postMessage({floatbase: "limit", text}, "*");
+  });
+  const drag = createDrag(scene.viewer, {
+    isWanted: ({button}) => button === 0 && frame !== null && frame.outcome === "",
+    most: () => 2.5 * robot.weight,
+    show(now) {
+      dragged = grabbed(now);
+      const [x, y, z] = [now.at.x, now.at.y, now.at.z];
+      newtons.textContent = `${Math.hypot(...dragged.force).toFixed(0)} N`;
+      placeLabel(newtons, scene.viewer, {x, y, z});
+    },
+    release(now) {
+      newtons.textContent = "";
+      dragged = null;
+      if (now === null) return;
+      const {body, at, force: pushed} = grabbed(now);
+      send({push: {body, at, force: pushed, duration: push.duration}});
+      parent.postMessage({floatbase: "push", force: pushed}, "*");
+    },
+  });
+  scene.viewer.renderer.domElement.addEventListener("pointermove", (event) => {
+    scene.viewer.renderer.domElement.style.cursor = drag.hit(event) ? "grab" : "";
+  });
+  const joints = drawing.links.map(([joint, item]) => [joint, ["meshcat", ...item.split("/")]]);
+  // What a drag means: body and point in its frame, point in the world, and force, z up.
+  function grabbed({at: {x, y, z}, node, force: size, towards}) {
+    const joint = joints.find(([, names]) => isBelow(node, findNode(scene.viewer, names)))?.[0]
+      ?? 1;
+    const world = [x, -z, y], R = frame.rotations.subarray(9 * joint, 9 * joint + 9);
+    const away = world.map((c, i) => c - frame.positions[3 * joint + i]);
+    const at = [0, 1, 2].map((c) => R[c] * away[0] + R[3 + c] * away[1] + R[6 + c] * away[2]);
+    const rounded = STEPS_BY * Math.round(size / STEPS_BY);
+    return {body: robot.bodies[joint], joint, at, world, force: vector({force: rounded, towards})};
+  }
+
+  function draw(next) {
+    frame = next;
+    painter.draw(frame);
+    const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
+    if (dragged) painter.drawPush(dragged.world, dragged.force);
+    else if (acting) painter.drawPush(placeOf(acting), acting.force);
+    else painter.drawPush(null, null);
+    tell(limitOf(frame, robot), performance.now());
+    if (frame.time < plotted) plotted = -1;
+    if (hasPanel) report();
+    scene.viewer.set_dirty();
+  }
+  function placeOf({body, at}) {
+    const joint = robot.bodies.indexOf(body), {rotations: R, positions: p} = frame;
+    return [0, 1, 2].map((r) => p[3 * joint + r] + at.reduce(
+      (sum, c, i) => sum + R[9 * joint + 3 * r + i] * c, 0,
+    ));
+  }
+  function report() {
+    // at the first picture there are no measured forces yet
+    if (frame.time >= plotted + PLOT_PERIOD && frame.time > 0) {
+      plotted = frame.time;
+      const away = frame.planned.map((x, i) => x - frame.measured[i]);
+      scene.handle({type: "add_plot_point", path: "", name: "planned minus measured force",
+        unit: "N", t: frame.time, value: Math.hypot(...away)});
+    }
+    const now = performance.now();
+    if (now < written + TEXT_PERIOD) return;
+    written = now;
+    text("active", multiplierText(frame.active));
+    const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
+    text("speed", frame.factor < SLOW * slow
+      ? `This computer is too slow for real time: ${frame.factor.toFixed(2)} × real time.`
+      : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
+  }
+  function text(key, content) {
+    scene.handle({type: "set_text", path: "", name: key, text: content,
+      section: key === "active" ? "constraints" : ""});
+  }
+
+  worker.onmessage = ({data}) => {
+    if (data.frame) {
+      isWaiting = false;
+      draw(data.frame);
+      if (!isLive) announce();
+    }
+    if (data.error) showNotice(data.error);
+  };
+  let isLive = false;
+  function announce() {
+    isLive = true;
+    document.body.classList.add("live");
+    parent.postMessage({floatbase: "live"}, "*");
+  }
+  addEventListener("message", ({data, source}) => {
+    if (source !== parent || !data?.floatbaseSet) return;
+    send({set: data.floatbaseSet});
+  });
+  window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page
+  (function loop() {
+    requestAnimationFrame(loop);
+    if (isWaiting || !sight()) return;
+    isWaiting = true;
+    send({frame: true});
+  })();
+}
+
+// The force of a push over the ground, z up.
+function vector({force, towards}) {
+  const angle = towards * Math.PI / 180;
+  return [force * Math.cos(angle), force * Math.sin(angle), 0];
+}
+
+function isBelow(object, node) {
+  for (let at = object; at && node; at = at.parent) if (at === node.object) return true;
+  return false;
+}
+
+function placeLabel(label, viewer, {x, y, z}) {
+  const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
+  const at = viewer.camera.position.clone().set(x, y, z).project(viewer.camera);
+  label.style.left = `${(at.x + 1) / 2 * w + 12}px`;
+  label.style.top = `${(1 - at.y) / 2 * h - 28}px`;
+}
+

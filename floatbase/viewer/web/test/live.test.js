@@ -1,0 +1,122 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+import {createClock} from "../src/engine/clock.js";
+import {setParameter} from "../src/engine/tick.js";
+import {arrowMatrix, coneStatus} from "../src/live/painter.js";
+import {deal, mapText, outline} from "../src/live/recovery_map.js";
+import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
+
+test("a clock gives the steps of the time that has passed, in slow motion too", () => {
+  const clock = createClock(1e-3);
+  assert.equal(clock.steps(1000), 0);
+  assert.equal(clock.steps(1016), 16);
+  clock.setScale(0.25);
+  assert.equal(clock.steps(1032), 4);
+});
+
+test("a paused clock gives single steps only", () => {
+  const clock = createClock(1e-3);
+  clock.steps(0);
+  clock.pause(true);
+  clock.single();
+  assert.equal(clock.steps(16), 1);
+  assert.equal(clock.steps(32), 0);
+});
+
+test("a machine that is too slow does not catch up, and the factor says so", () => {
+  const clock = createClock(1e-3);
+  clock.steps(0);
+  for (let now = 100; now <= 20000; now += 100) {
+    assert.equal(clock.steps(now), 100);
+    clock.done(50, 85);
+  }
+  assert.ok(Math.abs(clock.factor - 0.5) < 0.01);
+});
+
+test("a page that was out of sight has stood still", () => {
+  const clock = createClock(1e-3);
+  clock.steps(0);
+  assert.equal(clock.steps(60000), 0);
+});
+
+test("parameters set the numbers that depend on them", () => {
+  const numbers = new Float64Array(4);
+  setParameter(numbers, {at: [1], base: [2], slope: [-3], lengthAt: [3], lengthBase: [1],
+    lengthSlope: [0.5]}, 2);
+  assert.deepEqual([...numbers], [0, -4, 0, Math.sqrt(3)]);
+});
+
+test("an arrow begins at its point and ends along its vector", () => {
+  const sizes = {size: 1, slenderness: 0.1, arrowLength: 0.2};
+  for (const vector of [[0, 0, 2], [1, -2, 0.5]]) {
+    const matrix = arrowMatrix([1, 2, 3], vector, sizes);
+    assert.deepEqual(matrix.slice(12, 15), [1, 2, 3]);
+    assert.deepEqual(matrix.slice(8, 11), vector);
+    const across = matrix[0] * vector[0] + matrix[1] * vector[1] + matrix[2] * vector[2];
+    assert.ok(Math.abs(across) < 1e-12);
+  }
+});
+
+test("a force is inside its cone, outside, or nothing", () => {
+  assert.equal(coneStatus([0, 6, 10], 0.7, 0.1), "inside");
+  assert.equal(coneStatus([0, 8, 10], 0.7, 0.1), "outside");
+  assert.equal(coneStatus([0, 0, 0.01], 0.7, 0.1), "idle");
+});
+
+const robot = {points: ["FL_foot", "FR_foot"], weight: 100};
+const frameWith = (more) => ({
+  outcome: "", seen: [], settings: {actualMu: 0.7}, measured: new Float64Array([0, 0, 50, 0, 0, 50]),
+  planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
+});
+
+test("the sentence names what limits the robot, the most important first", () => {
+  const text = (more) => limitOf(frameWith(more), robot).text;
+  assert.match(text({}), /^No constraint is active/);
+  const friction = ["friction", "FL_foot", 2, 0.3];
+  assert.match(text({seen: [friction]}), /front left foot is at its friction limit/);
+  const torque = ["upper torque limit", "FL_calf_joint", 0, 0.1];
+  assert.match(text({seen: [friction, torque]}), /front left calf joint is at its torque limit/);
+  const both = [friction, ["friction", "FR_foot", 0, 0.3]];
+  assert.match(text({seen: both}), /left foot and the front right foot are at their friction/);
+  const measured = new Float64Array([0, 0, 50, 0, 34.9, 50]);
+  assert.match(text({seen: both, measured}), /front right foot is slipping/);
+  assert.match(text({outcome: "fell"}), /fell/);
+  assert.match(text({outcome: "infeasible"}), /all the constraints/);
+});
+
+test("parts have names that a reader knows", () => {
+  assert.equal(footName("HR_FOOT"), "hind right foot");
+  assert.equal(footName("left_sole_link corner 1"), "left foot");
+  assert.equal(jointName("RL_thigh_joint"), "rear left thigh joint");
+});
+
+test("a sentence stays long enough to be read, and a more important one waits for its turn", () => {
+  const said = [], tell = createVoice((text) => said.push(text), 600);
+  tell({rank: 6, text: "nothing"}, 0);
+  tell({rank: 3, text: "friction"}, 100);
+  tell({rank: 6, text: "nothing"}, 500);
+  tell({rank: 6, text: "nothing"}, 700);
+  assert.deepEqual(said, ["nothing", "friction"]);
+});
+
+test("the largest multipliers come first", () => {
+  const lines = multiplierText([["friction", "FL_foot", 0, 0.1],
+    ["upper torque limit", "FL_calf_joint", 0, 2]]).split("\n");
+  assert.match(lines[1], /torque.*2\.0/);
+  assert.match(lines[2], /facet 1.*0\.10/);
+});
+
+test("directions are dealt to all workers, each once", () => {
+  const hands = deal(16, 3);
+  assert.equal(new Set(hands.flat()).size, 16);
+  assert.ok(hands.every((hand) => hand.length >= 5));
+});
+
+test("a map grows around its centre and closes when it is complete", () => {
+  const found = [{direction: Math.PI / 2, push: 20}, {direction: 0, push: 10}];
+  const points = outline(found, [1, 1], 0.1, false);
+  assert.deepEqual(points[0].slice(0, 2), [2, 1]);
+  assert.ok(Math.abs(points[1][1] - 3) < 1e-12);
+  assert.equal(outline(found, [1, 1], 0.1, true).length, 3);
+  assert.match(mapText(found, 1), /10 N towards 0°, 20 N towards 90°/);
+});

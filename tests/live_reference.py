@@ -1,0 +1,127 @@
+"""Answers and runs of the Python library, which the engine of the web page must repeat."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+import floatbase as fb
+from floatbase.control.tick import tick
+from floatbase.lessons.publish.live import robots
+
+STATES_PER_ROBOT = 200
+RUN_TIME = 1.5  # s
+PUSH_TIME = 0.2  # s, when a push begins
+# friction coefficient, fraction of the torque limits, facets: tight friction, motors so weak that
+# most problems are infeasible, and the page's defaults
+SETTINGS = ((0.7, 1.0, 4), (0.7, 1.0, 16), (0.12, 1.0, 4), (0.3, 0.6, 8), (0.5, 0.35, 4),
+            (0.05, 0.01, 4))  # fmt: skip
+# robot, settings of the page, force of the push on the base [N] and its duration [s]
+RUNS: tuple[tuple[str, dict[str, float], tuple[float, float, float], float], ...] = (
+    ("go2", {}, (0.0, 0.0, 0.0), 0.1),
+    ("go2", {}, (0.0, 30.0, 0.0), 0.1),
+    ("go2", {}, (60.0, 0.0, 0.0), 0.1),
+    ("go2", {}, (-60.0, 0.0, 0.0), 0.1),
+    ("go2", {}, (0.0, -60.0, 0.0), 0.1),
+    ("go2", {}, (40.0, 40.0, -40.0), 0.1),
+    ("go2", {"actualPayload": 3.0}, (0.0, 30.0, 0.0), 0.1),
+    ("go2", {"mu": 0.25, "actualMu": 0.25}, (20.0, 0.0, 0.0), 0.1),
+    ("go2", {}, (0.0, 300.0, 0.0), 0.2),
+    ("talos", {}, (0.0, 60.0, 0.0), 0.1),
+    ("solo12", {"payload": 0.5, "actualPayload": 0.5}, (5.0, 0.0, 0.0), 0.1),
+)
+
+
+def write(folder: Path) -> None:
+    """Write robots, states with their answers, and runs into a folder, for `reference.mjs`."""
+    rng, index, numbers = np.random.default_rng(0), [], []
+    for name in robots.ROBOTS:
+        robot = fb.load(name)
+        (folder / f"{name}.json").write_text(robots.robot_json(robot))
+        controllers = [
+            robots.controller(robot, mu, None, facets, torque) for mu, torque, facets in SETTINGS
+        ]
+        for i in range(STATES_PER_ROBOT):
+            which = i % len(SETTINGS)
+            state = _random_state(robot, rng, violent=i % 4 == 3)
+            count, arrays = _answer(controllers[which], *state)
+            mu, torque, facets = SETTINGS[which]
+            settings = {"mu": mu, "torque": torque, "facets": facets}
+            index.append({"robot": name, "settings": settings, "count": count,
+                          "lengths": [len(array) for array in arrays]})  # fmt: skip
+            numbers += arrays
+    (folder / "states.bin").write_bytes(np.concatenate(numbers).tobytes())
+    (folder / "states.json").write_text(json.dumps(index))
+    (folder / "runs.json").write_text(json.dumps([_run(*given) for given in RUNS]))
+    (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
+
+
+def _random_state(robot: fb.Robot, rng: Any, violent: bool) -> tuple[Any, Any]:
+    scale = 3.0 if violent else 1.0
+    q = np.array(robot.standing().q)
+    step = scale * rng.normal(0.0, [0.02] * 3 + [0.05] * 3 + [0.05] * robot.d)
+    step[3:6] = rng.normal(0.0, 0.1, 3)
+    return pin.integrate(robot.model, q, step), scale * rng.normal(0.0, 0.25, robot.nv)
+
+
+def _answer(made: fb.WholeBodyController, q: Any, v: Any) -> tuple[int, list[Any]]:
+    """Number of active rows or code, and q, v, Pinocchio's quantities, torques, active rows."""
+    compiled = made.compiled
+    assert compiled is not None
+    inputs, robot = compiled.default_inputs, made.robot
+    result = compiled.empty_result(inputs)
+    result[:] = 0.0
+    with compiled.dynamics.lock:
+        compiled.dynamics.update(q, v)
+        M, h, J, Ag, oMi = (np.array(view) for view in compiled.dynamics.views)
+        count = tick.tick(q, v, inputs.packed, *compiled.arguments, result, tick.N_STAGES)
+    first = robot.nv + robot.d + made.contacts.k + robot.nv + made.contacts.k
+    active = np.sort(result[first : first + max(count, 0)])
+    matrices = [M.ravel("F"), h, J.ravel("F"), Ag.ravel("F"), oMi.ravel()]
+    return count, [q, v, *matrices, result[compiled.tau], active]
+
+
+def _run(name: str, given: dict[str, float], force: Any, duration: float) -> dict[str, Any]:
+    robot = fb.load(name)
+    standing = robot.standing()
+    sim = fb.Simulation(robot, given.get("actualMu", robots.MU))
+    if "actualPayload" in given:
+        sim.model.body_mass[1] += given["actualPayload"]
+        mujoco.mj_setConst(sim.model, mujoco.MjData(sim.model))
+    sim.reset(standing)
+    assumed = _with_payload(robot, given.get("payload", 0.0))
+    made = robots.controller(assumed, given.get("mu", robots.MU))
+    made = made.replace(tasks=fb.standing_tasks(standing))
+    push = fb.Push(force, PUSH_TIME, duration)
+    # the simulation is of the robot without its payload
+    run = fb.rollout(sim, lambda q, v, t: made(q, v, t), RUN_TIME, [push] if any(force) else [])
+    model = _with_payload(robot, given.get("actualPayload", 0.0)).model
+    data = model.createData()
+    com = [pin.centerOfMass(model, data, np.array(q)).tolist() for q in run.q]
+    return {"robot": name, "settings": given, "force": force, "duration": duration,
+            "start": PUSH_TIME, "time": RUN_TIME, "outcome": run.outcome, "com": com}  # fmt: skip
+
+
+def _recovery(name: str) -> dict[str, Any]:
+    """Largest survived pushes in three directions."""
+    robot = fb.load(name)
+    found = fb.push_recovery(
+        lambda: (fb.Simulation(robot, robots.MU), robots.controller(robot)),
+        directions=3, resolution=1.0, workers=1, progress=False,
+    )  # fmt: skip
+    return {"robot": name, "directions": found.directions.tolist(), "duration": found.duration,
+            "resolution": found.resolution, "pushes": found.pushes.tolist()}  # fmt: skip
+
+
+def _with_payload(robot: fb.Robot, payload: float) -> fb.Robot:
+    """The robot with a heavier base; the payload is at the base's centre of mass."""
+    model = robot.model.copy()
+    base = model.inertias[1]
+    model.inertias[1] = pin.Inertia(base.mass + payload, base.lever, base.inertia)
+    return replace(robot, model=model)
