@@ -1,6 +1,6 @@
 """Simulation in MuJoCo, built from the same URDF and independent of the controller's code."""
 
-from floatbase.simulation.build import Ground
+from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
@@ -13,6 +13,7 @@ from floatbase.simulation.sweep import sweep
 __all__ = [
     "ACTIVE_STATUSES",
     "Actuators",
+    "Box",
     "Controller",
     "Ground",
     "LiveSimulation",
