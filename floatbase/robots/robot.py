@@ -116,6 +116,8 @@ class Robot(Value):
         Purpose of the robot.
     sources : mapping of str to str
         Sources of the numbers that do not come from the URDF.
+    nominal : Robot or None
+        For a robot with a payload or scaled masses, the robot without them; otherwise None.
 
     Raises
     ------
@@ -138,6 +140,7 @@ class Robot(Value):
     posture: Array
     description: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
+    nominal: Robot | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "posture", as_posture(self.name, self.model, self.posture))
@@ -416,6 +419,89 @@ class Robot(Value):
         from floatbase.robots.standing import find_standing_state
 
         return find_standing_state(self)
+
+    def with_payload(
+        self, frame: str, mass: float, position: npt.ArrayLike = (0.0, 0.0, 0.0)
+    ) -> Robot:
+        """Return the robot with a point mass fixed to one of its links.
+
+        Give the robot with the payload to the simulation, to the controller or to both: a
+        controller made with the robot without it does not know about the payload.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame that carries the payload; "base" is the base link.
+        mass : float
+            Mass of the payload [kg].
+        position : array_like, shape (3,), optional
+            Position of the payload in the frame [m]. By default, the frame's origin.
+
+        Returns
+        -------
+        Robot
+            A robot with the same joints, feet and limits.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
+        InputError
+            If the mass is not positive, or if the frame is fixed to the ground.
+
+        Examples
+        --------
+        >>> import floatbase as fb
+        >>> robot = fb.load("go2")
+        >>> round(robot.with_payload("base", 3.0).mass - robot.mass, 6)
+        3.0
+        """
+        from floatbase.robots.inertia import robot_with_payload
+
+        return robot_with_payload(self, frame, mass, position)
+
+    def with_scaled_mass(self, factor: float) -> Robot:
+        """Return the robot with all its masses and moments of inertia multiplied by a factor.
+
+        M and h of eq. (1) are then multiplied by the factor, because rotor inertias are scaled,
+        too. A controller made with such a robot overestimates or underestimates the actual mass.
+
+        Parameters
+        ----------
+        factor : float
+            The factor, positive [-].
+
+        Returns
+        -------
+        Robot
+            A robot with the same joints, feet and limits.
+
+        Raises
+        ------
+        InputError
+            If the factor is not positive.
+        """
+        from floatbase.robots.inertia import robot_with_scaled_mass
+
+        return robot_with_scaled_mass(self, factor)
+
+    def has_joints_of(self, other: Robot) -> bool:
+        """Return whether this robot and another one differ in their masses at most.
+
+        Parameters
+        ----------
+        other : Robot
+            The other robot.
+
+        Returns
+        -------
+        bool
+            Whether states and torques of one robot also fit the other one.
+        """
+        first, second = (
+            robot if robot.nominal is None else robot.nominal for robot in (self, other)
+        )
+        return first == second
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
         """Return a random state near the standing state; equal seeds give equal states.

@@ -2,6 +2,7 @@
 
 from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
+from floatbase.simulation.observed import Latency, Observed, Observer, SensorNoise
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
@@ -16,10 +17,14 @@ __all__ = [
     "Box",
     "Controller",
     "Ground",
+    "Latency",
     "LiveSimulation",
+    "Observed",
+    "Observer",
     "Push",
     "PushRecovery",
     "Rollout",
+    "SensorNoise",
     "Simulation",
     "push_recovery",
     "read_sweep",

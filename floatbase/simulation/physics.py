@@ -258,11 +258,12 @@ class Simulation:
         Parameters
         ----------
         state : State, optional
-            The state. By default the robot stands on the ground with all feet. On a slope, a robot
-            with more than two feet is tilted with the ground. A biped stays upright instead, and
-            its soles are turned into the slope; its CoM stays above its feet as on level ground. On
-            several planes or on boxes, the base is oriented as in the standing posture. Each foot
-            must be clear of the edges of boxes; on an edge it would overlap the box.
+            The state; its robot may have other masses, as from `Robot.with_payload`. By default the
+            robot stands on the ground with all feet. On a slope, a robot with more than two feet is
+            tilted with the ground. A biped stays upright instead, and its soles are turned into the
+            slope; its CoM stays above its feet as on level ground. On several planes or on boxes,
+            the base is oriented as in the standing posture. Each foot must be clear of the edges of
+            boxes; on an edge it would overlap the box.
 
         Raises
         ------
@@ -272,7 +273,7 @@ class Simulation:
             If another thread is using the simulation.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
-        if state.robot != self.robot:
+        if not self.robot.has_joints_of(state.robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."

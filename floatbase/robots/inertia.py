@@ -1,0 +1,142 @@
+"""Robots with other masses: a payload on one link, or all masses scaled."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._validation import Array, as_array, as_instance, as_positive
+from floatbase.errors import InputError
+from floatbase.robots.robot import Robot
+
+_UPPER = "xx", "xy", "xz", "yy", "yz", "zz"  # entries of a tensor in a URDF, row by row
+
+
+def robot_with_payload(
+    robot: Robot, frame: str, mass: float, position: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> Robot:
+    """Return the robot with a point mass on a link; see `Robot.with_payload`.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    frame : str
+        Name of the frame that carries the payload.
+    mass : float
+        Mass of the payload [kg].
+    position : array_like, shape (3,), optional
+        Position of the payload in the frame [m].
+
+    Returns
+    -------
+    Robot
+        The robot with the payload.
+    """
+    mass = as_positive("mass of the payload", mass, "kg")
+    point = as_array("position of the payload", position, (3,), "m")
+    carrier = robot.model.frames[robot.frame_id(frame)]
+    if carrier.parentJoint == 0:
+        raise InputError(
+            f"A payload at {frame!r} has no effect, because {robot.name} is fixed to the ground "
+            f"there. Name a frame that moves."
+        )
+    link = carrier
+    while link.type != pin.FrameType.BODY:
+        link = robot.model.frames[link.parentFrame]
+    in_joint = carrier.placement.act(np.array(point))
+    model = robot.model.copy()
+    model.inertias[carrier.parentJoint] += _point_mass(mass, in_joint)
+    root = ElementTree.fromstring(robot.urdf)
+    (element,) = (one for one in root.findall("link") if one.get("name") == link.name)
+    inertia = _read_inertia(element) + _point_mass(mass, link.placement.actInv(in_joint))
+    _write_inertia(element, inertia)
+    return _changed(robot, model, root)
+
+
+def robot_with_scaled_mass(robot: Robot, factor: float) -> Robot:
+    """Return the robot with all masses multiplied by a factor; see `Robot.with_scaled_mass`.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    factor : float
+        Factor of all masses, moments of inertia and rotor inertias [-].
+
+    Returns
+    -------
+    Robot
+        The robot with the other masses.
+    """
+    factor = as_positive("factor", factor)
+    model = robot.model.copy()
+    for i, inertia in enumerate(model.inertias):
+        model.inertias[i] = _scaled(inertia, factor)
+    model.armature = factor * model.armature
+    root = ElementTree.fromstring(robot.urdf)
+    for link in root.findall("link"):
+        if link.find("inertial") is not None:
+            _write_inertia(link, _scaled(_read_inertia(link), factor))
+    return _changed(robot, model, root)
+
+
+def _changed(robot: Robot, model: pin.Model, root: ElementTree.Element) -> Robot:
+    """Return the robot with another model and URDF."""
+    urdf = ElementTree.tostring(root, encoding="unicode")
+    nominal = robot if robot.nominal is None else robot.nominal
+    return replace(robot, model=model, urdf=urdf, nominal=as_instance("robot", nominal, Robot))
+
+
+def _point_mass(mass: float, position: Array) -> pin.Inertia:
+    """Return the inertia of a point mass at a position, shape (3,) [m]."""
+    inertia = pin.Inertia.Zero()
+    inertia.mass, inertia.lever = mass, np.array(position)
+    return inertia
+
+
+def _scaled(inertia: pin.Inertia, factor: float) -> pin.Inertia:
+    """Return an inertia whose mass and tensor are multiplied by a factor."""
+    scaled = pin.Inertia.Zero()  # the constructor rejects tensors that are not positive definite
+    scaled.mass, scaled.lever = factor * inertia.mass, np.array(inertia.lever)
+    scaled.inertia = factor * inertia.inertia
+    return scaled
+
+
+def _numbers(element: ElementTree.Element | None, name: str) -> Array:
+    """Return an attribute of three numbers, zeros by default."""
+    text = "" if element is None else element.get(name, "")
+    return np.array(text.split(), dtype=np.float64) if text else np.zeros(3)
+
+
+def _read_inertia(link: ElementTree.Element) -> pin.Inertia:
+    """Return the inertia of a link in the link's frame; zero without <inertial>."""
+    inertia = pin.Inertia.Zero()
+    inertial = link.find("inertial")
+    mass = None if inertial is None else inertial.find("mass")
+    if inertial is None or mass is None:
+        return inertia
+    origin, tensor = inertial.find("origin"), inertial.find("inertia")
+    inertia.mass = float(mass.get("value", 0.0))
+    inertia.lever = _numbers(origin, "xyz")
+    if tensor is not None:
+        xx, xy, xz, yy, yz, zz = (float(tensor.get(f"i{axes}", 0.0)) for axes in _UPPER)
+        R = pin.rpy.rpyToMatrix(_numbers(origin, "rpy"))
+        inertia.inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+    return inertia
+
+
+def _write_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
+    """Replace <inertial> of a link by an inertia in the link's frame."""
+    for old in link.findall("inertial"):
+        link.remove(old)
+    inertial, tensor = ElementTree.SubElement(link, "inertial"), inertia.inertia
+    position = " ".join(repr(float(x)) for x in inertia.lever)
+    ElementTree.SubElement(inertial, "origin", xyz=position, rpy="0 0 0")
+    ElementTree.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
+    upper = zip(_UPPER, tensor[np.triu_indices(3)], strict=True)
+    ElementTree.SubElement(inertial, "inertia", {f"i{axes}": repr(float(x)) for axes, x in upper})
