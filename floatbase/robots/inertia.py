@@ -1,95 +1,84 @@
-"""Robots with other masses: a payload on one link, or all masses scaled."""
+"""Changes of the masses in a model and its URDF: a point mass on a link, or all masses scaled."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_array, as_instance, as_positive
-from floatbase.errors import InputError
-from floatbase.robots.robot import Robot
+from floatbase._validation import Array
 
 _UPPER = "xx", "xy", "xz", "yy", "yz", "zz"  # entries of a tensor in a URDF, row by row
 
 
-def robot_with_payload(
-    robot: Robot, frame: str, mass: float, position: npt.ArrayLike = (0.0, 0.0, 0.0)
-) -> Robot:
-    """Return the robot with a point mass on a link; see `Robot.with_payload`.
+def add_point_mass(
+    model: pin.Model, urdf: str, frame_id: int, mass: float, position: npt.ArrayLike
+) -> tuple[pin.Model, str]:
+    """Return a model and its URDF with a point mass fixed to a link.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
-    frame : str
-        Name of the frame that carries the payload.
+    model : pinocchio.Model
+        The model.
+    urdf : str
+        Text of the URDF from which the model was made.
+    frame_id : int
+        Index of the frame that carries the mass.
     mass : float
-        Mass of the payload [kg].
-    position : array_like, shape (3,), optional
-        Position of the payload in the frame [m].
+        The mass [kg].
+    position : array_like, shape (3,)
+        Position of the mass in the frame [m].
 
     Returns
     -------
-    Robot
-        The robot with the payload.
+    model : pinocchio.Model
+        A copy of the model with the mass.
+    urdf : str
+        The URDF with the mass.
     """
-    mass = as_positive("mass of the payload", mass, "kg")
-    point = as_array("position of the payload", position, (3,), "m")
-    carrier = robot.model.frames[robot.frame_id(frame)]
-    if carrier.parentJoint == 0:
-        raise InputError(
-            f"A payload at {frame!r} has no effect, because {robot.name} is fixed to the ground "
-            f"there. Name a frame that moves."
-        )
-    link = carrier
+    carrier = link = model.frames[frame_id]
     while link.type != pin.FrameType.BODY:
-        link = robot.model.frames[link.parentFrame]
-    in_joint = carrier.placement.act(np.array(point))
-    model = robot.model.copy()
+        link = model.frames[link.parentFrame]
+    in_joint = carrier.placement.act(np.array(position))
+    model = model.copy()
     model.inertias[carrier.parentJoint] += _point_mass(mass, in_joint)
-    root = ElementTree.fromstring(robot.urdf)
+    root = ElementTree.fromstring(urdf)
     (element,) = (one for one in root.findall("link") if one.get("name") == link.name)
     inertia = _read_inertia(element) + _point_mass(mass, link.placement.actInv(in_joint))
     _write_inertia(element, inertia)
-    return _changed(robot, model, root)
+    return model, ElementTree.tostring(root, encoding="unicode")
 
 
-def robot_with_scaled_mass(robot: Robot, factor: float) -> Robot:
-    """Return the robot with all masses multiplied by a factor; see `Robot.with_scaled_mass`.
+def scale_masses(model: pin.Model, urdf: str, factor: float) -> tuple[pin.Model, str]:
+    """Return a model and its URDF with all masses multiplied by a factor.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    model : pinocchio.Model
+        The model.
+    urdf : str
+        Text of the URDF from which the model was made.
     factor : float
         Factor of all masses, moments of inertia and rotor inertias [-].
 
     Returns
     -------
-    Robot
-        The robot with the other masses.
+    model : pinocchio.Model
+        A copy of the model with the other masses.
+    urdf : str
+        The URDF with the other masses; it does not contain the rotor inertias.
     """
-    factor = as_positive("factor", factor)
-    model = robot.model.copy()
+    model = model.copy()
     for i, inertia in enumerate(model.inertias):
         model.inertias[i] = _scaled(inertia, factor)
     model.armature = factor * model.armature
-    root = ElementTree.fromstring(robot.urdf)
+    root = ElementTree.fromstring(urdf)
     for link in root.findall("link"):
         if link.find("inertial") is not None:
             _write_inertia(link, _scaled(_read_inertia(link), factor))
-    return _changed(robot, model, root)
-
-
-def _changed(robot: Robot, model: pin.Model, root: ElementTree.Element) -> Robot:
-    """Return the robot with another model and URDF."""
-    urdf = ElementTree.tostring(root, encoding="unicode")
-    nominal = robot if robot.nominal is None else robot.nominal
-    return replace(robot, model=model, urdf=urdf, nominal=as_instance("robot", nominal, Robot))
+    return model, ElementTree.tostring(root, encoding="unicode")
 
 
 def _point_mass(mass: float, position: Array) -> pin.Inertia:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from threading import local
@@ -19,6 +19,7 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
+    as_instance,
     as_integer,
     as_positive,
     as_string,
@@ -34,6 +35,7 @@ from floatbase.robots._checks import (
     has_floating_base,
     joint_limits,
 )
+from floatbase.robots.inertia import add_point_mass, scale_masses
 
 if TYPE_CHECKING:
     from floatbase.robots.state import State
@@ -379,6 +381,8 @@ class Robot(Value):
         height: float | None = None,
         normal: npt.ArrayLike | None = None,
         offset: npt.ArrayLike | None = None,
+        surface: Callable[[Array], float] | None = None,
+        balanced: bool = False,
     ) -> State:
         """Return a state at rest with every foot on the ground.
 
@@ -394,6 +398,13 @@ class Robot(Value):
             several planes can form a valley.
         offset : float or array_like, shape (n,), optional
             Offsets of the planes normal · x = offset [m]; 0 by default.
+        surface : callable, optional
+            Height of the ground as a function of x and y, shape (2,), such as `Ground.height` [m].
+            Where it is above the planes, feet stand on it as on a level surface.
+        balanced : bool, optional
+            Whether the CoM keeps its horizontal distance from the middle of the feet, as on level
+            ground. Otherwise the base keeps its horizontal position, which moves the CoM on a
+            slope.
 
         Returns
         -------
@@ -409,8 +420,8 @@ class Robot(Value):
 
         return (
             self._standing
-            if height is normal is offset is None
-            else find_standing_state(self, height, normal, offset)
+            if height is normal is offset is None and surface is None and balanced is False
+            else find_standing_state(self, height, normal, offset, surface, balanced)
         )
 
     @cached_property
@@ -456,9 +467,14 @@ class Robot(Value):
         >>> round(robot.with_payload("base", 3.0).mass - robot.mass, 6)
         3.0
         """
-        from floatbase.robots.inertia import robot_with_payload
-
-        return robot_with_payload(self, frame, mass, position)
+        i, mass = self.frame_id(frame), as_positive("mass of the payload", mass, "kg")
+        point = as_array("position of the payload", position, (3,), "m")
+        if self.model.frames[i].parentJoint == 0:
+            raise InputError(
+                f"A payload at {frame!r} has no effect, because {self.name} is fixed to the ground "
+                f"there. Name a frame that moves."
+            )
+        return self._with_model(*add_point_mass(self.model, self.urdf, i, mass, point))
 
     def with_scaled_mass(self, factor: float) -> Robot:
         """Return the robot with all its masses and moments of inertia multiplied by a factor.
@@ -481,9 +497,12 @@ class Robot(Value):
         InputError
             If the factor is not positive.
         """
-        from floatbase.robots.inertia import robot_with_scaled_mass
+        return self._with_model(*scale_masses(self.model, self.urdf, as_positive("factor", factor)))
 
-        return robot_with_scaled_mass(self, factor)
+    def _with_model(self, model: pin.Model, urdf: str) -> Robot:
+        """Return the robot with other masses."""
+        nominal = self if self.nominal is None else self.nominal
+        return replace(self, model=model, urdf=urdf, nominal=nominal)
 
     def has_joints_of(self, other: Robot) -> bool:
         """Return whether this robot and another one differ in their masses at most.
@@ -498,9 +517,8 @@ class Robot(Value):
         bool
             Whether states and torques of one robot also fit the other one.
         """
-        first, second = (
-            robot if robot.nominal is None else robot.nominal for robot in (self, other)
-        )
+        pair = self, as_instance("other", other, Robot, 'fb.load("go2")')
+        first, second = (robot if robot.nominal is None else robot.nominal for robot in pair)
         return first == second
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_array, as_half_spaces
+from floatbase._validation import Array, as_array, as_bool, as_callable, as_half_spaces
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.robots._checks import joint_limits
@@ -48,11 +48,9 @@ def find_standing_state(
     offset : float or array_like, shape (n,), optional
         Offsets of the planes normal · x = offset [m]; 0 by default.
     surface : callable, optional
-        Height [m] of the ground at horizontal coordinates, shape (2,), where boxes may lie on the
-        planes. Their tops are level.
+        Height of the ground as a function of x and y, shape (2,) [m].
     balanced : bool, optional
-        Whether the CoM keeps its horizontal distance from the middle of the feet, as on level
-        ground. Otherwise the base keeps its horizontal position, which moves the CoM on a slope.
+        Whether the CoM keeps its horizontal distance from the middle of the feet.
 
     Returns
     -------
@@ -68,6 +66,8 @@ def find_standing_state(
     normals, offsets = _UP if normal is None else normal, 0.0 if offset is None else offset
     planes = as_half_spaces("the ground", normals, offsets)
     height = None if height is None else float(as_array("height", height, (), "m"))
+    if surface is not None:
+        as_callable("surface", surface, "surface(xy)")
     if not robot.is_floating or not robot.feet:
         return posture
     q = posture.q.copy()
@@ -76,7 +76,7 @@ def find_standing_state(
         if height is not None
         else q[2] - min(_clearance(posture, foot, planes, surface)[0] for foot in robot.feet)
     )
-    com_offset = _com_offset(robot.standing()) if balanced else None
+    com_offset = _com_offset(robot.standing()) if as_bool("balanced", balanced) else None
     state, (joints, index, lower, upper) = State(robot, q), joint_limits(robot.model)
     v_index = np.array(robot.model.idx_vs)[joints]
     for _ in range(_MAX_STEPS):
@@ -104,7 +104,7 @@ def find_standing_state(
         for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)
     ]
     reason = f", with these joints at their limits: {', '.join(limited)}" if limited else ""
-    advice = "Choose another height, or load the robot with another posture."
+    advice = "Choose another height or ground, or load the robot with another posture."
     raise InputError(
         f"{robot.name} cannot put all its feet on the ground{height_text}: an error of "
         f"{remaining:.2g} m remains{reason}. {advice}"

@@ -20,6 +20,7 @@ from floatbase._validation import (
     as_positive,
     cached_property,
     checked,
+    numeric_copy,
     read_only,
 )
 from floatbase.dynamics import UP
@@ -301,7 +302,7 @@ class Ground(Value):
         InputError
             If all planes of the ground are vertical.
         """
-        heights = self._heights(np.asarray(xy, dtype=np.float64)).max(axis=-1)
+        heights = self._heights(xy).max(axis=-1)
         return heights if np.ndim(heights) else float(heights)
 
     def normal(self, xy: npt.ArrayLike) -> Array:
@@ -323,7 +324,7 @@ class Ground(Value):
         InputError
             If all planes of the ground are vertical.
         """
-        highest = self._heights(np.asarray(xy, dtype=np.float64)).argmax(axis=-1)
+        highest = self._heights(xy).argmax(axis=-1)
         normals: Array = self._surface_normals[highest]
         return normals
 
@@ -359,26 +360,25 @@ class Ground(Value):
         tops = np.tile(UP, (len(self.boxes), 1))
         return np.concatenate([self.normals[self._upward_planes], tops])
 
-    def _heights(self, xy: Array) -> Array:
+    def _heights(self, xy: npt.ArrayLike) -> Array:
         """Return the heights of planes and boxes at points, shape (..., planes + boxes) [m].
 
         A box that does not reach a point has the height -∞ there.
         """
-        if xy.shape[-1:] != (2,):
-            raise InputError(
-                f"xy has shape {xy.shape}, but it must be (2,) or (..., 2): x and y [m]."
-            )
+        points = numeric_copy(xy)
+        shape = (2,) if points is None or points.shape[-1:] != (2,) else points.shape
+        points = as_array("xy", xy, shape, "m")
         normals, offsets = self.normals[self._upward_planes], self.offsets[self._upward_planes]
         if not len(normals):
             raise InputError(
                 "All planes of this ground are vertical, so it has no height. Give it a plane "
                 "whose normal points upwards."
             )
-        heights = (offsets - xy @ normals[:, :2].T) / normals[:, 2]
+        heights = (offsets - points @ normals[:, :2].T) / normals[:, 2]
         if not self.boxes:
             return np.asarray(heights)
         x0, x1, y0, y1, tops = self.box_bounds.T
-        x, y = xy[..., :1], xy[..., 1:]
+        x, y = points[..., :1], points[..., 1:]
         inside = (x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)
         return np.concatenate([heights, np.where(inside, tops, -np.inf)], axis=-1)
 

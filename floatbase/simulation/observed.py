@@ -17,6 +17,7 @@ from floatbase._validation import (
     as_instance,
     as_integer,
     as_positive,
+    cached_property,
     checked,
     refuse_new_attributes,
     short_repr,
@@ -210,14 +211,14 @@ class SensorNoise(Value):
     joint_position: float = field(default=1.1e-4, metadata=checked(as_positive, allow_zero=True))
     joint_velocity: float = field(default=0.05, metadata=checked(as_positive, allow_zero=True))
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        base, d = 3 if self.robot.is_floating else 0, self.robot.d
-        counts = [base, base, d]
+    @cached_property
+    def _deviations(self) -> tuple[Array, Array]:
+        """Noise of the components of q, as a velocity, and of v: deviations, shape (nv,) each."""
+        base = 3 if self.robot.is_floating else 0
+        counts = [base, base, self.robot.d]
         positions = [self.base_position, self.base_orientation, self.joint_position]
         velocities = [self.linear_velocity, self.angular_velocity, self.joint_velocity]
-        object.__setattr__(self, "_of_q", np.repeat(positions, counts))
-        object.__setattr__(self, "_of_v", np.repeat(velocities, counts))
+        return np.repeat(positions, counts), np.repeat(velocities, counts)
 
     def scaled(self, factor: float) -> SensorNoise:
         """Return the noise with all standard deviations multiplied by a factor.
@@ -261,7 +262,7 @@ class SensorNoise(Value):
         """
         generator = np.random.Philox(key=self.seed, counter=_nanoseconds(t) % 2**64)
         noise = np.random.Generator(generator).standard_normal(2 * self.robot.nv)
-        of_q, of_v = vars(self)["_of_q"], vars(self)["_of_v"]
+        of_q, of_v = self._deviations
         measured = pin.integrate(self.robot.model, q, of_q * noise[: self.robot.nv])
         return measured, v + of_v * noise[self.robot.nv :]
 

@@ -26,7 +26,6 @@ from floatbase._validation import (
 from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
-from floatbase.robots.standing import find_standing_state
 from floatbase.simulation._conversion import Conversion
 from floatbase.simulation.build import body_name, build_model
 from floatbase.simulation.foot_contacts import FootContacts
@@ -489,7 +488,7 @@ class Simulation:
         if not is_single_plane:
             state = robot.standing(**planes)
         elif robot.is_floating and is_biped and ground.normals[0, 2] < 1.0:
-            state = find_standing_state(robot, normal=ground.normals[0], balanced=True)
+            state = robot.standing(normal=ground.normals[0], balanced=True)
             if robot.feet:  # where the tilted robot would have its feet
                 shift = np.mean(_foot_middles(self._tilted_state()) - _foot_middles(state), axis=0)
                 state = state.replace(q=np.concatenate([state.q[:3] + shift, state.q[3:]]))
@@ -499,9 +498,7 @@ class Simulation:
             middles = _foot_middles(state)
             clearances = middles[:, 2] - ground.height(middles[:, :2])
             if np.any(clearances < np.array([foot.radius for foot in robot.feet]) - _ROUNDING):
-                return find_standing_state(
-                    robot, **planes, surface=ground.height, balanced=is_biped
-                )
+                return robot.standing(**planes, surface=ground.height, balanced=is_biped)
         return state
 
     def _tilted_state(self) -> State:
