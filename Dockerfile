@@ -5,7 +5,8 @@
 #
 # It prints an address to open. The reader's work is in the volume. A hub that starts containers needs this command instead:
 # ["sh", "-c", "python -m floatbase.lessons.publish workspace --to floatbase; exec jupyterhub-singleuser"]
-FROM python:3.12-slim
+# the digest is that of 3.12.14 for all architectures
+FROM python:3.12-slim@sha256:78387bc3881b8273120a12ebe6c1ab22b018ccc2c9adf565ae1ac9b536e184ea
 
 # Code is compiled here for any processor of this architecture, so that the first start is as fast as the next.
 ENV NUMBA_CPU_NAME=generic OPENBLAS_NUM_THREADS=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/venv/bin:$PATH

@@ -183,6 +183,10 @@ def container() -> Faults:
             r"NUMBA_CPU_NAME=generic.*pip install.*-m floatbase compile", text(path), flags=re.S
         ):
             yield f"{path} does not compile for a generic processor after it installs"
+    images = re.findall(r"^FROM (\S+)", docker, flags=re.M)
+    for image in [*images, json.loads(text(".devcontainer/devcontainer.json"))["image"]]:
+        if not re.fullmatch(r"\S+@sha256:[0-9a-f]{64}", image):
+            yield f"the image {image} is not pinned by its digest"
     if (
         not re.search(r"^USER learner$(?!.*^(?:USER|RUN) ).*^CMD ", docker, flags=re.M | re.S)
         or "allow-root" in docker
@@ -201,7 +205,7 @@ def pythons() -> Faults:
         "Dockerfile": re.findall(r"^FROM python:(3\.\d+)", text("Dockerfile"), flags=re.M),
         ".binder/runtime.txt": re.findall(r"python-(3\.\d+)", text(".binder/runtime.txt")),
         ".devcontainer/devcontainer.json": re.findall(
-            r"python:(3\.\d+)", text(".devcontainer/devcontainer.json")
+            r"python:\d-(3\.\d+)", text(".devcontainer/devcontainer.json")
         ),
         ".github/workflows/test.yml": re.findall(r'"(3\.\d+)"', text(".github/workflows/test.yml")),
     }
@@ -243,6 +247,9 @@ def workflows() -> Faults:
     for script in re.findall(r"\.ci/\w+(?:\.py)?", tests + publish):
         if not (ROOT / script).exists():
             yield f"a workflow runs {script}, which does not exist"
+    for action in re.findall(r"uses: (.+)", tests + publish):
+        if not re.fullmatch(r"\./\S+|[\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action):
+            yield f"{action} is not pinned by its commit, with the version as a comment"
     if "secrets." in publish:
         yield "publish.yml has a password"
     if (tests + publish).count("persist-credentials: false") < (tests + publish).count("checkout@"):

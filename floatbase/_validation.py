@@ -94,8 +94,9 @@ class Value:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+            for array in value.values() if type(value) is dict else [value]:
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False
             object.__setattr__(
                 self, name, MappingProxyType(value) if type(value) is dict else value
             )

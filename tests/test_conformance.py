@@ -34,14 +34,22 @@ from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import ConstantTorques, qp_plots
 from floatbase.lessons.lessonC import table_top
+from floatbase.playground import (
+    CHALLENGES,
+    BaseMotors,
+    ModelMismatch,
+    PerturbedSimulation,
+    RealTimeFactor,
+    Session,
+    Settings,
+)
 from floatbase.simulation import Latency, LiveSimulation, Observed
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
 
 PACKAGES = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp",
-    "robots", "simulation",
-    "viewer",
+    "playground", "robots", "simulation", "viewer",
 )  # fmt: skip
 MODULES = (
     run_plots,
@@ -113,6 +121,7 @@ def right() -> dict[str, Any]:
     walk(state.q, state.v)  # so that it has a plan
     view, qp = fb.Viewer(robot), values()["QP"]
     forces = 30.0 * np.tile(UP, 4)
+    perturbed, session = PerturbedSimulation(robot), Session(robot)
     return values() | {
         "Simulation": sim, "Viewer": view,
         "WholeBodyController":
@@ -128,11 +137,21 @@ def right() -> dict[str, Any]:
         "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
         "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(),
         "StepPlan": walk.history[0],
+        "PerturbedSimulation": perturbed, "BaseMotors": BaseMotors(controller(), perturbed),
+        "Session": session, "Settings": Settings(), "Challenge": CHALLENGES[0],
+        "Judge": CHALLENGES[0].judge(), "RealTimeFactor": RealTimeFactor(), "fb.Rollout": record(),
+        "Watch": lambda judge, record, session: "", "nodding_rotation.rotation": np.eye(3),
+        "term": "gravity", "Challenge.start": Settings(), "mass": 1.0,
+        "slider_panel.draw": lambda ranges: "", "ranges": (0.0, 1.0, 2.0),
+        "clock": lambda: 0.0, "ModelMismatch": ModelMismatch(gravity=False),
+        "term_arrows.scale": 0.01,
         "bool": True, "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": UP,
         "npt.ArrayLike": UP, "RGB": (0.0, 0.5, 1.0), "Box": (-1.0, 1.0, -1.0, 1.0),
         "Sequence[Task]": controller().tasks,
         "Sequence[str]": ["a", "b"],
+        "items": view.painter.picture(state, contacts), "prefixed.path": "new",
+        "Picture": view.painter.picture(state, contacts),
         "Sequence[Picture]": [view.painter.picture(state, contacts)] * 2,
         "A": np.eye(12), "b": ZERO,
         "x": ZERO, "r": ZERO,
@@ -181,17 +200,18 @@ def right() -> dict[str, Any]:
 RESULTS = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition
     TorquesFromForces CylinderGeometry PowerBalance Robot PushRecovery StepPlan
-    AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState
+    AnalyticCommand Command Verdict Item ConstraintLabel recording.Animation HydraulicState Term
 """
 LEFT_OUT = {
-    "a widget": ("SliderPanel", "slider_panel", "push_panel", "live_run"),
+    "made by `slider_panel`": ("SliderPanel",),
     "judges whatever a learner may give": (
         "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in",
         "array_or_verdict", "predict", "reveal", "review",
     ),
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
-        "Simulation.advance", "Simulation.contact_forces_of", "Simulation.torques_of",
+        *(f"{kind}.{method}" for kind in ("Simulation", "PerturbedSimulation")
+            for method in ("advance", "contact_forces_of", "torques_of")),
         "Push.active_fraction", "conflicting_constraints", "constraint_and_jacobian",
         "raibert_foothold",
         *(f"{kind}Task.{method}" for method in ("shapes_for", "targets_at")
@@ -213,10 +233,16 @@ LEFT_OUT = {
         *(f"{kind}.__call__" for kind in ("Observed", "SensorNoise", "Latency")),
         "with_thumbnail", "receive_during_cells",
     ),
+    "starts a page, with tests of its own": (
+        "Playground", "playground", *(f"Playground.{method}" for method in (
+            "close", "push", "reset_all", "set", "set_nodding", "show_term", "start",
+            "start_challenge", "undo",
+        )),
+    ),
+    "takes any field of `Settings`, which is checked itself": ("Session.change",),
     "needs trimesh": ("urdf_visuals",),
     "draws what it is given": (
-        "Viewer.draw", "Viewer.play_pictures", "prefixed", "hex_code", "robot_meshes",
-        "appearance_digest",
+        "hex_code", "robot_meshes", "appearance_digest",
     ),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"

@@ -48,7 +48,11 @@ MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
 ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
 # numba loads with them, so no __init__ imports them
-COMPILED = {"floatbase.control.tick.jit", "floatbase.control.tick.tick"}
+COMPILED = {
+    "floatbase.behaviours.compiled_targets",
+    "floatbase.control.tick.jit",
+    "floatbase.control.tick.tick",
+}
 BUILT = ("dist", "node_modules", "vendor")  # folders of JavaScript that nobody writes by hand
 MODULES = sorted(
     path

@@ -9,6 +9,7 @@ import inspect
 import multiprocessing
 import pickle
 import threading
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from importlib import import_module
 from typing import Any
@@ -65,6 +66,8 @@ def same(a: Any, b: Any) -> bool:
     """Whether two values hold the same numbers and texts, at whatever depth."""
     if isinstance(a, np.ndarray):
         return np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, Mapping):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     if isinstance(a, (tuple, list)):
         return len(a) == len(b) and all(map(same, a, b))
     if (

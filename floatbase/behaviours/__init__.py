@@ -10,9 +10,10 @@ from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
-from floatbase.behaviours.planner import StepPlan
+from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.stand import Stand
-from floatbase.behaviours.swing import Swing
+from floatbase.behaviours.swing import Swing, SwingPath
+from floatbase.behaviours.terrain import Terrain
 from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     "Stand",
     "StepPlan",
     "Swing",
+    "SwingPath",
+    "Terrain",
     "Walk",
     "capture_point",
     "neutral_point",

@@ -32,7 +32,7 @@ class Gait(Value):
     """A periodic contact schedule: which foot is in the air at which time.
 
     Foot f lifts off at start + (n + offsets[f]) period for n = 0, 1, 2, ..., and stays in the air
-    for `swing`. `trot`, `crawl` and `walk` make the usual gaits.
+    for `swing`. `trot`, `crawl`, `walk`, `pace`, `bound` and `pronk` make the usual gaits.
 
     Parameters
     ----------
@@ -115,9 +115,8 @@ class Gait(Value):
             The gait.
         """
         front, hind = _front_and_hind_feet(robot)
-        step = _step_time(swing, pause)
         offsets = {front[0]: 0.0, hind[1]: 0.0, front[1]: 0.5, hind[0]: 0.5}
-        return Gait({foot: offsets[foot] for foot in _foot_names(robot)}, 2.0 * step, swing, start)
+        return _in_turn(robot, offsets, 2, swing, pause, start)
 
     @staticmethod
     def crawl(robot: Robot, swing: float = 0.3, pause: float = 0.2, start: float = 1.0) -> Gait:
@@ -142,22 +141,71 @@ class Gait(Value):
             The gait.
         """
         front, hind = _front_and_hind_feet(robot)
-        step = _step_time(swing, pause)
         offsets = {hind[0]: 0.0, front[0]: 0.25, hind[1]: 0.5, front[1]: 0.75}
-        return Gait({foot: offsets[foot] for foot in _foot_names(robot)}, 4.0 * step, swing, start)
+        return _in_turn(robot, offsets, 4, swing, pause, start)
 
     @staticmethod
-    def walk(robot: Robot, swing: float = 0.6, pause: float = 0.1, start: float = 1.0) -> Gait:
-        """Return a walk, in which a biped's feet swing alternately.
+    def walk(
+        robot: Robot,
+        swing: float | None = None,
+        pause: float | None = None,
+        start: float | None = None,
+    ) -> Gait:
+        """Return a walk, in which the feet of a biped or a quadruped swing one after the other.
+
+        A quadruped's feet swing in the order of `crawl`, without a pause. A biped on flat feet
+        pauses on both feet. A biped on balls or points cannot stand still, so it begins to walk at
+        once, with short swings.
 
         Parameters
         ----------
         robot : Robot
-            A robot with two feet.
+            A robot with two or four feet.
+        swing : float, optional
+            Time that a foot spends in the air [s]; by default 0.25, 0.6 for a biped on flat feet,
+            and 0.15 for a biped on points.
+        pause : float, optional
+            Time on all feet after each swing [s]; by default 0, or 0.1 for a biped on flat feet.
+        start : float, optional
+            Time of the first lift-off [s]; by default 1, or 0 for a biped on points.
+
+        Returns
+        -------
+        Gait
+            The gait.
+        """
+        names = _foot_names(robot)
+        if len(names) not in (2, 4):
+            raise InputError(
+                f"{robot.name} has {len(names)} feet, but Gait.walk needs two or four. Make its "
+                f"gait with Gait(offsets, …)."
+            )
+        flat = any(foot.corners is not None for foot in robot.feet)
+        values: tuple[float, float, float] = (0.25, 0.0, 1.0)
+        if len(names) == 2:
+            values = (0.6, 0.1, 1.0) if flat else (0.15, 0.0, 0.0)
+        swing, pause, start = (
+            default if given is None else given
+            for default, given in zip(values, (swing, pause, start), strict=True)
+        )
+        if len(names) == 4:
+            return Gait.crawl(robot, swing, pause, start)
+        return _in_turn(robot, dict(zip(names, (0.0, 0.5), strict=True)), 2, swing, pause, start)
+
+    @staticmethod
+    def pace(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 1.0) -> Gait:
+        """Return a pace, in which the left and the right feet of a quadruped swing alternately.
+
+        The body sways to the side, which needs friction: `Walk` refuses a pace if it is too low.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
         swing : float, optional
             Time that a foot spends in the air [s].
         pause : float, optional
-            Time on both feet after each swing [s].
+            Time on all feet after each swing [s].
         start : float, optional
             Time of the first lift-off [s].
 
@@ -166,14 +214,63 @@ class Gait(Value):
         Gait
             The gait.
         """
-        names = _foot_names(robot)
-        if len(names) != 2:
-            raise InputError(
-                f"{robot.name} has {len(names)} feet, but Gait.walk needs two. For four feet, use "
-                f"Gait.trot or Gait.crawl."
-            )
-        step = _step_time(swing, pause)
-        return Gait(dict(zip(names, (0.0, 0.5), strict=True)), 2.0 * step, swing, start)
+        front, hind = _front_and_hind_feet(robot)
+        offsets = {front[0]: 0.0, hind[0]: 0.0, front[1]: 0.5, hind[1]: 0.5}
+        return _in_turn(robot, offsets, 2, swing, pause, start)
+
+    @staticmethod
+    def bound(robot: Robot, swing: float = 0.25, pause: float = 0.0, start: float = 1.0) -> Gait:
+        """Return a bound, in which the front and the hind feet of a quadruped swing alternately.
+
+        The body sways forwards and backwards, which needs friction: `Walk` refuses a bound if it is
+        too low.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
+        swing : float, optional
+            Time that a foot spends in the air [s].
+        pause : float, optional
+            Time on all feet after each swing [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
+        """
+        front, hind = _front_and_hind_feet(robot)
+        offsets = {front[0]: 0.0, front[1]: 0.0, hind[0]: 0.5, hind[1]: 0.5}
+        return _in_turn(robot, offsets, 2, swing, pause, start)
+
+    @staticmethod
+    def pronk(robot: Robot, swing: float = 0.25, pause: float = 0.25, start: float = 1.0) -> Gait:
+        """Return a pronk, in which all feet of a quadruped swing together.
+
+        The robot flies during each swing, so `Walk` refuses this gait.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
+        swing : float, optional
+            Time that a foot spends in the air [s].
+        pause : float, optional
+            Time on all feet after each swing [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
+        """
+        offsets = dict.fromkeys(
+            _front_and_hind_feet(robot)[0] + _front_and_hind_feet(robot)[1], 0.0
+        )
+        return _in_turn(robot, offsets, 1, swing, pause, start)
 
     @property
     def feet(self) -> tuple[str, ...]:
@@ -346,11 +443,13 @@ def check_always_supported(gait: Gait) -> None:
             )
 
 
-def _step_time(swing: float, pause: float) -> float:
-    """Return the time of a swing and the pause after it [s], both checked."""
-    return as_positive("swing", swing, "s", maximum=_MAX_PERIOD) + as_positive(
-        "pause", pause, "s", allow_zero=True
-    )
+def _in_turn(
+    robot: Robot, offsets: Mapping[str, float], n: int, swing: float, pause: float, start: float
+) -> Gait:
+    """Return a gait with n swings in turn, each followed by a pause [s]."""
+    swing = as_positive("swing", swing, "s", maximum=_MAX_PERIOD)
+    step = swing + as_positive("pause", pause, "s", allow_zero=True)
+    return Gait({foot: offsets[foot] for foot in _foot_names(robot)}, n * step, swing, start)
 
 
 def _foot_names(robot: Robot) -> tuple[str, ...]:

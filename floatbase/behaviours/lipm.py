@@ -158,6 +158,16 @@ class LIPM(Value):
         return read_only(self._evaluate(t)[0])
 
     @cached_property
+    def pieces(self) -> Array:
+        """Return the closed form of the motion as numbers, shape (n, 9).
+
+        Each row has the time at which a piece begins [s], the ZMP p there [m], its slope [m/s], and
+        the coefficients a and b [m] of c = p + slope s + a e^{ω s} + b e^{-ω s}, with the time s
+        since the piece began. The last piece never ends.
+        """
+        return read_only(np.array([np.concatenate([[t], *rest]) for t, *rest in self._closed_form]))
+
+    @cached_property
     def _closed_form(self) -> tuple[tuple[float, Array, Array, Array, Array], ...]:
         """Return begin, p there, its slope, and the coefficients a and b of each segment.
 

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from floatbase._validation import Value, as_array, as_instance, as_positive, checked
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_callable,
+    as_instance,
+    as_positive,
+    checked,
+    short_repr,
+)
 from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.swing import Swing, SwingPath
+from floatbase.behaviours.terrain import Terrain
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
+from floatbase.objectives import Task
+
+_DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
+_MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
 
 
 def _as_gains(name: str, value: Any) -> tuple[float, float]:
@@ -64,6 +82,90 @@ class Gains(Value):
             Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2))
             if flat
             else Gains()
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class WalkOptions:
+    """Options of a `Walk` that do not change; `Walk` describes them.
+
+    Parameters
+    ----------
+    clearance, reach, ramp : float
+        Height of the swings [m], largest distance of a foothold from the nominal one [m], and time
+        in which a foot is loaded or unloaded [s].
+    foothold, adjustment, swing : callable
+        Rules for footholds, their adjustment (or None), and the paths of swings.
+    ground : Terrain or None
+        The ground, if it is known.
+    tasks : tuple of Task
+        Further tasks.
+    acceleration : ndarray, shape (3,)
+        Largest acceleration of the path [m/s², m/s², rad/s²].
+    gains : Gains
+        Gains of the tasks.
+    controller : dict
+        Options of `WholeBodyController`.
+    """
+
+    clearance: float
+    reach: float
+    ramp: float
+    foothold: Callable[..., npt.ArrayLike]
+    adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None
+    swing: Callable[..., SwingPath]
+    ground: Terrain | None
+    tasks: tuple[Task, ...]
+    acceleration: Array
+    gains: Gains
+    controller: Mapping[str, Any]
+
+    @staticmethod
+    def checked(
+        contacts: Contacts,
+        clearance: float,
+        reach: float | None,
+        ramp: float,
+        foothold: Callable[..., npt.ArrayLike],
+        adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None,
+        swing: Callable[..., SwingPath] | None,
+        ground: Terrain | None,
+        tasks: Sequence[Task],
+        acceleration: tuple[float, float],
+        gains: Gains | None,
+        controller: Mapping[str, Any],
+    ) -> WalkOptions:
+        """Return the options after checking them; None stands for a default."""
+        limits = as_array("acceleration", acceleration, (2,)).tolist()
+        forwards, turning = (
+            as_positive("acceleration", limit, unit, maximum=_MAX_ACCELERATION)
+            for limit, unit in zip(limits, ("m/s²", "rad/s²"), strict=True)
+        )
+        if reach is None:
+            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
+        if adjustment is not None:
+            example = "adjustment(plan, path, com, com_velocity, t)"
+            as_callable("adjustment", adjustment, example)
+        if ground is not None and not isinstance(ground, Terrain):
+            raise InputError(
+                f"ground must have the methods height(xy) and normal(xy), as fb.Ground has, but "
+                f"{short_repr(ground)} lacks at least one of them."
+            )
+        if not isinstance(tasks, list | tuple):
+            raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
+        example = "swing(start, end, lift_off, touchdown, clearance)"
+        return WalkOptions(
+            as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
+            as_positive("reach", reach, "m", maximum=1.0),
+            as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
+            as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
+            adjustment,
+            Swing if swing is None else as_callable("swing", swing, example),
+            ground,
+            tuple(tasks),
+            np.array([forwards, forwards, turning]),
+            Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains),
+            controller,
         )
 
 

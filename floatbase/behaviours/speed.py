@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import sqrt
+from collections.abc import Mapping
+from functools import lru_cache
+from math import pi, sqrt
+from typing import Protocol
 
 import numpy as np
+import pinocchio as pin
 
 from floatbase._geometry import minimum_jerk
 from floatbase._validation import Array
 from floatbase.behaviours.gait import Gait
-from floatbase.robots import State
+from floatbase.behaviours.posture import WalkingPosture
+from floatbase.robots import Robot, State
+from floatbase.robots._checks import joint_limits
 
 # with four feet or fewer, the middle of all feet is at the edge of each smaller stance
 MAX_FEET_WITH_SWAY = 4
-# fraction of a leg's length that a walk uses: a straight leg cannot lift or press its foot
+# fraction of a straight leg's length that a walk uses: a straight leg cannot lift or press its foot
 _MAX_EXTENSION = 0.9
+_GRID_SIZE = 25  # positions of a joint that the search for the longest leg tries
+_SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot of the catalogue
 
 
 def speed_fractions(
     gait: Gait,
-    state: State,
-    nominal_feet: dict[str, Array],
-    flat_feet: set[str],
+    posture: WalkingPosture,
     reach: float,
     motion: Array,
+    acceleration: float,
 ) -> tuple[float, float]:
     """Return the largest fractions of a desired motion that the feet can follow, at most 1.
 
@@ -40,21 +46,19 @@ def speed_fractions(
     ----------
     gait : Gait
         The gait.
-    state : State
-        State whose posture the robot keeps.
-    nominal_feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame in the standing posture, relative to the middle of the feet
-        [m].
-    flat_feet : set of str
-        Names of the flat feet.
+    posture : WalkingPosture
+        The standing posture.
     reach : float
         Largest distance of a foothold from the nominal one [m].
     motion : ndarray, shape (3,)
         Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
+    acceleration : float
+        Largest acceleration of the velocity [m/s²].
     """
     if not motion.any():
         return 1.0, 1.0
     first_fraction, fraction = 1.0, 1.0
+    state, nominal_feet, flat_feet = posture.state, posture.nominal_feet, posture.flat_feet
     wait, shifts = max(gait.offsets.values()) * gait.period, _weight_shifts(gait, nominal_feet)
     half_stance = (gait.period - gait.swing) / 2.0
     longest = half_stance + _swing_lag(gait)
@@ -70,12 +74,38 @@ def speed_fractions(
             shift = float(np.abs(shifts @ direction).max())
             leg_limit = max(_leg_reach(state, foot, direction) - shift, 0.0)
             fraction = min(fraction, leg_limit / (longest * speed))
-            # at 1 m/s², the distance after `wait` is speed wait - speed² / 2
-            if wait**2 > 2.0 * leg_limit:
-                first_fraction = min(
-                    first_fraction, (wait - sqrt(wait**2 - 2.0 * leg_limit)) / speed
-                )
+            # at the largest acceleration, the distance after `wait` is
+            # speed wait - speed² / (2 acceleration)
+            square = wait**2 - 2.0 * leg_limit / acceleration
+            if square > 0.0:
+                first_fraction = min(first_fraction, acceleration * (wait - sqrt(square)) / speed)
     return min(first_fraction, fraction), fraction
+
+
+class _Walking(Protocol):
+    """A walk: its robot and its desired motion."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def velocity(self) -> Array:
+        """Desired velocity, shape (2,) [m/s]."""
+
+    @property
+    def yaw_rate(self) -> float:
+        """Desired yaw rate [rad/s]."""
+
+
+def slow_message(walk: _Walking, gait: Gait, fraction: float) -> str:
+    """Return the warning for a walk that is limited to a fraction of its desired motion."""
+    x, y = fraction * walk.velocity
+    return (
+        f"{walk.robot.name} cannot make steps that are long enough for {walk!r}. It walks at "
+        f"{x:.3g} and {y:.3g} m/s, and turns at {fraction * walk.yaw_rate:.3g} rad/s. Use a gait "
+        f"with a shorter period than {gait.period:g} s."
+    )
 
 
 def _weight_shifts(gait: Gait, nominal_feet: dict[str, Array]) -> Array:
@@ -115,14 +145,54 @@ def _leg_reach(state: State, foot: str, direction: Array) -> float:
 
     The result is the smaller of the two distances from the foot's place in the standing posture.
     """
-    model, placements = state.robot.model, state.joint_transforms
-    joint = model.frames[state.robot.frame_id(foot)].parentJoint
-    points = [state.point(foot)]
-    while joint > 0 and model.names[joint] in state.robot.joint_names:
-        points.append(placements[joint][:3, 3])
-        joint = model.parents[joint]
-    length = sum(np.linalg.norm(a - b) for a, b in pairwise(points))
-    leg = points[0] - points[-1]
+    root = _leg_joints(state.robot, foot)[-1]
+    leg = state.point(foot) - state.joint_transforms[root][:3, 3]
     along = abs(float(leg[:2] @ direction))
-    square = (_MAX_EXTENSION * length) ** 2 - float(leg @ leg) + along**2
+    square = _leg_length(state.robot, foot) ** 2 - float(leg @ leg) + along**2
     return sqrt(max(square, 0.0)) - along
+
+
+def _leg_joints(robot: Robot, foot: str) -> list[int]:
+    """Return the joints of a leg, from the foot to the hip."""
+    model, joints = robot.model, []
+    joint = model.frames[robot.frame_id(foot)].parentJoint
+    while joint > 0 and model.names[joint] in robot.joint_names:
+        joints.append(joint)
+        joint = model.parents[joint]
+    return joints
+
+
+@lru_cache(maxsize=64)
+def _leg_length(robot: Robot, foot: str) -> float:
+    """Return the largest distance of a foot from its hip in a walk [m].
+
+    The leg is bent a little, and its joints are within their limits.
+    """
+    joints, _, lower, upper = joint_limits(robot.model)
+    limits = dict(zip(joints.tolist(), zip(lower, upper, strict=True), strict=True))
+    return min(_MAX_EXTENSION * _longest_leg(robot, foot, {}), _longest_leg(robot, foot, limits))
+
+
+def _longest_leg(robot: Robot, foot: str, limits: Mapping[int, tuple[float, float]]) -> float:
+    """Return the largest distance of a foot from its hip [m], by a search joint by joint.
+
+    limits: lower and upper limit of joints by their index [rad or m]; other joints turn fully.
+    """
+    model, data, frame = robot.model, robot.model.createData(), robot.frame_id(foot)
+    leg, q = _leg_joints(robot, foot), np.array(robot.standing().q)
+
+    def distance(i: int, position: float) -> float:
+        q[i] = position
+        pin.forwardKinematics(model, data, q)
+        place = pin.updateFramePlacement(model, data, frame).translation
+        return float(np.linalg.norm(place - data.oMi[leg[-1]].translation))
+
+    longest = 0.0
+    for joint in leg * _SWEEPS:
+        i = model.idx_qs[joint]
+        if model.nqs[joint] > 1:  # (cos, sin) of a joint without limits
+            continue
+        lower, upper = limits.get(joint, (q[i] - pi, q[i] + pi))
+        positions = [q[i], *np.linspace(max(lower, q[i] - pi), min(upper, q[i] + pi), _GRID_SIZE)]
+        longest, q[i] = max((distance(i, position), position) for position in positions)
+    return longest

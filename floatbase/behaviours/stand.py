@@ -7,13 +7,11 @@ from math import inf
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from floatbase._validation import Array, as_instance, as_number, as_positive
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import Gait, check_always_supported
 from floatbase.behaviours.walk import Walk
-from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -56,7 +54,7 @@ class Stand(Walk):
     The capture point is from [Pratt2006]_.
     """
 
-    _waits_for_weight = False  # it steps because it falls
+    waits_for_weight = False  # it steps because it falls
 
     def __init__(
         self,
@@ -72,6 +70,7 @@ class Stand(Walk):
             if stepping_gait is None
             else stepping_gait
         )
+        self._feet = contacts
         self._standing_gait = replace(
             as_instance("stepping_gait", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0
         )
@@ -93,45 +92,36 @@ class Stand(Walk):
         """Whether the robot is stepping now."""
         return self.gait is not self._standing_gait
 
-    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """Compute the command of one control step.
+    def restart(self) -> None:
+        """Let the next control step begin to stand in the measured state."""
+        self.gait = self._standing_gait
+        super().restart()
+
+    def select_gait(self, q: Array, v: Array, t: float) -> None:
+        """Begin to step, or stop stepping.
 
         Parameters
         ----------
-        q : array_like, shape (nq,)
+        q : ndarray, shape (nq,)
             Configuration.
-        v : array_like, shape (nv,)
+        v : ndarray, shape (nv,)
             Velocity.
-        t : float, optional
+        t : float
             The time [s].
-
-        Returns
-        -------
-        Command
-            Joint torques, with the planned accelerations and contact forces.
         """
-        t = as_number("t", t, "s")
-        if self.stepping_gait is not None and self._continues(t):
-            self._update_stepping(State(self.robot, q, v), t, self.stepping_gait)
-        return super().__call__(q, v, t)
-
-    def _initialize(self, state: State, t: float) -> None:
-        """Start by standing in the measured state."""
-        self.gait = self._standing_gait
-        super()._initialize(state, t)
-
-    def _update_stepping(self, state: State, t: float, stepping_gait: Gait) -> None:
-        """Begin to step, or stop stepping."""
-        ref = self._ref
+        state, t = State(self.robot, q, v), as_number("t", t, "s")
+        if self.stepping_gait is None:
+            return
         if not self.stepping:
             dcm = capture_point(state.com, state.com_velocity, self.omega)
-            if support_margin(dcm, self._all_contacts.positions(state)[:, :2]) < self.margin:
-                self.gait = replace(self._best_start(stepping_gait, state, dcm), start=t, stop=None)
+            if support_margin(dcm, self._feet.positions(state)[:, :2]) < self.margin:
+                start = self._best_start(self.stepping_gait, state, dcm)
+                self.gait = replace(start, start=t, stop=None)
         elif self.gait.stop is None:
             slow = np.linalg.norm(state.com_velocity[:2]) < _STOP_SPEED
             if slow and t > self.gait.start + self.gait.period:
                 self.gait = replace(self.gait, stop=t)
-        elif not ref.swinging:
+        elif not self.swings:
             self.gait = self._standing_gait
 
     def _best_start(self, stepping_gait: Gait, state: State, dcm: Array) -> Gait:
@@ -143,11 +133,9 @@ class Stand(Walk):
         )
 
         def margin(gait: Gait) -> float:
-            standing_feet = [
-                name for name in self._all_contacts.names if gait.offsets.get(name) != 0.0
-            ]
+            standing_feet = [name for name in self._feet.names if gait.offsets.get(name) != 0.0]
             return (
-                support_margin(dcm, self._all_contacts.only(*standing_feet).positions(state)[:, :2])
+                support_margin(dcm, self._feet.only(*standing_feet).positions(state)[:, :2])
                 if standing_feet
                 else -inf
             )

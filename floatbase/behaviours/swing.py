@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,36 @@ from floatbase._validation import (
 from floatbase.errors import InputError
 
 _MIN_DURATION = 1e-3  # s: a shorter swing must be in another unit
+
+
+class SwingPath(Protocol):
+    """Path of a foot through the air, such as `Swing`."""
+
+    @property
+    def start(self) -> Array:
+        """Position at lift-off, shape (3,), world frame [m]."""
+
+    @property
+    def end(self) -> Array:
+        """Position at touchdown, shape (3,), world frame [m]."""
+
+    @property
+    def lift_off(self) -> float:
+        """Time of lift-off [s]."""
+
+    @property
+    def touchdown(self) -> float:
+        """Time of touchdown [s]."""
+
+    @property
+    def height(self) -> float:
+        """Height above the line from start to end, half-way, for pictures [m]."""
+
+    def with_end(self, end: npt.ArrayLike) -> SwingPath:
+        """Return the same path to another end, shape (3,), in the world frame [m]."""
+
+    def __call__(self, t: float) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration at t [s], each (3,), in the world frame."""
 
 
 @dataclass(frozen=True, eq=False)

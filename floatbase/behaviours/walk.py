@@ -11,42 +11,57 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from math import inf
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from floatbase._validation import (
     Array,
     as_array,
-    as_callable,
     as_instance,
     as_number,
-    as_positive,
+    numeric_copy,
     refuse_new_attributes,
 )
+from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
+from floatbase.behaviours.gait_clock import GaitClock
 from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import Gains, check_gait_feet, check_options, flat_foot_names
-from floatbase.behaviours.planner import Planner, StepPlan
-from floatbase.behaviours.reference import Motion, Reference, rotated_by_yaw
-from floatbase.behaviours.speed import speed_fractions
-from floatbase.behaviours.swing import Swing
-from floatbase.control import Command, JointLimits, WholeBodyController
+from floatbase.behaviours.options import Gains, WalkOptions, check_gait_feet, check_options
+from floatbase.behaviours.path import DesiredMotion, Path
+from floatbase.behaviours.plan import (
+    StepPlan,
+    first_footing,
+    first_path,
+    make_plan,
+    next_footing,
+    weight_shift,
+)
+from floatbase.behaviours.posture import WalkingPosture
+from floatbase.behaviours.speed import slow_message, speed_fractions
+from floatbase.behaviours.stance_controllers import StanceControllers
+from floatbase.behaviours.sway import check_friction
+from floatbase.behaviours.swing import SwingPath
+from floatbase.behaviours.targets import Adjustment, BodyPose
+from floatbase.behaviours.terrain import Terrain
+from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
-from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
+from floatbase.objectives import Task
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
-_DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
-_RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at which a ramp begins
-# per rad/s²: the weight of a task. A knee that touches its stop is better than a fall: of 24
-# pushes of 200 to 300 N, go2 survives 24 with this weight, 22 with 200 and 13 with 10 000
-_JOINT_LIMIT_WEIGHT = 10.0
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
+_MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
+# attributes of a walk that its copies do not share
+_MADE_ANEW = (
+    "_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_data", "_com",
+)  # fmt: skip
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -59,6 +74,10 @@ class Walk:
     from its present position. In each control step it shifts the ends of the swings by
     `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the
     rest. If no contact forces can hold the feet, their contacts become soft.
+
+    Between two changes of stance, a walk is a few arrays, and one compiled function writes all
+    targets of a control step. With a user-defined adjustment, or swings of another class than
+    `Swing`, slower functions do that.
 
     If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
@@ -77,14 +96,14 @@ class Walk:
         weight must first shift to the feet that stand at its first lift-off.
     velocity : array_like, shape (2,), optional
         Desired velocity of the body, forwards and to the left [m/s]. The velocity can be set while
-        walking, and is approached at 1 m/s². If the legs are too short for its steps, a
-        `SimulationWarning` says so, and the robot walks at the fraction `speed_fraction` of the
-        desired velocity. In its first period, a slow gait may be slower. At (0, 0) the robot
+        walking, and is approached at the largest `acceleration`. If the legs are too short for its
+        steps, a `SimulationWarning` says so, and the robot walks at the fraction `speed_fraction`
+        of the desired velocity. In its first period, a slow gait may be slower. At (0, 0) the robot
         marches on the spot; to make it stand, set `walk.gait = dataclasses.replace(walk.gait,
         stop=walk.time)`.
     yaw_rate : float, optional
         Desired yaw rate, to the left [rad/s]. The yaw rate can be set while walking, and is
-        approached at 1 rad/s². It is limited together with the velocity.
+        approached at the largest `acceleration`. It is limited together with the velocity.
     clearance : float, optional
         Height of the swings [m].
     reach : float, optional
@@ -95,8 +114,30 @@ class Walk:
         stand meanwhile [s]. The option `max_normal_force` replaces the ramps.
     foothold : callable, optional
         Called as foothold(foot, touchdown, walk) with the time of touchdown [s]. It returns the
-        foothold before adjustments, shape (2,), in the world frame [m]. The default is
-        `raibert_foothold`.
+        foothold before adjustments, in the world frame [m]: x and y, shape (2,), or the position of
+        the foot's frame, shape (3,). The default is `raibert_foothold`.
+    adjustment : callable, optional
+        Called in each control step as adjustment(plan, path, com, com_velocity, t) with the
+        `StepPlan`, the body's present path, centre of mass and its velocity, shape (3,). It returns
+        a mapping from feet in the air to the places where they land, shape (2,) or (3,), in the
+        world frame [m]. The default shifts footholds by the error of the capture point,
+        `step_adjustment`.
+    swing : callable, optional
+        Called as swing(start, end, lift_off, touchdown, clearance) when a foot lifts off. It
+        returns the path of the foot, such as a `Swing`, which is the default.
+    ground : Terrain, optional
+        The ground, if the walk knows it: an object with the methods height(xy) and normal(xy), such
+        as `fb.Ground`. Footholds then lie on it, swings clear its steps, and soles follow its
+        normal. Without it, the ground is the plane through the feet.
+    tasks : sequence of Task, optional
+        Further tasks, for example for a hand.
+    height : float, optional
+        Change of the height of the centre of mass [m]. It can be set while walking.
+    pitch : float, optional
+        Pitch of the base relative to the standing posture, nose down if positive [rad]. It can be
+        set while walking.
+    acceleration : (float, float), optional
+        Largest acceleration of the desired velocity [m/s²] and of the yaw rate [rad/s²].
     gains : Gains, optional
         Gains of the tasks; by default `Gains.for_contacts(contacts)`.
     **options : object
@@ -123,7 +164,8 @@ class Walk:
     """
 
     __setattr__ = refuse_new_attributes
-    _waits_for_weight = True  # whether a new gait begins later if the weight must first shift
+    waits_for_weight = True
+    """Whether a new gait begins later if the weight must first shift."""
 
     def __init__(
         self,
@@ -137,34 +179,32 @@ class Walk:
         reach: float | None = None,
         ramp: float = 0.1,
         foothold: Foothold | None = None,
+        adjustment: Adjustment | None = None,
+        swing: Callable[..., SwingPath] | None = None,
+        ground: Terrain | None = None,
+        tasks: Sequence[Task] = (),
+        height: float = 0.0,
+        pitch: float = 0.0,
+        # 1 m/s² and 1 rad/s²: a jump of the desired velocity makes robots fall
+        acceleration: tuple[float, float] = (1.0, 1.0),
         gains: Gains | None = None,
         **options: Any,
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
-        self._reference: Reference | None = None
+        self._active: ActivePlan | None = None
+        self._planning_path: Path | None = None
+        self._speeds = 1.0, 1.0  # fractions in the first period, and later
+        self._pose = BodyPose()
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
-        self._clearance = as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0)
-        if reach is None:
-            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
-        self._reach = as_positive("reach", reach, "m", maximum=1.0)
-        self._ramp = as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0)
-        self._foothold = (
-            raibert_foothold
-            if foothold is None
-            else as_callable("foothold", foothold, "foothold(foot, touchdown, walk)")
-        )
-        self._gains = (
-            Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains)
-        )
+        self.height, self.pitch = height, pitch
         check_options(type(self).__name__, options)
-        self._limits = WholeBodyController(
-            robot, contacts, (), **options
-        ).limits  # reports wrong options now
-        self._options, self._standing_state = options, robot.standing()
-        self._single_contacts = {contact.name: Contacts([contact]) for contact in contacts}
-        self._planner = Planner(contacts, self._standing_state, self._clearance, self._reach)
+        self._options = WalkOptions.checked(
+            self._all_contacts, clearance, reach, ramp, foothold or raibert_foothold, adjustment,
+            swing, ground, tasks, acceleration, gains, options,
+        )  # fmt: skip
         self._clear()
+        self._prepare(gait)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -175,32 +215,32 @@ class Walk:
     @property
     def clearance(self) -> float:
         """Height of the swings [m]."""
-        return self._clearance
+        return self._options.clearance
 
     @property
     def reach(self) -> float:
         """Largest distance of a foothold from the nominal one below the body [m]."""
-        return self._reach
+        return self._options.reach
 
     @property
     def ramp(self) -> float:
         """Time in which a foot is unloaded or loaded [s]."""
-        return self._ramp
+        return self._options.ramp
 
     @property
     def foothold(self) -> Foothold:
         """Function that returns the foothold of a foot."""
-        return self._foothold
+        return self._options.foothold
 
     @property
     def gains(self) -> Gains:
         """Gains of the tasks."""
-        return self._gains
+        return self._options.gains
 
     @property
     def omega(self) -> float:
         """Natural frequency of the pendulum [1/s]."""
-        return self._planner.omega
+        return self._posture.omega
 
     @property
     def history(self) -> deque[StepPlan]:
@@ -217,6 +257,8 @@ class Walk:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
+        if self._is_complete:
+            self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
 
@@ -243,43 +285,94 @@ class Walk:
         self._limit_speed(stacklevel=3)
 
     @property
+    def height(self) -> float:
+        """Change of the height of the centre of mass [m]."""
+        return self._pose.height
+
+    @height.setter
+    def height(self, height: float) -> None:
+        height = as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE)
+        self._pose = replace(self._pose, height=height)
+        self._refresh()
+
+    @property
+    def pitch(self) -> float:
+        """Pitch of the base relative to the standing posture, nose down if positive [rad]."""
+        return self._pose.pitch
+
+    @pitch.setter
+    def pitch(self, pitch: float) -> None:
+        pitch = as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH)
+        self._pose = replace(self._pose, pitch=pitch)
+        self._refresh()
+
+    @property
     def speed_fraction(self) -> float:
         """Fraction of the desired velocity and yaw rate at which the robot walks, at most 1."""
-        return self._speed_fraction
+        return self._speeds[1]
 
     @property
     def time(self) -> float | None:
         """Time of the last control step [s]; None before the first."""
-        return self._ref.time if self._reference else None
+        return self._active.path.time if self._active else None
 
     @property
     def stance(self) -> tuple[str, ...]:
         """Names of the feet that stand now."""
-        return self._ref.stance if self._reference else self._all_contacts.names
+        return self._active.plan.stance if self._active else self._all_contacts.names
 
     @property
     def contacts(self) -> Contacts:
         """Contacts of the present stance."""
-        controller = self._controllers.get(self.stance)
-        return self._all_contacts if controller is None else controller.contacts
+        return self._controllers[self.stance].contacts if self._active else self._all_contacts
 
     @property
     def footholds(self) -> dict[str, Array]:
         """Foothold of each foot in the air or next to lift off, shape (3,), world frame [m]."""
         ends = {foot: path.end for foot, path in self.swings.items()}
-        return self._ref.footholds | ends if self._reference else {}
+        return {**self._active.plan.footholds, **ends} if self._active else {}
 
     @property
-    def swings(self) -> dict[str, Swing]:
+    def swings(self) -> dict[str, SwingPath]:
         """Paths of the feet in the air."""
-        if self._reference is None:
-            return {}
-        return {foot: each.path for foot, each in self._reference.swinging.items()}
+        return self._active.swings if self._active else {}
 
     @property
     def plan(self) -> LIPM | None:
         """Plan of the centre of mass's horizontal motion; None before the first control step."""
-        return self._ref.plan if self._reference else None
+        return self._active.plan.plan if self._active else None
+
+    @property
+    def path(self) -> Path:
+        """Path of the body at the last control step, or at the time that is being planned.
+
+        Raises
+        ------
+        InputError
+            Before the first control step.
+        """
+        path = self._planning_path or (self._active.path if self._active else None)
+        if path is None:
+            raise InputError(
+                "A Walk has no path before its first control step. Call walk(q, v, t) first, as a "
+                "rollout does."
+            )
+        return path
+
+    def path_at(self, t: float) -> Path:
+        """Predict the path of the body, if the desired velocity does not change.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Returns
+        -------
+        Path
+            Position, yaw and velocity at that time.
+        """
+        return self.path.moved(self._desired, as_number("t", t, "s"))
 
     def nominal_foothold(self, foot: str, t: float) -> Array:
         """Return where a foot would stand below the body, if the desired velocity does not change.
@@ -297,8 +390,7 @@ class Walk:
             Position of the foot's frame in the world frame [m].
         """
         foot = self._all_contacts[foot].name  # an `UnknownNameError` lists the names
-        position, yaw, _ = self._path_at(as_number("t", t, "s"))
-        return position + rotated_by_yaw(self._planner.nominal_feet[foot][:2], yaw)
+        return self.path_at(t).point(self._posture.nominal_feet[foot][:2])
 
     def velocity_at(self, t: float) -> Array:
         """Predict the body's velocity, if the desired velocity does not change.
@@ -313,8 +405,7 @@ class Walk:
         ndarray, shape (2,)
             Velocity in the world frame [m/s].
         """
-        _, yaw, velocity = self._path_at(as_number("t", t, "s"))
-        return rotated_by_yaw(velocity[:2], yaw)
+        return self.path_at(t).point_velocity(np.zeros(2))
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """Compute the command of one control step.
@@ -333,188 +424,162 @@ class Walk:
         Command
             Joint torques, with the planned accelerations and contact forces.
         """
-        state, t = State(self.robot, q, as_array("v", v, (self.robot.nv,))), as_number("t", t, "s")
-        if not self._continues(t):
-            self._initialize(state, t)
-        ref = self._ref
-        self._update_gait(state, t)
-        (ref.position, ref.yaw, ref.velocity), ref.time = self._path_at(t), t
-        stance = self._stance_at(t)
-        if stance != ref.stance or t >= ref.replan_time:
-            plan = self._planner.replan(ref, state, stance, self._foothold_at, self._yaw_at)
-            self._history.append(plan)
-        self._planner.adjust_footholds(ref, state)
-        return self._stance_controller()(q, v, t)
+        robot, t, active = self._robot, as_number("t", t, "s"), self._active
+        q, v = _as_vector("q", q, robot.nq), _as_vector("v", v, robot.nv)
+        if active is None or not self._continues(t):
+            self.restart()
+            self._forget_plan()
+        elif type(self).select_gait is not Walk.select_gait:
+            self.select_gait(q, v, t)
+        if self._active is None or not self._clock.follows(self._gait) or t >= self._next_change:
+            self._change(State(robot, q, v), t)
+        active = self._active
+        assert active is not None
+        pin.centerOfMass(robot.model, self._data, q, v, False)
+        controller = self._controllers[active.plan.stance]
+        targets = controller.targets_at(t)
+        active.write(t, *self._com, targets)
+        self._time = t
+        return controller(q, v, t, targets)
 
-    @property
-    def _ref(self) -> Reference:
-        """Reference, which exists from the first control step on."""
-        if self._reference is None:
-            raise InputError(
-                "A Walk has no path before its first control step. Call walk(q, v, t) first, as a "
-                "rollout does."
-            )
-        return self._reference
+    def restart(self) -> None:
+        """Let the next control step start from the measured state.
+
+        `Walk` calls this method by itself if the time jumps. Derived classes may extend it.
+        """
+        self._time = -inf
+
+    def select_gait(self, q: Array, v: Array, t: float) -> None:
+        """Choose the gait before a control step; derived classes may set `gait` here.
+
+        Parameters
+        ----------
+        q : ndarray, shape (nq,)
+            Configuration.
+        v : ndarray, shape (nv,)
+            Velocity.
+        t : float
+            The time [s].
+        """
+        State(self.robot, q, v)  # raises for wrong arguments
+        as_number("t", t, "s")
 
     def _continues(self, t: float) -> bool:
         """Return whether a time [s] follows the last control step, so that the walk continues."""
-        ref = self._reference
-        return (
-            ref is not None
-            and t > ref.start_time
-            and ref.time - TIME_TOLERANCE <= t <= ref.time + _RESTART_GAP
+        return t > self._start_time and (
+            self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
         )
 
+    @property
+    def _is_complete(self) -> bool:
+        """Whether the constructor has checked its arguments."""
+        return "_controllers" in vars(self)
+
     def _clear(self) -> None:
-        """Discard the controllers, the reference and the history."""
-        self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
-        self._reference = None
+        """Make everything that a copy makes anew."""
+        self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
+        self._controllers = StanceControllers(self._posture, self._options)
+        self._data = self._robot.model.createData()
+        self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
+        self._start_time = self._next_change = -inf
+        self._forget_plan()
+        self.restart()
+
+    def _forget_plan(self) -> None:
+        """Discard the plan and the history."""
+        self._active, self._planning_path = None, None
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
+
+    def _prepare(self, gait: Gait) -> None:
+        """Check the friction that a gait needs, and make the controllers of its stances."""
+        limits = self._controllers.limits
+        facets, inner = limits.facets, limits.inner_approximation
+        check_friction(gait, self._posture, self._all_contacts, facets, inner)
+        self._controllers.prepare(gait)
 
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
-        if "_planner" not in vars(self):  # the constructor is still checking its arguments
+        if not self._is_complete:
             return
-        self._first_fraction, self._speed_fraction = speed_fractions(
+        self._speeds = speed_fractions(
             self._gait,
-            self._standing_state,
-            self._planner.nominal_feet,
-            self._planner.flat_feet,
-            self._reach,
+            self._posture,
+            self._options.reach,
             np.array([*self._velocity, self._yaw_rate]),
+            self._options.acceleration[0],
         )
-        if self._speed_fraction < 1.0:
-            x, y = self._speed_fraction * self._velocity
-            warnings.warn(
-                f"{self.robot.name} cannot make steps that are long enough for {self!r}. It walks "
-                f"at {x:.3g} and {y:.3g} m/s, and turns at "
-                f"{self._speed_fraction * self._yaw_rate:.3g} rad/s. Use a gait with a shorter "
-                f"period than {self._gait.period:g} s.",
-                SimulationWarning,
-                stacklevel=stacklevel,
-            )
+        if self.speed_fraction < 1.0:
+            message = slow_message(self, self._gait, self.speed_fraction)
+            warnings.warn(message, SimulationWarning, stacklevel=stacklevel)
+        self._refresh()
 
-    def _path_at(self, t: float) -> tuple[Array, float, Array]:
-        """Return position, yaw and velocity of the path at t [s].
+    def _refresh(self) -> None:
+        """Apply a new desired motion or pose to the plan in use."""
+        active = self._active
+        if active is not None:
+            swinging, time = bool(active.plan.planned_swings), active.path.time
+            self._desired = self._desired_motion(swinging, time)
+            self._active = active.changed(self._desired, self._pose)
+
+    def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
+        """Return the motion that the path approaches from t [s] on.
 
         The path does not move before the first lift-off or after the last touchdown.
         """
-        ref, begin = self._ref, max(self._ref.time, self._ref.gait.start)
-        walking = ref.swinging or any(ref.gait.next_swing(foot, begin) for foot in ref.gait.feet)
-        first = t < ref.gait.start + ref.gait.period
-        return ref.predict(
-            (self._first_fraction if first else self._speed_fraction)
-            * np.array([*self.velocity, self.yaw_rate])
-            if walking
-            else np.zeros(3),
-            begin,
-            t,
-        )
+        gait, motion = self._clock.gait, np.array([*self._velocity, self._yaw_rate])
+        if not (swinging or self._clock.lifts_later(t)):
+            motion = np.zeros(3)
+        first, later = (fraction * motion for fraction in self._speeds)
+        first_until = gait.start + gait.period
+        return DesiredMotion(first, later, first_until, gait.start, self._options.acceleration)
 
-    def _update_gait(self, state: State, t: float) -> None:
-        """Change to a newly requested gait once all feet stand.
+    def _change(self, state: State, t: float) -> None:
+        """Start, or change stance or gait, if it is time to do so."""
+        active, posture, names = self._active, self._posture, self._all_contacts.names
+        if active is None:
+            self._start_time, self._clock = t, GaitClock(self._gait, t)
+            stance = self._clock.stance(names, t)
+            path, footing = first_path(posture, state, t), first_footing(posture, state)
+            swings: dict[str, SwingPath] = {}
+        else:
+            swinging = bool(active.plan.planned_swings)
+            delay = partial(weight_shift, posture, state, t) if self.waits_for_weight else None
+            new_gait = self._clock.update(self._gait, swinging, t, delay)
+            self._refresh()
+            stance, swings = self._clock.stance(names, t), active.swings
+            if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
+                self._next_change = self._change_after(t, active.plan)
+                return
+            footing, shift = next_footing(active.plan, swings, state, stance, t)
+            path = active.path.moved(self._desired, t)
+            path = replace(path, position=path.position + shift)
+            swings = {foot: swing for foot, swing in swings.items() if foot not in stance}
+        self._planning_path, self._desired = path, self._desired_motion(bool(swings), t)
+        try:
+            plan = make_plan(
+                posture, self._options, state, path, self._clock.gait, stance, footing,
+                lambda foot, touchdown: self._options.foothold(foot, touchdown, self),
+                lambda time: self.path_at(time).yaw,
+                active.plan if active else None,
+                swings,
+            )  # fmt: skip
+        finally:
+            self._planning_path = None
+        self._history.append(plan)
+        self._controllers.plan, controller = plan, self._controllers[stance]
+        self._active = ActivePlan(
+            posture, plan, self._desired, self._pose, self._options.reach, controller.targets,
+            self._options.adjustment, controller.compiled is not None,
+        )  # fmt: skip
+        self._next_change = self._change_after(t, plan)
 
-        Feet that are in the air come down as planned.
-        """
-        ref = self._ref
-        if ref.requested_gait is not None and vars(self._gait) == vars(ref.requested_gait):
-            return
-        if not ref.swinging:
-            gait = self._gait.starting_at(t)
-            if self._waits_for_weight and (delay := self._planner.weight_shift(gait, state, t)):
-                gait = replace(gait, start=gait.start + delay)
-            ref.requested_gait, ref.gait, ref.replan_time = self._gait, gait, t
-        elif ref.gait.stop is None or ref.gait.stop > t:
-            ref.requested_gait, ref.gait = None, replace(ref.gait, stop=t)
-
-    def _initialize(self, state: State, t: float) -> None:
-        """Start from the measured state."""
-        self._reference = self._planner.start(state, self._gait, t)
-        self._history.clear()
-
-    def _foothold_at(self, foot: str, touchdown: float) -> npt.ArrayLike:
-        """Return the foothold of a foot, (2,) [m], that lands at a time [s]."""
-        return self._foothold(foot, touchdown, self)
-
-    def _yaw_at(self, t: float) -> float:
-        """Return the path's yaw [rad] at t [s]."""
-        return self._path_at(t)[1]
-
-    def _stance_at(self, t: float) -> tuple[str, ...]:
-        """Return the contacts that stand at t [s]."""
-        gait = self._ref.gait
-        swinging = {foot for foot in gait.feet if gait.swing_at(foot, t)}
-        return tuple(name for name in self._all_contacts.names if name not in swinging)
-
-    def _stance_controller(self) -> WholeBodyController:
-        """Return the controller of the present stance, which is made when first needed."""
-        stance = self._ref.stance
-        if stance not in self._controllers:
-            arguments: dict[str, Any] = {
-                "max_normal_force": self._normal_force_bounds(stance),
-                "on_infeasible": "soften",  # torques and friction may be unable to hold the feet
-                "joint_limits": JointLimits.of(self.robot, weight=_JOINT_LIMIT_WEIGHT),
-                **self._options,
-            }
-            self._controllers[stance] = WholeBodyController(
-                self.robot, self._all_contacts.only(*stance), self._tasks(stance), **arguments
-            )
-        return self._controllers[stance]
-
-    def _tasks(self, stance: Sequence[str]) -> list[Task]:
-        """Return the tasks of a stance, with targets that follow the reference."""
-        (com, com_weight), (base, base_weight) = self.gains.com, self.gains.base
-        (swing, swing_weight), (posture, posture_weight) = self.gains.swing, self.gains.posture
-        tasks: list[Task] = [
-            CoMTask(lambda t: self._ref.com_target(t), kp=com, weight=com_weight),
-            OrientationTask(
-                "base", lambda t: self._ref.base_target(t), kp=base, weight=base_weight
-            ),
-            PostureTask(self._standing_state.q, kp=posture, weight=posture_weight),
-        ]
-        for foot in [name for name in self._all_contacts.names if name not in stance]:
-            position, rotation = (
-                partial(target, foot) for target in (self._foot_target, self._foot_rotation_target)
-            )
-            tasks.append(FrameTask(foot, position, kp=swing, weight=swing_weight))
-            if foot in self._planner.flat_feet:
-                tasks.append(OrientationTask(foot, rotation, kp=swing, weight=swing_weight))
-        return tasks
-
-    def _foot_target(self, foot: str, t: float) -> Motion:
-        """Return the target position of a foot at t [s]."""
-        return self._ref.foot_target(foot, t)
-
-    def _foot_rotation_target(self, foot: str, t: float) -> Motion:
-        """Return the target rotation of a flat foot at t [s]."""
-        return self._ref.foot_rotation_target(foot, t)
-
-    def _normal_force_bounds(
-        self, stance: Sequence[str]
-    ) -> dict[str, Callable[[float], float]] | None:
-        """Return ramps for the normal force of each point if all feet stand, otherwise None."""
-        if self.ramp == 0.0 or len(stance) < len(self._all_contacts) or len(stance) < 2:
-            return None
-        return {foot: partial(self._normal_force_bound, foot) for foot in self._all_contacts.names}
-
-    def _normal_force_bound(self, foot: str, t: float) -> float:
-        """Return the upper bound of the normal force of each point of a foot at t [s], in N."""
-        full_load = (
-            _RAMP_LOAD_FACTOR
-            * self.robot.weight
-            / len(self._all_contacts)
-            / len(self._single_contacts[foot].point_names)
-        )
-        minimum = float(self._limits.normal_forces(self._single_contacts[foot], t)[0].max())
-        return max(minimum, self._ref.normal_force_bound(foot, t, self.ramp, full_load))
+    def _change_after(self, t: float, plan: StepPlan) -> float:
+        """Return until when a plan that is in use at t needs no change [s]."""
+        return min(self._clock.stance_end(t), plan.replan_time) - TIME_TOLERANCE
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
-        return {
-            key: value
-            for key, value in vars(self).items()
-            if key not in ("_controllers", "_reference", "_history")
-        }
+        return {key: value for key, value in vars(self).items() if key not in _MADE_ANEW}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -528,8 +593,20 @@ class Walk:
         )
 
 
+def _as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
+    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
+    vector = numeric_copy(values)
+    if vector is None or vector.shape != (size,):
+        return as_array(name, values, (size,))
+    return vector
+
+
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
+
+    Where the body turns, the velocity is that of the foot's nominal position. The foothold also
+    lies farther outside by a / ω², with the centripetal acceleration a: the centre of mass of a
+    pendulum runs on a smaller circle than its zero-moment point.
 
     Parameters
     ----------
@@ -549,9 +626,11 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     -----
     The rule is from [Raibert1986]_.
     """
-    gait = walk.gait
-    return neutral_point(
-        walk.nominal_foothold(foot, touchdown),
-        walk.velocity_at(touchdown),
-        gait.period - gait.swing,
-    )
+    gait, path, velocity = walk.gait, walk.path_at(touchdown), walk.velocity_at(touchdown)
+    nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
+    arm = nominal - path.position
+    turning = yaw_rate * np.array([-arm[1], arm[0]])
+    centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
+    point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
+    foothold: Array = point - centripetal / walk.omega**2
+    return foothold

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal, TypeAlias, cast, get_args
 
+import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import (
@@ -31,7 +32,13 @@ from floatbase.control.soft import (
     contact_weight_of,
     with_soft_contacts,
 )
-from floatbase.control.tick import CompiledTick, TickInputs, cache_warning, unsupported_reason
+from floatbase.control.tick import (
+    CompiledTick,
+    TargetLayout,
+    TickInputs,
+    cache_warning,
+    unsupported_reason,
+)
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
@@ -96,7 +103,8 @@ class WholeBodyController:
         again with soft joint limits, user-defined inequalities and bounds of normal forces (weight
         1e4), and sets `Command.softened`. `Command.violations` lists the violations. If there is
         still no solution, the contacts become soft as well (contact_weight=1e4). The equations
-        of motion, friction and torque limits always hold.
+        of motion, friction and torque limits always hold. The compiled backend softens at once,
+        without confirmation by the reference backend.
     modify_qp : callable, optional
         Function (qp, eom) -> QP that changes the problem before it is solved. It is called at every
         control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
@@ -204,6 +212,13 @@ class WholeBodyController:
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
         self._prepare(problem, solver, backend, on_infeasible)
+        self._prepare_softer_controllers()
+
+    def _prepare_softer_controllers(self) -> None:
+        """Make the controllers for infeasible states now, since that takes milliseconds."""
+        softer = self._settings[2] == "soften" and self._softer_controller
+        if softer:
+            softer._prepare_softer_controllers()
 
     def _prepare(
         self,
@@ -298,6 +313,47 @@ class WholeBodyController:
         """Friction, normal force and torque limits, and user-defined inequalities."""
         return self._problem.limits
 
+    @cached_property
+    def _layout(self) -> TargetLayout:
+        """Positions of the targets in the array of all targets."""
+        return TargetLayout(self._problem) if self._compiled is None else self._compiled.layout
+
+    @property
+    def targets(self) -> Mapping[str, slice]:
+        """Entries of each task in an array of all targets, by the task's name.
+
+        Only tasks of this package that the compiled backend supports have entries: `CoMTask`,
+        `OrientationTask`, `FrameTask`, `PostureTask`, `ForceTask` and `TorqueTask`. The entries are
+        the target and its derivatives, for example position, velocity and acceleration. Rotation
+        matrices are stored row by row. If several tasks have the same name, the entries are those
+        of the first one.
+        """
+        return self._layout.names
+
+    def targets_at(self, t: float = 0.0) -> Array:
+        """Return the array of all targets at a given time.
+
+        The array can be changed and passed to a call, which replaces the targets of the tasks:
+
+        >>> robot = fb.load("go2")
+        >>> state, contacts = robot.standing(), fb.Contacts.points(robot)
+        >>> controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
+        >>> targets = controller.targets_at()
+        >>> targets[controller.targets["centre of mass"]][:3] += [0.0, 0.0, 0.02]
+        >>> command = controller(state.q, state.v, targets=targets)
+
+        Parameters
+        ----------
+        t : float, optional
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Targets in the order of `targets`, a new array.
+        """
+        return self._layout.at(as_number("t", t, "s"))
+
     def qp(self, state: State, t: float = 0.0) -> QP:
         """Return the QP of one control step, for inspection.
 
@@ -315,7 +371,13 @@ class WholeBodyController:
         """
         return self._problem.qp(state, t)
 
-    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+    def __call__(
+        self,
+        q: npt.ArrayLike,
+        v: npt.ArrayLike,
+        t: float = 0.0,
+        targets: npt.ArrayLike | None = None,
+    ) -> Command:
         """Compute the command of one control step.
 
         Parameters
@@ -327,6 +389,10 @@ class WholeBodyController:
             frame, then the joints [rad/s or m/s].
         t : float, optional
             Time, for tasks and bounds that depend on it [s].
+        targets : array_like, shape (n,), optional
+            Targets of the tasks, as `targets_at` returns them. They replace those of the tasks, and
+            functions of t are not called. Rotation matrices must be exact to 1e-9, otherwise the
+            slower reference backend corrects or refuses them.
 
         Returns
         -------
@@ -338,17 +404,72 @@ class WholeBodyController:
         InfeasibleError
             If the QP has no solution, unless `on_infeasible` is "soften".
         """
+        softens = self._settings[2] == "soften"
+        if softens or self._compiled is not None:
+            command = self.attempt(q, v, t, targets)
+            if command is not None:
+                return command
+        last, softer = self, softens and self._softer_controller
+        while softer:
+            last, softer = softer, softer._softer_controller
+        return last._reference_command(q, v, *self._checked_inputs(v, t, targets))
+
+    def attempt(
+        self,
+        q: npt.ArrayLike,
+        v: npt.ArrayLike,
+        t: float = 0.0,
+        targets: npt.ArrayLike | None = None,
+    ) -> Command | None:
+        """Compute the command of one control step, or return None if the QP has no solution.
+
+        Unlike a call, this method does not search for the conflicting constraints, which takes up
+        to 0.3 s. It is therefore suitable for real-time loops. A call with the same arguments gives
+        the reasons as an `InfeasibleError`.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Generalized velocity: the base's linear [m/s] and angular [rad/s] part in the base
+            frame, then the joints [rad/s or m/s].
+        t : float, optional
+            Time, for tasks and bounds that depend on it [s].
+        targets : array_like, shape (n,), optional
+            Targets of the tasks, as for a call.
+
+        Returns
+        -------
+        Command or None
+            Torques, with the forces and accelerations planned with them. With
+            `on_infeasible="soften"`, the command may be softened.
+
+        Notes
+        -----
+        The compiled backend decides in microseconds. States in which its last digits are lost, and
+        problems without a compiled form, need the reference backend.
+        """
+        t, target_array = self._checked_inputs(v, t, targets)
+        command = self._attempt(q, v, t, target_array)
+        softer = command is None and self._settings[2] == "soften" and self._softer_controller
+        return softer.attempt(q, v, t, target_array) if softer else command
+
+    def _checked_inputs(
+        self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
+    ) -> tuple[float, Array | None]:
+        """Return the time and the targets of a call, checked."""
         if type(t) is not float or not -MAX_MAGNITUDE <= t <= MAX_MAGNITUDE:
             t = as_number("t", t, "s")
         if v is None:  # State takes None for rest; here it is a mistake
             as_array("v", v, (self.robot.nv,))
-        try:
-            return self._answer(q, v, t)
-        except InfeasibleError:
-            softer = self._settings[2] == "soften" and self._softer_controller
-            if not softer:
-                raise
-        return softer(q, v, t)
+        if targets is None:
+            return t, None
+        # the compiled tick checks that numbers are finite
+        is_float64 = type(targets) is np.ndarray and targets.dtype.char == "d"
+        array = cast(Array, targets) if is_float64 else as_array("targets", targets, (None,))
+        self._layout.check_size(array)
+        return t, array
 
     @cached_property
     def _softer_controller(self) -> WholeBodyController | None:
@@ -368,30 +489,22 @@ class WholeBodyController:
         other._softened = True
         return other
 
-    def _answer(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command:
-        """Return the compiled backend's command, or the reference backend's if there is none."""
-        command = (
-            None if self._compiled is None else self._compiled_command(self._compiled, q, v, t)
-        )
-        if command is not None:
-            return command
-        solution = self._problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
-        tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
-        return Command(tau, qdd, forces, self.contacts, "reference", solution, self._softened)
-
-    def _compiled_command(
-        self, tick: CompiledTick, q: npt.ArrayLike, v: npt.ArrayLike, t: float
+    def _attempt(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
     ) -> Command | None:
-        """Return the compiled tick's answer, or None if the reference backend must decide."""
-        q_array, v_array = numeric_copy(q), numeric_copy(v)
-        if q_array is None or v_array is None:
-            return None
-        answer = tick(q_array, v_array, t)
+        """Return the command of this controller alone, or None if there is no solution."""
+        tick, q_array, v_array = self._compiled, numeric_copy(q), numeric_copy(v)
+        if tick is None or q_array is None or v_array is None:
+            return self._reference_attempt(q, v, t, targets)
+        answer = tick(q_array, v_array, t, targets)
         if answer is None:
+            return self._reference_attempt(q, v, t, targets)
+        result, n_active, inputs = answer
+        if n_active == tick.infeasible:
             return None
-        result = answer[0]
         result.setflags(write=False)
-        solution = partial(self._solution_of, q_array, v_array, t, *answer)
+        inputs.packed.setflags(write=False)
+        solution = partial(self._solution_of, q_array, v_array, t, result, n_active, inputs)
         return Command(
             result[tick.tau],
             result[tick.qdd],
@@ -400,7 +513,34 @@ class WholeBodyController:
             "compiled",
             solution,
             self._softened,
+            inputs.packed[: tick.layout.size],
+            tick.layout.names,
         )
+
+    def _reference_attempt(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
+    ) -> Command | None:
+        """Return the reference backend's command, or None if there is no solution."""
+        try:
+            return self._reference_command(q, v, t, targets)
+        except InfeasibleError:
+            return None
+
+    def _reference_command(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
+    ) -> Command:
+        """Return the reference backend's command."""
+        problem, values = self._problem, targets
+        if targets is not None:
+            problem = self._layout.fixed_problem(targets)
+        solution = problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
+        if values is None:
+            values = self._layout.at(t) if self._layout.varies else self._layout.constant
+        tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
+        return Command(
+            tau, qdd, forces, self.contacts, "reference", solution, self._softened,
+            read_only(values), self._layout.names,
+        )  # fmt: skip
 
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs

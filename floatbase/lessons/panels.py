@@ -13,7 +13,16 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from floatbase.errors import FloatbaseError
+from floatbase._validation import (
+    as_array,
+    as_bool,
+    as_instance,
+    as_positive,
+    as_string,
+    short_repr,
+    signature_error,
+)
+from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, recorded_pushes
 from floatbase.simulation import Controller, LiveSimulation, Rollout, Simulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
@@ -150,25 +159,51 @@ def slider_panel(
     -------
     SliderPanel
         The panel; a notebook displays it as the value of a cell.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type, or if a range is not one of these.
     """
+    if view is not None:
+        as_instance("view", view, Viewer)
+    if error := signature_error(draw, **ranges) if callable(draw) else f"it is {short_repr(draw)}":
+        raise InputError(f"draw must be a function of the values of the sliders, but {error}.")
+    on_release, beside = as_bool("on_release", on_release), as_bool("beside", beside)
+    samples = {} if samples is None else samples
+    as_instance("samples", samples, Mapping)  # type: ignore[type-abstract]
+    for name, values in samples.items():
+        as_array(f"samples of {short_repr(name)}", values, (None,))
     sliders = {name: _range_slider(name, bounds, on_release) for name, bounds in ranges.items()}
     longest = max((len(slider.description) for slider in sliders.values()), default=0)
     for slider in sliders.values():
         slider.style.description_width = (
             f"max(min(12em, 36%), {min(_LETTER_WIDTH * longest, _MAX_NAME_WIDTH):.2f}em)"
         )
-    return SliderPanel(view, draw, sliders, beside, samples or {})
+    return SliderPanel(view, draw, sliders, beside, samples)
 
 
 def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlider:
-    whole = isinstance(bounds, range)
-    low, first, high, *unit = (bounds[0], bounds[0], bounds[-1]) if whole else bounds
-    text = " ".join([name.replace("_", " "), *(f"[{part}]" for part in unit if part)])
-    made = _slider(
-        text, low, first, high, bounds.step if whole else _round_step(low, first, high), on_release
-    )
+    low, first, high, unit, step = _checked_range(name, bounds)
+    text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
+    made = _slider(text, low, first, high, step, on_release)
     made.layout.width = "80%"
     return made
+
+
+def _checked_range(name: str, bounds: Any) -> tuple[float, float, float, str, float]:
+    """Return lowest, first and highest value, unit and step of a slider's range."""
+    if isinstance(bounds, range) and bounds and bounds.step > 0:
+        return bounds[0], bounds[0], bounds[-1], "", bounds.step
+    if isinstance(bounds, tuple | list) and len(bounds) in (3, 4):
+        low, first, high = as_array(f"the range {name}", bounds[:3], (3,)).tolist()
+        if low <= first <= high:
+            unit = as_string(f"the unit of {name}", bounds[3]) if len(bounds) == 4 else ""
+            return low, first, high, unit, _round_step(low, first, high)
+    raise InputError(
+        f'{name} must be (lowest, first, highest), such as (0, 10, 60), or (0, 10, 60, "N"), or '
+        f"range(5), not {short_repr(bounds)}."
+    )
 
 
 def _slider(
@@ -241,7 +276,13 @@ def live_run(
     -------
     LiveSimulation
         The simulation, paused.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type, or if an option does not exist.
     """
+    as_instance("view", view, Viewer)
 
     def show(record: Rollout) -> None:
         view.show(
@@ -252,7 +293,10 @@ def live_run(
             qdd=planned_qdd_at(record, -1),
         )
 
-    return LiveSimulation(sim, controller, show, push_memory=PUSH_DISPLAY_TIME, **options)
+    options = {"push_memory": PUSH_DISPLAY_TIME} | options
+    if error := signature_error(LiveSimulation, sim, controller, show, **options):
+        raise InputError(f"The options must be those of LiveSimulation, but {error}.")
+    return LiveSimulation(sim, controller, show, **options)
 
 
 def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> widgets.VBox:
@@ -280,7 +324,15 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     -------
     VBox
         The panel; a notebook displays it as the value of a cell.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type or is out of range.
     """
+    as_instance("run", run, LiveSimulation)
+    as_instance("view", view, Viewer)
+    max_force = as_positive("max_force", max_force, "N")
     force = _slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
     towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)
     speed = _slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05, on_release=False)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.simulation import PushRecovery, Simulation, push_recovery
@@ -158,7 +159,7 @@ def measure_push_recovery(lesson: str) -> PushRecovery:
     )
     kept = {**_stored_pushes(), lesson: recovery.pushes.tolist()}
     lines = [f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in sorted(kept)]
-    _FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    write_whole(_FILE, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
     return recovery
 
 

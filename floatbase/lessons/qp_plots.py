@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 
 from floatbase._validation import Array, as_array, as_instance, as_strings
 from floatbase.errors import InputError, unknown_name
-from floatbase.qp import QP
+from floatbase.qp import QP, solve
 from floatbase.viewer.scene.colours import GREYS
 
 Box = tuple[float, float, float, float]
@@ -82,6 +82,63 @@ def plot(
         )
     axis.set(xlim=box[:2], ylim=box[2:], aspect="equal")
     return axis
+
+
+def plot_optimum(qp: QP, box: Box = (-3.0, 3.0, -2.0, 3.0), axis: Axes | None = None) -> Axes:
+    """Plot a QP of two variables, its optimum, and how the active constraints balance the gradient.
+
+    The dark arrow at the optimum is the negative gradient of the objective. The light arrows,
+    drawn head to tail, are the normals of the active constraints times their multipliers. Their
+    sum is the dark arrow. All arrows have the same scale.
+
+    Parameters
+    ----------
+    qp : QP
+        QP of two variables without equality constraints.
+    box : tuple of float, optional
+        Visible range: minimum and maximum of the first variable, then of the second.
+    axis : Axes, optional
+        Axes to plot on; by default a new figure.
+
+    Returns
+    -------
+    Axes
+        The axes.
+
+    Raises
+    ------
+    InfeasibleError
+        If no point satisfies all constraints.
+    InputError
+        If the QP does not have two variables, or has equality constraints.
+
+    Notes
+    -----
+    [FBR]_, App. C.
+    """
+    feasible_polygon(qp, box)  # checks the QP
+    solution = solve(qp)
+    prices = {str(name): price for name, price in solution.multipliers.items()}
+    axis = plot(qp, box, list(prices), solution.x, axis)
+    slope = -(qp.H @ solution.x + qp.g)
+    scale = 0.3 * min(box[1] - box[0], box[3] - box[2]) / (float(np.linalg.norm(slope)) or 1.0)
+    start = solution.x
+    for i, name in enumerate(map(str, qp.inequality_names)):
+        if name in prices:
+            tip = start + scale * prices[name] * qp.G[i]
+            _plot_arrow(axis, start, tip, GREYS[1], width=5.0)
+            start = tip
+    _plot_arrow(axis, solution.x, solution.x + scale * slope, GREYS[0], width=2.0)
+    return axis
+
+
+def _plot_arrow(axis: Axes, start: Array, tip: Array, colour: str, width: float) -> None:
+    axis.annotate(
+        "", tip, xytext=start, zorder=6,
+        arrowprops={
+            "arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0,
+        },
+    )  # fmt: skip
 
 
 def feasible_polygon(qp: QP, box: Box) -> Array:

@@ -10,10 +10,20 @@ from typing import Any, ClassVar
 import numpy as np
 
 import floatbase as fb
-from floatbase._validation import Array
+from floatbase._validation import (
+    Array,
+    Value,
+    as_bool,
+    as_callable,
+    as_instance,
+    as_string,
+    as_strings,
+    checked,
+)
+from floatbase.errors import unknown_name
 from floatbase.friction import FrictionPolyhedron
 from floatbase.playground.session import Session
-from floatbase.playground.settings import Settings
+from floatbase.playground.settings import PAIR_NAMES, SETTING_NAMES, Settings
 
 _MIN_LOAD = 5.0  # N: a foot with a larger normal force counts as loaded
 _LIFTED_HEIGHT = 0.02  # m above the ground: a higher foot counts as lifted
@@ -40,10 +50,15 @@ class Judge:
     ----------
     challenge : Challenge
         Challenge to judge.
+
+    Raises
+    ------
+    InputError
+        If the challenge has the wrong type.
     """
 
     def __init__(self, challenge: Challenge):
-        self.challenge = challenge
+        self.challenge = as_instance("challenge", challenge, Challenge)
         self.won = False
         self.message = self.violation = ""
         self.pushes: list[fb.Push] = []
@@ -64,6 +79,8 @@ class Judge:
         session : Session
             Session that ran it.
         """
+        as_instance("record", record, fb.Rollout)
+        as_instance("session", session, Session)
         self.pushes += [
             push for push in record.pushes if all(push is not seen for seen in self.pushes)
         ]
@@ -79,6 +96,8 @@ class Judge:
         session : Session
             Session that ran it.
         """
+        as_string("status", status)
+        as_instance("session", session, Session)
         if self.challenge.end is not None:
             self._apply_verdict(self.challenge.end(self, status, session), session)
 
@@ -100,10 +119,24 @@ class Judge:
 
 
 Watch = Callable[[Judge, fb.Rollout, Session], bool | str]
+End = Callable[[Judge, str, Session], bool | str]
+
+
+def _as_settings(name: str, value: Any, known: tuple[str, ...]) -> tuple[str, ...]:
+    """Return `value` as a tuple after checking that it contains known names of settings."""
+    for setting in (settings := as_strings(name, value)):
+        if setting not in known:
+            raise unknown_name(f"setting in {name}", setting, known)
+    return settings
+
+
+def _as_end(name: str, value: Any) -> End | None:
+    """Return `value` after checking that it is None or can judge the end of a run."""
+    return None if value is None else as_callable(name, value, "end(judge, status, session)")
 
 
 @dataclass(frozen=True)
-class Challenge:
+class Challenge(Value):
     """A challenge of the playground.
 
     Parameters
@@ -126,17 +159,24 @@ class Challenge:
         that can be solved in this way. It returns the same as `watch`.
     paused : bool
         Whether the challenge starts paused, so that the user must press run.
+
+    Raises
+    ------
+    InputError
+        If a value has the wrong type.
+    UnknownNameError
+        If a locked setting does not exist, or is not a pair in `locked_actual`.
     """
 
     robot: ClassVar[str] = "go2"
-    title: str
-    text: str
-    watch: Watch
-    start: Settings = field(default_factory=Settings)
-    locked: tuple[str, ...] = ()
-    locked_actual: tuple[str, ...] = ()
-    end: Callable[[Judge, str, Session], bool | str] | None = None
-    paused: bool = False
+    title: str = field(metadata=checked(as_string))
+    text: str = field(metadata=checked(as_string))
+    watch: Watch = field(metadata=checked(as_callable, "watch(judge, record, session)"))
+    start: Settings = field(default_factory=Settings, metadata=checked(as_instance, Settings))
+    locked: tuple[str, ...] = field(default=(), metadata=checked(_as_settings, SETTING_NAMES))
+    locked_actual: tuple[str, ...] = field(default=(), metadata=checked(_as_settings, PAIR_NAMES))
+    end: End | None = field(default=None, metadata=checked(_as_end))
+    paused: bool = field(default=False, metadata=checked(as_bool))
 
     def judge(self) -> Judge:
         """Make a new judge."""
@@ -155,6 +195,7 @@ class Challenge:
         list of str
             Names of the settings, for a message.
         """
+        as_instance("settings", settings, Settings)
         locked = [
             name for name in self.locked if getattr(settings, name) != getattr(self.start, name)
         ]

@@ -116,7 +116,8 @@ class ModelMismatch(Value):
         QP
             The QP with the assumed model.
         """
-        if self.is_exact:
+        as_instance("eom", eom, EquationsOfMotion)
+        if as_instance("qp", qp, QP) and self.is_exact:
             return qp
         assumed, A, b = self.assumed_equations(eom), np.array(qp.A), np.array(qp.b)
         A[: eom.nv] = np.hstack([assumed.M, -assumed.S, -assumed.J.T])

@@ -17,6 +17,7 @@ from floatbase._validation import (
     Value,
     as_array,
     as_bool,
+    as_callable,
     as_instance,
     as_positive,
     as_strings,
@@ -256,6 +257,11 @@ class BaseMotors:
         Simulation whose base wrench is set.
     mismatch : ModelMismatch, optional
         Mismatch of the controller. By default, its model is exact.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type, or if the controller has no `contacts`.
     """
 
     def __init__(
@@ -264,8 +270,14 @@ class BaseMotors:
         sim: PerturbedSimulation,
         mismatch: ModelMismatch | None = None,
     ):
-        self.controller, self.sim = controller, sim
-        self.mismatch = ModelMismatch() if mismatch is None else mismatch
+        self.controller: Controller = as_callable("controller", controller, "controller(q, v, t)")
+        as_instance("contacts of the controller", getattr(controller, "contacts", None), Contacts)
+        self.sim = as_instance("sim", sim, PerturbedSimulation)
+        self.mismatch = (
+            ModelMismatch()
+            if mismatch is None
+            else as_instance("mismatch", mismatch, ModelMismatch)
+        )
 
     @property
     def contacts(self) -> Contacts:

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from floatbase._validation import as_number
+from floatbase._validation import as_callable, as_number, as_positive
 
 
 class RealTimeFactor:
@@ -21,7 +21,8 @@ class RealTimeFactor:
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, over: float = 2.0):
-        self._clock, self._over = clock, over
+        self._clock = as_callable("clock", clock, "clock()")
+        self._over = as_positive("over", over, "s")
         self._seen: deque[tuple[float, float]] = deque()  # clock and simulated time, s
 
     def update(self, simulated: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from floatbase._validation import (
@@ -20,7 +21,7 @@ from floatbase.errors import unknown_name
 from floatbase.friction._polytopes import MAX_FACETS
 from floatbase.playground.equation import EQUATION
 
-GAITS = {  # by number of feet
+GAITS: dict[int, dict[str, Callable[..., Gait]]] = {  # by number of feet
     4: {"trot": Gait.trot, "crawl": Gait.crawl},
     2: {"walk": Gait.walk},
 }
@@ -163,6 +164,7 @@ class Settings(Value):
 
 
 SETTING_NAMES = tuple(field.name for field in fields(Settings))
+PAIR_NAMES = ("friction", "slope", "mass", "bandwidth")  # settings that are (nominal, actual)
 
 
 def six_digits(x: float) -> float:

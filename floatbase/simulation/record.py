@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -75,6 +77,10 @@ class Rollout(Value):
     planned_qdd : ndarray, shape (n, nv), or None
         Accelerations that the controller planned, as in `Command.qdd` [m/s² or rad/s²]; rows
         without a plan have NaN.
+    targets : mapping of str to ndarray, shape (n, m)
+        The controller's targets, as in `Command.targets`: for each task, its target and the
+        derivatives of it. Rows in which the controller had no such task have NaN, as does the end
+        of rows with fewer contact forces.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -94,6 +100,7 @@ class Rollout(Value):
     stances: tuple[Contacts, ...] = ()
     controller_off_time: float | None = None
     planned_qdd: Array | None = None
+    targets: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -283,6 +290,8 @@ class Recorder:
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
         self._rows_with_plan: list[int] = []  # the rows that have planned forces
+        # row, values and entries of each task of the controllers' targets
+        self._targets: list[tuple[int, Array, Mapping[str, slice]]] = []
 
     def enable_link_collisions(self) -> None:
         """Switch link collisions on, and discard the timesteps of an unfinished control step."""
@@ -321,6 +330,7 @@ class Recorder:
         stance: Contacts,
         planned: Array | None,
         planned_qdd: Array | None = None,
+        targets: tuple[Array, Mapping[str, slice]] | None = None,
     ) -> None:
         """Complete a row.
 
@@ -334,8 +344,12 @@ class Recorder:
             Forces that the controller planned at the contacts, in the world frame [N].
         planned_qdd : ndarray, shape (nv,), or None
             Accelerations that the controller planned [m/s² or rad/s²].
+        targets : (ndarray, mapping of str to slice), optional
+            The controller's targets, as `Command.target_values` and `Command.target_entries`.
         """
         n = self._n
+        if targets is not None:
+            self._targets.append((n, *targets))
         if planned_qdd is not None:
             self._planned_qdd[n] = planned_qdd
         self._tau_desired[n] = tau_desired
@@ -411,7 +425,28 @@ class Recorder:
             else tuple(self._stances),
             controller_off_time=controller_off_time,
             planned_qdd=self._complete_rows(self._planned_qdd),
+            targets=MappingProxyType(self._targets_by_name()),
         )
+
+    def _targets_by_name(self) -> dict[str, Array]:
+        """Return the targets of each task, shape (n, m), with NaN in rows without that task."""
+        rows_of: dict[int, list[int]] = {}
+        for i, (_, _, entries) in enumerate(self._targets):
+            rows_of.setdefault(id(entries), []).append(i)
+        targets: dict[str, Array] = {}
+        for indices in rows_of.values():
+            rows = [self._targets[i][0] for i in indices]
+            values = np.array([self._targets[i][1] for i in indices])
+            for name, part in self._targets[indices[0]][2].items():
+                width = part.stop - part.start
+                if name not in targets or targets[name].shape[1] < width:
+                    grown = np.full((self._n, width), np.nan)
+                    grown[:, : targets[name].shape[1] if name in targets else 0] = targets.get(
+                        name, grown[:, :0]
+                    )
+                    targets[name] = grown
+                targets[name][rows, :width] = values[:, part]
+        return {name: frozen(array) for name, array in targets.items()}
 
     def _complete_rows(self, rows: Array) -> Array:
         """Return the completed rows, without a copy."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -187,7 +187,8 @@ def rollout(
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
             accelerations = _planned_accelerations(sim, command)
-            record.complete_tick(desired, stance, planned, accelerations)
+            targets = _targets(command)
+            record.complete_tick(desired, stance, planned, accelerations, targets)
             if sim.diverged:
                 return record.to_rollout(pushes, "diverged")
             if sim.fallen:
@@ -365,6 +366,15 @@ def _planned_forces(command: Any, stance: Contacts) -> Array | None:
             f"attribute contacts."
         )
     return planned
+
+
+def _targets(command: Any) -> tuple[Array, Mapping[str, slice]] | None:
+    """Return a command's targets and the entries of each task, or None if it has none."""
+    values = getattr(command, "target_values", None)
+    entries = getattr(command, "target_entries", None)
+    return (
+        (values, entries) if type(values) is np.ndarray and isinstance(entries, Mapping) else None
+    )
 
 
 def _planned_accelerations(sim: Simulation, command: Any) -> Array | None:

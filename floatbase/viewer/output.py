@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,8 +71,7 @@ class Output:
             if target.suffix.lower() in film.FRAME_RATES:
                 film.capture(self.static_html(title), target, size)
             else:
-                # a link stays, and the file that it names is replaced
-                write_whole(Path(os.path.realpath(target)), self.static_html(title).encode())
+                write_whole(target, self.static_html(title).encode(), keep_link=True)
         except OSError as error:
             raise ViewerError(
                 f"Cannot write {target} ({error.strerror}). Choose an existing folder in which you "

@@ -359,6 +359,8 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         """
+        _check_texts(title=title, ghost_name=ghost_name)
+        picture = shapes.with_normal_paths(picture)
         if self._is_playing:
             follow = self._camera.follow_command(self.painter, ROBOT)
             self.window.put([follow, *protocol.end_animation()])
@@ -499,6 +501,7 @@ class Viewer(Controls, Output):
         Viewer
             This viewer.
         """
+        _check_texts(title=title, ghost_name=ghost_name)
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
         self.renderer.set(

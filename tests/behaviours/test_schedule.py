@@ -94,8 +94,31 @@ def test_gaits_refuse_what_does_not_fit() -> None:
     refused(lambda: Gait({"a": 0.0}, 0.5, 0.5), InputError, "swing", "period", 0.5)
     refused(lambda: Gait({"a": 1.0}, 0.5, 0.2), InputError, "a", 1)
     refused(lambda: Gait.trot(talos), InputError, "talos", 2, "Gait.walk")
-    refused(lambda: Gait.walk(go2), InputError, "go2", 4, "Gait.trot", "Gait.crawl")
+    refused(lambda: Gait.walk(judges.load("ur5")), InputError, "ur5", 0)
     refused(lambda: Gait.trot(go2).swing_at("FL", 0.0), UnknownNameError, "FL", "FL_foot")
+
+
+@pytest.mark.parametrize(
+    ("name", "together"),
+    [
+        ("trot", {("FL", "RR"), ("FR", "RL")}),
+        ("pace", {("FL", "RL"), ("FR", "RR")}),
+        ("bound", {("FL", "FR"), ("RL", "RR")}),
+        ("pronk", {("FL", "FR", "RL", "RR")}),
+        ("walk", {("FL",), ("FR",), ("RL",), ("RR",)}),
+        ("crawl", {("FL",), ("FR",), ("RL",), ("RR",)}),
+    ],
+)
+def test_gaits_lift_the_feet_that_their_names_say(
+    name: str, together: set[tuple[str, ...]]
+) -> None:
+    go2 = judges.load("go2")
+    gait = getattr(Gait, name)(go2)
+    groups = set()
+    for offset in gait.offsets.values():
+        standing = gait.stance(gait.start + (offset + 1.0) * gait.period + gait.swing / 2.0)
+        groups.add(tuple(sorted(foot[:2] for foot in set(gait.feet) - set(standing))))
+    assert groups == together
 
 
 def test_a_swing_leads_from_rest_to_rest_over_its_height() -> None:

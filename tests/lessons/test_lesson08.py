@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 import judges
 import numpy as np
 import pytest
-from waiting import until
 
 import floatbase as fb
-from floatbase.behaviours import Gait, Stand, Walk, support_margin
+from floatbase.behaviours import support_margin
 from floatbase.errors import InputError
 from floatbase.lessons.lesson08 import (
-    PushComparison,
-    foothold_marks,
     largest_tilt,
     make_controller,
     mean_velocity,
-    plot_foot_loads,
     plot_pendulum_fall,
     plot_support_triangles,
     run_crawl,
     run_go2,
+    show_foothold,
+    show_shifted_loads,
     smallest_support_margin,
     state_with_moved_body,
-    torque_jump,
     uneven_stance,
 )
 from floatbase.viewer.scene.colours import GREYS, hex_code
@@ -54,24 +50,15 @@ def test_in_the_uneven_stance_one_foot_stands_further_back() -> None:
     assert np.allclose(away, np.outer([0, 0, 0, 1], [-0.06, 0, 0]), atol=LENGTHS)
 
 
-def test_a_record_tells_its_speed_tilt_margin_and_jumps() -> None:
-    robot = judges.load("go2")
+def test_a_record_tells_its_speed_tilt_and_margin() -> None:
     stands = run_go2(judges.controller_of("go2"), 0.3)
     assert np.allclose(mean_velocity(stands, 0.2), 0.0, atol=1e-3) and largest_tilt(stands) < 0.1
     margin = support_margin(stands.com[-1, :2], stands.foot_positions[-1, :, :2])
     assert np.isclose(smallest_support_margin(stands), margin, atol=1e-3)
-    crawls = run_crawl(0.3, 0.25, 0.12)
-    assert np.isclose(mean_velocity(crawls, 2.2)[0], 0.12, atol=0.01)  # of one period
+    crawls = run_crawl(0.25, 0.22, 0.14)
+    assert np.isclose(mean_velocity(crawls, 1.88)[0], 0.14, atol=0.01)  # of one period
     assert 1e3 * (crawls.com[-1, 0] - crawls.com[0, 0]) > 600.0
     assert 1e3 * smallest_support_margin(crawls) > 32.0 and crawls.measured[:, 2::3].max() < 80.0
-    steep = Walk(
-        robot,
-        fb.Contacts.points(robot),
-        Gait.crawl(robot, 0.3, 0.25, start=0.5),
-        (0.12, 0.0),
-        ramp=0.0,
-    )
-    assert torque_jump(run_go2(steep, 2.0)) > 2 * torque_jump(crawls)
 
 
 def test_a_push_of_a_run_acts_when_it_is_asked_to() -> None:
@@ -91,43 +78,18 @@ def test_plots_have_greys_and_the_colours_of_forces_alone() -> None:
     drawn = plot_support_triangles(state, contacts, "FL_foot", "RR_foot").data
     assert drawn.count("<polygon") == 4 and "without RR_foot" in drawn
     assert set(re.findall(r"#[0-9A-F]{6}", drawn)) <= {hex_code(grey) for grey in GREYS}
-    record = run_go2(Stand(robot, contacts), 0.2)
-    assert len(plot_foot_loads({"a": record, "b": record}, "FR_foot", 0.0, 0.2).axes) == 2
     falls = plot_pendulum_fall([0.0, 0.1], [0.01, 0.02], 5.0).axes[0].lines
     assert np.allclose(falls[1].get_ydata(), [10.0, 10.0 * np.cosh(0.5)])
 
 
-def test_footholds_lie_on_the_ground_and_others_have_a_label() -> None:
-    view = fb.Viewer(judges.load("go2"))
+def test_panels_tell_loads_and_distances() -> None:
+    robot = judges.load("go2")
+    view = fb.Viewer(robot)
     try:
-        marks = foothold_marks(view, {"FL_foot": [0.1, 0.2], "here": [0.0, 0.0]})
-        two = foothold_marks(view, {"FL_foot": [0.1, 0.2], "RR_foot": [-0.2, -0.2]})
+        loads = show_shifted_loads(view, robot.standing(), "FL_foot", 0.0, 0.0)
+        far = show_foothold(view, robot.standing(), 0.3, 0.25, 0.061)
     finally:
         view.close()
-    assert set(two) == {"place/FL_foot", "place/RR_foot", "line"}
-    assert np.allclose(two["line"].matrix[:2, 2], [-0.3, -0.4])
-    assert set(marks) == {"place/FL_foot", "place/here", "label/here"}
-    assert np.allclose(marks["place/FL_foot"].matrix[:2, 3], [0.1, 0.2])
-
-
-@pytest.fixture
-def together() -> Iterator[PushComparison]:
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot)
-    made = PushComparison(
-        {"stands": Stand(robot, contacts), "steps": Stand(robot, contacts, Gait.trot(robot))}
-    )
-    yield made
-    made.close()
-
-
-def test_both_are_pushed_alike_and_one_falls(together: PushComparison) -> None:
-    assert [run.status for run in together.runs.values()] == ["paused", "paused"]
-    together.force.value = 300.0
-    together.push_button.click()
-    until(lambda: together.runs["stands"].status == "fell")
-    assert together.runs["steps"].status == "running"
-    until(lambda: "fell" in together.lines["stands"].value)
-    together.reset_button.click()
-    until(lambda: together.runs["stands"].status == "running")
-    until(lambda: together.lines["stands"].value == "")
+    numbers = [float(text) for text in re.findall(r"(-?[\d.]+) (?:N|mm)", loads)]
+    assert np.isclose(sum(numbers[:3]), robot.weight, atol=1.5) and numbers[2:] == [-8.0, -12.5]
+    assert [float(text) for text in re.findall(r"(-?[\d.]+) mm", far)] == [61.0, 54.0, 38.0]

@@ -68,7 +68,7 @@ def view() -> Iterator[fb.Viewer]:
 
 
 def test_09_4_takes_no_lean_that_lets_arms_and_trunk_go(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = all_exercises()["09.4"].judge
+    judge = all_exercises()["09.3"].judge
     assert judge([1.5, 0.0]).hint in ("falls", "in_the_air", "tips")
     record = run_lean(1.5, 0.01)
     jump = replace(record, measured=0.0 * record.measured)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from messages import raises, refused
 
-from floatbase.errors import InputError, UnknownNameError
+from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.lessons import qp_plots
 from floatbase.lessons.lessonC import table_top
-from floatbase.qp import QP
+from floatbase.qp import QP, solve
 
 BOX = (-3.0, 3.0, -2.0, 3.0)
 NONE = np.zeros((0, 2)), np.zeros(0)
@@ -73,6 +73,25 @@ def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick(
     assert dot.get_xydata().tolist() == [[0.5, -0.5]]
     assert [text.get_text() for text in axis.texts] == ["slant", "table"]
     assert axis.get_xlim() + axis.get_ylim() == BOX
+    plt.close("all")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_normals_times_their_multipliers_end_where_the_negative_gradient_ends(
+    seed: int,
+) -> None:
+    qp = random_qp(seed)
+    try:
+        x = solve(qp).x
+    except InfeasibleError:
+        pytest.skip("no feasible point")
+    axis: Any = qp_plots.plot_optimum(qp, BOX)
+    *normals, gradient = [text for text in axis.texts if text.arrow_patch is not None]
+    ends = [np.array([arrow.xyann, arrow.xy]) for arrow in normals]
+    tip = ends[-1][1] if ends else x
+    assert np.allclose(gradient.xyann, x) and np.allclose(gradient.xy, tip, atol=1e-6)
+    for (start, _), (_, end) in zip(ends[1:], ends, strict=False):
+        assert np.allclose(start, end)
     plt.close("all")
 
 

@@ -133,3 +133,20 @@ def test_a_gif_keeps_colours_that_appear_after_its_first_picture(tmp_path: Path)
                 red, green, blue = np.moveaxis(np.array(gif.convert("RGB"), dtype=int), 2, 0)
                 orange.append(np.sum((red > green + SOME) & (green > blue + 2 * SOME)))
     assert orange[0] == 0 and orange[1] > 10
+
+
+@needs_chromium
+def test_names_that_javascript_objects_have_are_drawn(tmp_path: Path) -> None:
+    robot = fb.load("ur5")
+    with closing(fb.Viewer(robot)) as view:
+        picture = view.painter.picture(robot.standing())
+        view.show(robot.standing())  # places the camera
+        images = []
+        for name in ("any", "constructor", "__proto__"):
+            view.draw({f"{name}/{path}": item for path, item in picture.items()})
+            images.append(
+                np.array(Image.open(view.save(tmp_path / f"{len(images)}.png", size=SIZE)))
+            )
+    assert np.ptp(images[0], axis=(0, 1)).min() > 100  # a robot is in it
+    for image in images[1:]:
+        assert share_of_others(images[0], image) < 0.01

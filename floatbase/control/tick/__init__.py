@@ -6,6 +6,14 @@ from floatbase.control.tick.compiled import (
     cache_warning,
     unsupported_reason,
 )
+from floatbase.control.tick.targets import TargetLayout
 from floatbase.control.tick.user_terms import TickInputs
 
-__all__ = ["CompiledTick", "TickInputs", "announce_if_slow", "cache_warning", "unsupported_reason"]
+__all__ = [
+    "CompiledTick",
+    "TargetLayout",
+    "TickInputs",
+    "announce_if_slow",
+    "cache_warning",
+    "unsupported_reason",
+]

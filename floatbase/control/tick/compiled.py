@@ -8,18 +8,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import lru_cache
-from math import prod
 from threading import Event, Thread
-from typing import Any, cast
 
 import numpy as np
 
 from floatbase._validation import Array
 from floatbase.control.limits import hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, residual_of
-from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem, task_kind
+from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem
+from floatbase.control.tick.targets import TargetLayout, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
@@ -145,6 +143,10 @@ class CompiledTick:
     ----------
     qdd, tau, forces : slice
         Slices of q̈, τ and λ in the array of a result.
+    layout : TargetLayout
+        Positions of the targets in the array of all targets.
+    infeasible : int
+        Code of a tick that has no solution.
     unchecked_tasks : list of Task
         Tasks that the problem arrays do not check: user-defined and time-varying ones.
     arguments : tuple
@@ -164,24 +166,25 @@ class CompiledTick:
     """
 
     def __init__(self, problem: Problem):
-        from floatbase.control.tick import tick
+        from floatbase.control.tick import dual_search, tick
 
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
         self._problem, self.dynamics = problem, dynamics_of(robot)
-        *tables, targets, self._time_varying_tasks = pack_problem(problem)
+        self.layout, self.infeasible = TargetLayout(problem), dual_search.INFEASIBLE
+        tables = pack_problem(problem, self.layout)
         self.user_terms = UserTerms(problem)
-        time_varying = {each.task_index for each in self._time_varying_tasks}
+        time_varying = {each.task_index for each in self.layout.tasks if each.task.is_time_varying}
         self.unchecked_tasks = [
             task
             for i, task in enumerate(problem.tasks)
             if i in time_varying or task_kind(task) is None
         ]
-        self.default_inputs, self.n_targets = self.user_terms.zero_inputs(targets), targets.size
+        self.default_inputs = self.user_terms.zero_inputs(self.layout.constant)
         self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
         self._workspace_sizes, self._tables, self._tick = tick.workspace_sizes, tables, tick.tick
         self._n_stages = tick.N_STAGES
-        self._varies = bool(self._time_varying_tasks) or self.user_terms.varies
+        self._varies = self.layout.varies or self.user_terms.varies
         self._n_user_rows = -1
         limits = problem.limits
         inequalities = limits.all_inequalities(problem.contacts)
@@ -206,7 +209,9 @@ class CompiledTick:
             self._n_user_rows = n_user_rows
             self.arguments = *self.dynamics.views, *self._tables, *self.workspace
 
-    def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, int, TickInputs] | None:
+    def __call__(
+        self, q: Array, v: Array, t: float, targets: Array | None = None
+    ) -> tuple[Array, int, TickInputs] | None:
         """Run one tick, or return None if the reference backend must decide.
 
         Parameters
@@ -218,23 +223,28 @@ class CompiledTick:
             array.
         t : float
             Time [s].
+        targets : ndarray, shape (n,), optional
+            All targets, in the order of `layout`; by default those of the tasks.
 
         Returns
         -------
         tuple or None
-            The array of numbers that `tick.tick` fills, the number of active inequalities, and the
-            inputs of the tick.
+            The array of numbers that `tick.tick` fills, the number of active inequalities or the
+            code `infeasible`, and the inputs of the tick.
         """
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
-        inputs = self.inputs_at(q, v, t) if self._varies else self.default_inputs
+        inputs: TickInputs | None = self.default_inputs
+        if self._varies or targets is not None:
+            inputs = self.inputs_at(q, v, t, targets)
         if inputs is None:
             return None
         dynamics, result = self.dynamics, self.empty_result(inputs)
         with dynamics.lock:
             dynamics.update(q, v)
             n_active = self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
-        return (result, n_active, inputs) if n_active >= 0 else None
+        decided = n_active >= 0 or n_active == self.infeasible
+        return (result, n_active, inputs) if decided else None
 
     def warm_up(self) -> str:
         """Run one tick outside the loop, which compiles the code or loads it from disk.
@@ -318,26 +328,14 @@ class CompiledTick:
         QP
             The QP.
         """
-        values: dict[int, dict[str, Any]] = {}
-        for index, moving, first in self._time_varying_tasks:
-            values[index] = {}
-            shapes = moving.shapes_for(self._problem.robot, self._problem.contacts.k)
-            for name, shape in shapes.items():
-                values[index][name] = inputs.packed[first : first + prod(shape)].reshape(shape)
-                first += prod(shape)
         eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
-        for i, task in enumerate(self._problem.tasks):
-            fixed = replace(cast(Any, task), **values[i]) if i in values else task
-            costs.append(
-                (
-                    task.block,
-                    *(
-                        inputs.residuals[i]
-                        if i in inputs.residuals
-                        else (task.weight, residual_of(fixed, eom, t))
-                    ),
-                )
+        for i, task in enumerate(self.layout.fixed_tasks(inputs.packed[: self.layout.size])):
+            weight_and_residual = (
+                inputs.residuals[i]
+                if i in inputs.residuals
+                else (task.weight, residual_of(task, eom, t))
             )
+            costs.append((task.block, *weight_and_residual))
         return assemble_qp(
             eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities
         )
@@ -393,7 +391,9 @@ class CompiledTick:
         multipliers: Array = all_rows[has_row]
         return multipliers
 
-    def inputs_at(self, q: Array, v: Array, t: float) -> TickInputs | None:
+    def inputs_at(
+        self, q: Array, v: Array, t: float, targets: Array | None = None
+    ) -> TickInputs | None:
         """Return the inputs of a tick, in new arrays since other threads may run ticks too.
 
         Parameters
@@ -404,6 +404,8 @@ class CompiledTick:
             Generalized velocity, base part in the base frame [m/s, rad/s].
         t : float
             Time [s].
+        targets : ndarray, shape (n,), optional
+            All targets, in the order of `layout`; by default those of the tasks.
 
         Returns
         -------
@@ -412,11 +414,8 @@ class CompiledTick:
             the error.
         """
         try:
-            targets = (
-                self._targets_at(t)
-                if self._time_varying_tasks
-                else self.default_inputs.packed[: self.n_targets]
-            )
+            if targets is None:
+                targets = self.layout.at(t) if self.layout.varies else self.layout.constant
             inputs = self.user_terms.inputs(targets, q, v, t)
         except Exception:  # user code may raise anything
             return None
@@ -424,13 +423,3 @@ class CompiledTick:
             with self.dynamics.lock:
                 self._make_workspace(inputs.n_user_rows)
         return inputs
-
-    def _targets_at(self, t: float) -> Array:
-        """Return all targets at time t; raise `InputError` for an invalid one."""
-        targets, robot = self.default_inputs.packed[: self.n_targets].copy(), self._problem.robot
-        k = self._problem.contacts.k
-        for _, task, first in self._time_varying_tasks:
-            for value in task.targets_at(robot, k, t):
-                targets[first : first + value.size] = value.ravel()
-                first += value.size
-        return targets

@@ -15,19 +15,12 @@ from floatbase.control.tick.kinematics import (
     frame_pose,
     point_velocity,
 )
-from floatbase.control.tick.problem_arrays import (
-    COM,
-    FORCE,
-    FORCES,
-    FRAME,
-    ORIENTATION,
-    POSTURE,
-    QDD,
-    TAU,
-    TORQUE,
-)
+from floatbase.control.tick.problem_arrays import FORCES, QDD, TAU
+from floatbase.control.tick.targets import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
 from floatbase.control.tick.workspace import clear, take_matrix, take_vector
+
+_MAX_ROTATION_ERROR = 1e-9  # of entries of RᵀR: the reference backend corrects or refuses others
 
 
 class TaskTable(NamedTuple):
@@ -67,10 +60,19 @@ def rotation_error(R, target):
 
 
 @jit
+def is_rotation(x, y, z):
+    """Return whether three columns are a rotation matrix, to `_MAX_ROTATION_ERROR`."""
+    normal = minus(cross(x, y), z)
+    error = max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0), abs(dot(x, y)))
+    return max(error, abs(normal[0]), abs(normal[1]), abs(normal[2])) < _MAX_ROTATION_ERROR
+
+
+@jit
 def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
     """Return e, ė and J̇ v - desired acceleration of task i, and False if an angle is too large.
 
-    The task is on the CoM, an orientation or a frame. rows: (3, nv), receives the Jacobian.
+    The task is on the CoM, an orientation or a frame. A target that is no rotation matrix also
+    gives False. rows: (3, nv), receives the Jacobian.
     """
     clear(rows)
     kind, joint, first = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2]
@@ -95,6 +97,7 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
                 column_part(columns, 0, 2),
             )
             e, valid = rotation_error(R, (x, y, z))
+            valid = valid and is_rotation(x, y, z)
         else:
             body_jacobian(bodies, joint, True, p, rows, 0)
             e_dot, drift = point_velocity(bodies, joint, p)

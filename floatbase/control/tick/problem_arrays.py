@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 from threading import Lock
-from typing import Any, ClassVar, NamedTuple, TypeAlias, cast
+from typing import Any, ClassVar, TypeAlias, cast
 from weakref import WeakSet
 
 import numpy as np
@@ -20,17 +20,11 @@ from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
 from floatbase.control.problem import Problem
+from floatbase.control.tick.targets import TargetLayout
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
-from floatbase.objectives import Task
-from floatbase.objectives._task import TargetTask
 from floatbase.robots import Robot
 
-COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
-_TASK_KINDS = {
-    "com": COM, "orientation": ORIENTATION, "frame": FRAME, "posture": POSTURE, "force": FORCE,
-    "torque": TORQUE
-}  # fmt: skip
 POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 QDD, TAU, FORCES = range(len(BLOCKS))
@@ -106,31 +100,14 @@ if hasattr(os, "register_at_fork"):
 dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one per robot, shared by its controllers
 
 
-def task_kind(task: Task) -> int | None:
-    """Return the compiled form of a task, which its own class declares, or None.
+def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indices, Array]:
+    """Return a problem as the arrays of `tick.unpack`.
 
-    The residual of a task without a compiled form is called.
-    """
-    return _TASK_KINDS.get(vars(type(task)).get("compiled_as", ""))
-
-
-class TimeVaryingTask(NamedTuple):
-    """A task whose targets are a function of time."""
-
-    task_index: int  # in the problem's tasks
-    task: TargetTask
-    first: int  # where its targets start among all targets
-
-
-def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list[TimeVaryingTask]]:
-    """Return a problem as the arrays of `tick.unpack`, its targets and its time-varying tasks.
-
-    Time-varying targets are zero in these arrays. Raises `UnknownNameError` if a frame does not
-    exist, and `InputError` if a constant target has the wrong shape.
+    Raises `UnknownNameError` if a frame does not exist.
     """
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
-    tasks, gains, poses, targets, time_varying = _pack_tasks(problem)
+    tasks, gains, poses = _pack_tasks(problem, layout)
     dynamics, limits = dynamics_of(problem.robot), problem.limits
     problem_contacts = problem.contacts
     sizes = (
@@ -151,7 +128,7 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
     has_optional = n_inequalities > 0 or np.any(hard_maximum(problem_contacts, limits))
     counts = (
         problem_contacts.k,
-        targets.size,
+        layout.size,
         n_user_contact_numbers,
         len(problem.tasks) - len(tasks),
         n_inequalities,
@@ -169,8 +146,6 @@ def pack_problem(problem: Problem) -> tuple[Indices, Indices, Array, Array, list
         np.array((*sizes, *counts), np.int64),
         int_tables,
         np.concatenate([np.ravel(table) for table in float_tables]),
-        targets,
-        time_varying,
     )
 
 
@@ -245,35 +220,21 @@ def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
     return np.tile(cones, (len(contact.point_names), 1))
 
 
-def _pack_tasks(problem: Problem) -> tuple[Any, ...]:
-    """Return tasks (N, 3), gains (N, 3) and frames (N, 12), targets, and the time-varying tasks.
+def _pack_tasks(problem: Problem, layout: TargetLayout) -> tuple[Any, ...]:
+    """Return tasks (N, 3), gains (N, 3) and frames (N, 12): the tables of `costs.TaskTable`.
 
-    The tables are those of `costs.TaskTable`. Only the built-in tasks are included, so the
-    positions of user-defined tasks in the list do not matter.
+    Only the built-in tasks are included, so the positions of user-defined tasks in the list do not
+    matter.
     """
-    known = [
-        (i, kind, cast(TargetTask, task))
-        for i, task in enumerate(problem.tasks)
-        if (kind := task_kind(task)) is not None
-    ]
-    n, robot, k = len(known), problem.robot, problem.contacts.k
+    n = len(layout.tasks)
     table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE_SIZE))
-    targets: list[Array] = [np.zeros(0)]
-    first, time_varying = 0, []
-    for i, (index, kind, task) in enumerate(known):
+    for i, (_, kind, task, _, entries) in enumerate(layout.tasks):
         frame, joint = getattr(task, "frame", None), 0
         if frame is not None:
-            joint, poses[i] = _frame_placement(robot, frame)
-        table[i] = kind, joint, first
+            joint, poses[i] = _frame_placement(problem.robot, frame)
+        table[i] = kind, joint, entries.start
         gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
-        values: list[Array] = [np.zeros(shape) for shape in task.shapes_for(robot, k).values()]
-        if task.is_time_varying:
-            time_varying.append(TimeVaryingTask(index, task, first))
-        else:
-            values = task.targets_at(robot, k, 0.0)
-        targets += [target.ravel() for target in values]
-        first += sum(target.size for target in values)
-    return table, gains, poses, np.concatenate(targets), time_varying
+    return table, gains, poses
 
 
 def _frame_placement(robot: Robot, name: str) -> tuple[int, Array]:

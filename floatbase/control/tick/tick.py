@@ -1,9 +1,9 @@
 """The compiled entry point `tick`: eqs. (26), (27) over plain arrays.
 
 `compiled.py` fills the arrays and calls `tick`; README.md explains its stages. A tick without an
-answer returns a code: INVALID (a value is not finite, a quaternion has the wrong length, or an
-orientation error is too large), INACCURATE (the last digits are lost), INFEASIBLE. The reference
-backend then decides.
+answer returns a code: INVALID (a value is not finite, a quaternion has the wrong length, an
+orientation error is too large, or the target of an orientation is no rotation matrix), INACCURATE
+(the last digits are lost), INFEASIBLE. After the first two, the reference backend decides.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ from floatbase._validation import Array, read_only
 from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem, residual_of
-from floatbase.control.tick.problem_arrays import CONTACT_KINDS, task_kind
+from floatbase.control.tick.problem_arrays import CONTACT_KINDS
+from floatbase.control.tick.targets import task_kind
 from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -97,11 +98,11 @@ class UserTerms:
         Raises `InputError`, or what user functions raise.
         """
         problem, limits = self._problem, self._limits
-        bounds = limits.hard_normal_forces(problem.contacts, t)
-        packed: list[npt.ArrayLike] = [
-            targets,
-            *(_finite(bounds) if limits.time_varying else self._finite_bounds),
-        ]
+        bounds, finite = self._constant_bounds, self._finite_bounds
+        if limits.time_varying:
+            bounds = limits.hard_normal_forces(problem.contacts, t)
+            finite = _finite(bounds)
+        packed: list[npt.ArrayLike] = [targets, *finite]
         if not self.any:
             return TickInputs(np.concatenate(packed), normal_forces=bounds)
         state = State._unchecked(problem.robot, q, v)  # the compiled tick checks q and v

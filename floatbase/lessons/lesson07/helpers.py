@@ -127,7 +127,7 @@ def median_time_ms(function: Callable[[], Any], repeats: int = 20) -> float:
 
 @cache
 def leaning_controller(mu: float) -> fb.WholeBodyController:
-    """Return the controller of exercise 07.3, which asks for more force than friction allows.
+    """Return the controller of exercise 07.2, which asks for more force than friction allows.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def leaning_controller(mu: float) -> fb.WholeBodyController:
 
 
 def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
-    """Return the controller of exercise 07.4.
+    """Return the controller of exercise 07.3.
 
     Parameters
     ----------

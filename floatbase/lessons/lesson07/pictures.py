@@ -1,16 +1,17 @@
-"""Lesson 07: iterations of a solver, displacements of the centre of mass, and multipliers."""
+"""Lesson 07: a QP in the plane, displacements of the centre of mass, and multipliers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from floatbase.lessons.qp_plots import plot_optimum
 from floatbase.lessons.rounding import rounded
-from floatbase.qp import Solution
+from floatbase.qp import QP, Solution
 from floatbase.simulation import Rollout
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
@@ -18,33 +19,23 @@ _STYLES = ("-", "--", ":")
 _MAX_LISTED = 4  # constraints that a note lists
 
 
-def plot_rounds(ms: npt.ArrayLike, rounds: Mapping[str, Sequence[int]]) -> Figure:
-    """Plot the iterations of the active-set method in each control step.
-
-    Parameters
-    ----------
-    ms : array_like, shape (n,)
-        Time of each control step since the push began [ms].
-    rounds : mapping of str to sequence of int
-        For each way to start the solver: its iterations, n numbers.
+def plot_one_foot() -> Axes:
+    """Plot a QP for the force of one foot whose optimum lies in the corner of two constraints.
 
     Returns
     -------
-    Figure
-        The figure.
+    Axes
+        The axes, with the horizontal and the normal force [N].
     """
-    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    for (name, numbers), colour, style in zip(rounds.items(), GREYS[:2], _STYLES, strict=False):
-        ax.plot(ms, numbers, style, color=hex_code(colour), label=name, linewidth=2)
-    ax.set(
-        xlabel="time since the push began [ms]",
-        ylabel="iterations per control step",
-        ylim=(0, None),
-    )
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure
+    goal = np.array([70.0, 85.0])  # N
+    G, h = np.array([[1.0, -0.5], [-1.0, -0.5], [0.0, 1.0]]), np.array([0.0, 0.0, 60.0])
+    names = ("facet, forwards", "facet, backwards", "largest normal force")
+    qp = QP(np.eye(2), -goal, np.zeros((0, 2)), np.zeros(0), G, h, inequality_names=names)
+    ax = plot_optimum(qp, (-45.0, 90.0, -10.0, 95.0))
+    ax.plot(*goal, "+", color=GREYS[0], markersize=12, markeredgewidth=2)
+    ax.set(xlabel="horizontal force [N]", ylabel="normal force [N]")
+    plt.close(ax.figure)  # type: ignore[arg-type]
+    return ax
 
 
 def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:

@@ -11,6 +11,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons.judges import (
+    NEAR_MISS,
     Example,
     Verdict,
     array_judge,
@@ -18,7 +19,6 @@ from floatbase.lessons.judges import (
 )
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson07.helpers import (
-    MU,
     PUSH_DURATION,
     PUSH_START,
     leaning_controller,
@@ -29,125 +29,78 @@ from floatbase.lessons.rounding import rounded
 from floatbase.qp import ConstraintLabel
 from floatbase.simulation import Rollout
 
-INNER = MU * np.cos(np.pi / 4)  # μ' of a pyramid inside the cone
-HARD, AFTER = 150.0, 1.0  # of exercise 07.4: N, and s after the end of the push
-AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm: limits of exercise 07.4
-STEP = 0.005  # increase of μ in exercise 07.3
+HARD, AFTER = 150.0, 1.0  # of exercise 07.3: N, and s after the end of the push
+AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm: limits of exercise 07.3
+STEP = 0.005  # increase of μ in exercise 07.2
 
 
 # 07.1 ---------------------------------------------------------------------------------------------
 
+KNEE = 6 + 2  # column of the left front knee: after the base, hip and thigh
+ROOM, SPEED, PERIOD = 0.1, 20.0, 0.004  # rad to the upper limit, rad/s, s
+BOUND = 2 * (ROOM - PERIOD * SPEED) / PERIOD**2  # rad/s²
 
-def rows_on_three_feet() -> int:
-    """Count the inequality constraints in the QP of floatbase."""
-    state = standing_go2_eom().state
-    contacts = fb.Contacts.points(state.robot, mu=MU).without("FL_foot")
-    return len(
-        fb.WholeBodyController(
-            state.robot, contacts, fb.standing_tasks(state), facets=6, joint_limits=None
+
+@array_judge((43,))
+def judge_joint_limit(given: Array) -> Verdict:
+    """Judge a row and its bound by the accelerations that they allow, whatever their scale."""
+    row, bound = given[:-1], given[-1]
+    used = np.flatnonzero(row)
+    if not len(used):
+        return Verdict(False, "There is no answer yet. A zero row does not limit anything.", "zero")
+    if used.tolist() != [KNEE]:
+        return Verdict(
+            False,
+            f"This row depends on column {', '.join(map(str, used))} of x. Only the acceleration "
+            f"of the left front knee matters. The order is base, then hip, thigh and calf of FL.",
+            "columns",
         )
-        .qp(state)
-        .G
+    if row[KNEE] < 0:
+        return Verdict(
+            False, "The sign is wrong: this is a lower bound of the acceleration.", "sign"
+        )
+    limit = bound / row[KNEE]
+    mistakes = {
+        "no_velocity": (2 * ROOM / PERIOD**2, "Without q̈ the knee still moves by Δt v."),
+        "velocity_sign": (
+            2 * (ROOM + PERIOD * SPEED) / PERIOD**2,
+            "The knee moves towards the limit, so its velocity leaves less room, not more.",
+        ),
+        "no_half": (BOUND / 2, "The factor ½ of ½ Δt² q̈ is missing."),
+    }
+    if abs(limit - BOUND) <= NEAR_MISS * BOUND:
+        return Verdict(
+            True, f"The knee may accelerate by at most {rounded(limit)} rad/s² in this step."
+        )
+    for name, (wrong, text) in mistakes.items():
+        if abs(limit - wrong) <= NEAR_MISS * wrong:
+            return Verdict(False, text, name)
+    return Verdict(
+        False,
+        "This row allows other accelerations. Solve the formula at its limit for q̈.",
+        "other_limit",
     )
+
+
+def joint_limit_examples() -> list[Example]:
+    """Return examples for exercise 07.1."""
+
+    def row(limit: float, column: int = KNEE, scale: float = PERIOD**2 / 2) -> Array:
+        given = np.zeros(43)
+        given[column], given[-1] = scale, scale * limit
+        return given
+
+    return [
+        (row(BOUND), ""), (row(BOUND, scale=1.0), ""),
+        (np.zeros(43), "zero"),
+        (row(BOUND, column=2), "columns"), (row(BOUND, column=20), "columns"),
+        (row(BOUND, scale=-1.0), "sign"), (row(2 * ROOM / PERIOD**2), "no_velocity"),
+        (row(2 * (ROOM + PERIOD * SPEED) / PERIOD**2), "velocity_sign"),
+        (row(BOUND / 2), "no_half"), (row(0.0), "other_limit"),
+    ]  # fmt: skip
 
 
 # 07.2 ---------------------------------------------------------------------------------------------
-
-
-@array_judge((4, 42))
-def judge_rows(G: Array) -> Verdict:
-    """Judge the matrix G by G x ≤ 0 on vectors x, whatever the order and length of its rows."""
-    if not np.any(G):
-        return Verdict(False, "There is no answer yet. Zero rows do not forbid anything.", "zero")
-    felt = [i for i in range(42) if np.any(G[:, i])]
-    if not set(felt) <= {36, 37, 38}:
-        return Verdict(
-            False,
-            f"These rows depend on {_places(felt)}. RL is the third foot of λ. Which columns of x "
-            f"belong to it?",
-            "columns",
-        )
-    if not np.all(np.any(G, axis=1)):
-        return Verdict(
-            False, "One of the four rows is zero, but a pyramid has four sides.", "zero_row"
-        )
-    own = G[:, 36:39]
-    if _agrees(own, INNER):
-        return Verdict(
-            True,
-            "Four rows of 42 numbers, with three non-zero columns. That is all a solver knows "
-            "about a friction cone.",
-        )
-    if _agrees(-own, INNER):
-        return Verdict(
-            False,
-            "The sign is wrong: these rows are G x ≥ 0. A vertical upward force must satisfy G "
-            "x ≤ 0.",
-            "sign",
-        )
-    if _agrees(own, MU):
-        around = (
-            "This pyramid is outside the cone: at its edges it allows more than μ. Inside, μ' "
-            "is μ cos 45°."
-        )
-        return Verdict(False, around, "around")
-    if _agrees(own, MU * np.cos(45)):
-        return Verdict(False, "np.cos takes radians, and 45° is π/4.", "radians")
-    if _agrees(own, 1 / INNER):
-        turned = (
-            "This is the pyramid for μ = 1/0.7. Which of the two forces is limited by the other "
-            "one?"
-        )
-        return Verdict(False, turned, "inverse_mu")
-    if np.any(own @ [0.0, 0.0, 1.0] > 0):
-        return Verdict(
-            False,
-            "These rows forbid a vertical upward force. Check the signs of the last column.",
-            "up_forbidden",
-        )
-    if np.all(own @ [0.2, 0.0, 1.0] <= 0) and np.all(own @ [2.0, 0.0, 1.0] <= 0):
-        return Verdict(False, "These rows allow any forward tangential force.", "leans_freely")
-    return Verdict(
-        False,
-        "These rows do not allow the same forces as the pyramid with its sides towards ±x and ±y.",
-        "other_forces",
-    )
-
-
-def _places(columns: list[int]) -> str:
-    parts = {
-        "q̈": (0, 18),
-        "τ": (18, 30),
-        "FL": (30, 33),
-        "FR": (33, 36),
-        "RL": (36, 39),
-        "RR": (39, 42),
-    }
-    return ", ".join(
-        name for name, (low, high) in parts.items() if any(low <= i < high for i in columns)
-    )
-
-
-@cache
-def _tried() -> Array:
-    """Return unit forces all over the sphere, shape (n, 3)."""
-    made = np.random.default_rng(7).standard_normal((4000, 3))
-    return made / np.linalg.norm(made, axis=1)[:, None]
-
-
-def _agrees(rows: Array, slope: float) -> bool:
-    """Return whether constraints allow exactly the forces with `|f_x|, |f_y| ≤ slope f_z`.
-
-    Forces close to the border do not count: rounding a number to two digits may move it.
-    """
-    forces = _tried()
-    room = slope * forces[:, 2] - np.abs(forces[:, :2]).max(axis=1)
-    allowed = np.max(rows @ forces.T, axis=0) <= 0
-    # rounding a number to two digits may move the border by 5e-3
-    return bool(np.all((allowed == (room > 0)) | (np.abs(room) < 5e-3)))
-
-
-# 07.3 ---------------------------------------------------------------------------------------------
 
 
 def change_of_psi() -> float:
@@ -202,7 +155,7 @@ def change_mistakes() -> dict[str, Callable[[], Any]]:
     }
 
 
-# 07.4 ---------------------------------------------------------------------------------------------
+# 07.3 ---------------------------------------------------------------------------------------------
 
 
 @cache
@@ -229,8 +182,8 @@ def judge_design(given: Array) -> Verdict:
     strayed = 1e3 * record.slip().max()
     end = rounded(round(away[-1], 1), "mm", floor=0.5)
     text = (
-        f"x_c moves by {rounded(away.max(), 'mm')} at most, {end} at the end; a foot moves by "
-        f"{rounded(strayed, 'mm')}"
+        f"x_c moves by {away.max():.1f} mm at most, {end} at the end; a foot moves by "
+        f"{strayed:.1f} mm"
     )
     if away.max() > AWAY and away[-1] > BACK:
         return Verdict(
@@ -272,34 +225,8 @@ def judge_design(given: Array) -> Verdict:
     )
 
 
-def _sides(slope: float = INNER, first: int = 36) -> Array:
-    """Return the four sides of a pyramid on three columns of x."""
-    G = np.zeros((4, 42))
-    G[:, first : first + 3] = [[1, 0, -slope], [0, 1, -slope], [-1, 0, -slope], [0, -1, -slope]]
-    return G
-
-
-def pyramid_examples() -> list[Example]:
-    """Return examples for exercise 07.2."""
-    right = _sides()
-    leans_freely, up_forbidden = (
-        right[[2, 1, 2, 3]],
-        right * np.where(np.arange(42) == 38, [[-1], [1], [1], [1]], 1),
-    )
-    return [
-        (right, ""), (8.0 * right, ""), (right[[3, 1, 0, 2]], ""), (_sides(0.495), ""),
-        (_sides(0.5), ""),
-        (0.0 * right, "zero"), (_sides(first=39), "columns"), (_sides(first=18), "columns"),
-        (_sides(first=30), "columns"),
-        (right * [[1], [1], [0], [1]], "zero_row"), (-right, "sign"), (_sides(MU), "around"),
-        (_sides(MU * np.cos(45)), "radians"), (_sides(1 / INNER), "inverse_mu"),
-        (_sides(0.6), "other_forces"),
-        (leans_freely, "leans_freely"), (up_forbidden, "up_forbidden"),
-    ]  # fmt: skip
-
-
 def design_examples() -> list[Example]:
-    """Return examples for exercise 07.4."""
+    """Return examples for exercise 07.3."""
     return [
         ((400, 80, 10, 1e-3), ""), ((400, 70, 10, 1e-3), ""), ((500, 90, 30, 1e-3), ""),
         ((200, 40, 10, 1e-3), "too_far"), ((100, 20, 10, 1e-3), "too_far_and_strays"),

@@ -10,32 +10,30 @@ from floatbase.lessons.lesson08.helpers import (
     shortest_com_shift,
     smallest_support_margin,
     state_with_moved_body,
-    torque_jump,
     uneven_stance,
 )
 from floatbase.lessons.lesson08.pictures import (
     PushComparison,
-    foothold_marks,
-    plot_foot_loads,
     plot_pendulum_fall,
     plot_support_triangles,
+    show_foothold,
+    show_shifted_loads,
 )
 
 __all__ = [
     "EXERCISES",
     "PushComparison",
-    "foothold_marks",
     "largest_tilt",
     "make_controller",
     "mean_velocity",
-    "plot_foot_loads",
     "plot_pendulum_fall",
     "plot_support_triangles",
     "run_crawl",
     "run_go2",
     "shortest_com_shift",
+    "show_foothold",
+    "show_shifted_loads",
     "smallest_support_margin",
     "state_with_moved_body",
-    "torque_jump",
     "uneven_stance",
 ]  # fmt: skip

@@ -126,19 +126,6 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
     return mean
 
 
-def torque_jump(record: Rollout) -> float:
-    """Return the typical jump of a torque when a foot lifts off [N·m].
-
-    For each lift-off, the largest jump of all joints from one control step to the next counts. The
-    result is the median over all lift-offs.
-    """
-    counts = [len(record.contacts_at(i)) for i in range(len(record))]
-    lifts = [i for i in range(1, len(record)) if counts[i] < counts[i - 1]]
-    return float(
-        np.median([np.abs(record.tau_desired[i] - record.tau_desired[i - 1]).max() for i in lifts])
-    )
-
-
 def smallest_support_margin(record: Rollout) -> float:
     """Return the smallest margin of the centre of mass in a record [m].
 

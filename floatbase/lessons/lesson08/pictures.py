@@ -15,15 +15,17 @@ from IPython.display import HTML
 from matplotlib.figure import Figure
 
 import floatbase as fb
+from floatbase.behaviours import capture_point, neutral_point, support_margin
 from floatbase.lessons.lesson06 import region_picture
+from floatbase.lessons.lesson08.helpers import state_with_moved_body
 from floatbase.lessons.panels import live_run
 from floatbase.lessons.slider_samples import recorded_pushes
-from floatbase.simulation import LiveSimulation, Rollout
+from floatbase.simulation import LiveSimulation
 from floatbase.viewer import Picture, Viewer, shapes, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.scene import geometry
-from floatbase.viewer.scene.colours import GREYS, MEASURED, PLANNED, hex_code
+from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
@@ -97,37 +99,68 @@ def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -
     return figure
 
 
-def plot_foot_loads(records: Mapping[str, Rollout], foot: str, begin: float, end: float) -> Figure:
-    """Plot the planned and measured normal force of a foot for some records.
+def show_shifted_loads(
+    view: Viewer, state: fb.State, lifted: str, back: float, right: float
+) -> str:
+    """Move the body while all feet stay, and show the loads of three feet at rest.
 
     Parameters
     ----------
-    records : mapping of str to Rollout
-        The records by title.
-    foot : str
-        Name of the foot.
-    begin, end : float
-        Time range [s].
+    view : Viewer
+        Viewer of the picture.
+    state : State
+        State of the robot before the move.
+    lifted : str
+        Name of the foot without load.
+    back, right : float
+        Displacement of the body [mm].
 
     Returns
     -------
-    Figure
-        The figure.
+    str
+        The loads and the distance to the edge of the support triangle.
     """
-    figure, axes = plt.subplots(
-        1, len(records), figsize=(8.5, 3.0), sharey=True, layout="constrained"
-    )
-    for ax, (title, record) in zip(np.atleast_1d(axes), records.items(), strict=True):
-        rows = (record.time >= begin) & (record.time <= end)
-        for kind, colour, width in (("planned", PLANNED, 3.5), ("measured", MEASURED, 1.2)):
-            normal = record.force(foot, kind)[rows, 2]  # type: ignore[arg-type]
-            ax.plot(record.time[rows], normal, color=hex_code(colour), linewidth=width, label=kind)
-        ax.set(title=title, xlabel="time [s]")
-        ax.grid(alpha=0.3)
-    np.atleast_1d(axes)[0].set_ylabel(f"{foot}, normal force [N]")
-    np.atleast_1d(axes)[0].legend()
-    plt.close(figure)
-    return figure
+    moved = state_with_moved_body(state, [-back / 1000, -right / 1000, 0.0])
+    stand = fb.Contacts.points(state.robot).without(lifted)
+    feet = stand.positions(moved)[:, :2]
+    moments = np.vstack([np.ones(3), feet.T])
+    loads = np.linalg.solve(moments, state.robot.weight * np.array([1.0, *moved.com[:2]]))
+    view.show(moved, stand, planned=np.outer(loads, _VERTICAL), cones=False, support=True)
+    told = ", ".join(f"{name[:2]} {n:.0f} N" for name, n in zip(stand.names, loads, strict=True))
+    return f"{told}; {1000 * support_margin(moved.com[:2], feet):.1f} mm inside"
+
+
+def show_foothold(view: Viewer, state: fb.State, speed: float, time: float, ahead: float) -> str:
+    """Mark where two feet land for a given step, with the capture and the neutral point.
+
+    Parameters
+    ----------
+    view : Viewer
+        Viewer of the picture.
+    state : State
+        State of the robot.
+    speed : float
+        Forward velocity of the centre of mass [m/s].
+    time : float
+        Duration of the step [s].
+    ahead : float
+        Distance of the step from the centre of mass [m].
+
+    Returns
+    -------
+    str
+        The three distances.
+    """
+    contacts = fb.Contacts.points(state.robot)
+    feet = dict(zip(contacts.names, contacts.positions(state)[:, :2], strict=True))
+    c, middle = state.com[:2], np.mean(list(feet.values()), axis=0)
+    omega = math.sqrt(state.robot.gravity / state.com[2])
+    p, v = c + [ahead, 0.0], np.array([speed, 0.0])
+    under = {foot: p + feet[foot] - middle for foot in ("FL_foot", "RR_foot")}
+    known = {"ξ": capture_point(c, v, omega), "v T / 2": neutral_point(c, v, time)}
+    view.show(state, contacts, cones=False, extra=foothold_marks(view, under | known))
+    told = ", ".join(f"{name} {1000 * (point - c)[0]:.0f} mm" for name, point in known.items())
+    return f"step {1000 * ahead:.0f} mm, {told}"
 
 
 def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:

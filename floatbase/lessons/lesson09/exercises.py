@@ -9,13 +9,11 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.dynamics import FlatFootContact
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
     NumericJudge,
-    ShapeJudge,
     Verdict,
     array_judge,
     lasting_or_verdict,
@@ -30,15 +28,14 @@ from floatbase.lessons.lesson09.helpers import (
     load_talos,
 )
 from floatbase.lessons.rounding import rounded
-from floatbase.linear_algebra import rank
 from floatbase.simulation import Rollout
 
 ANKLE = 0.107  # m: height of the sensor of exercise 09.1 above the sole
 # N, of exercise 09.1
 CORNER_FORCES = ((30.0, 5.0, 210.0), (24.0, -6.0, 120.0), (14.0, 2.0, 60.0), (12.0, 9.0, 90.0))
-LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.3
+LENGTH, WIDTH, LOAD, SOLE_MU = 0.24, 0.10, 400.0, 0.6  # m, m, N and μ of the sole of exercise 09.2
 ROUND = 360  # facets that approximate a round cone with an error of 4e-5
-LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: requirements of exercise 09.4
+LEAN, QUICK, EDGE, NEAR = 6.0, 1.5, 15.0, 2.0  # cm, s, mm, mm: requirements of exercise 09.3
 _LOOSE = 1e-3  # weight of the posture in `standing_tasks`; below it, arms and trunk are loose
 
 
@@ -87,26 +84,6 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
 # 09.2 ---------------------------------------------------------------------------------------------
 
 
-@cache
-def _new_soles() -> fb.Contacts:
-    """Return two soles with six corners each."""
-    angles = np.pi / 3 * np.arange(6)
-    corners = np.column_stack([0.1 * np.cos(angles), 0.06 * np.sin(angles), np.zeros(6)])
-    return fb.Contacts(
-        [FlatFootContact(name, corners) for name in ("left_sole_link", "right_sole_link")]
-    )
-
-
-def _counted() -> Array:
-    """Count by rank: λ without any effect, internal forces, and the dimension of all motions."""
-    eom = fb.equations_of_motion(load_talos().standing(), _new_soles())
-    J = eom.J
-    return np.array([len(J) - rank(J), len(J) - rank(J[:, :6]), fb.feasible_space(eom).dimension])
-
-
-# 09.3 ---------------------------------------------------------------------------------------------
-
-
 def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
     """Compute the largest twist of the sole [N·m] by a linear program over its corner forces."""
     corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
@@ -115,12 +92,12 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
     return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
 
 
-# 09.4 ---------------------------------------------------------------------------------------------
+# 09.3 ---------------------------------------------------------------------------------------------
 
 
 @cache
 def run_lean(seconds: float, posture: float) -> Rollout:
-    """Simulate the lean of exercise 09.4 with a duration [s] and a weight of the posture."""
+    """Simulate the lean of exercise 09.3 with a duration [s] and a weight of the posture."""
     controller = leaning_controller(LEAN, seconds, posture)
     ticks = int(np.ceil((LEAN_START + seconds + TIME_AFTER_LEAN) / SLOW_PERIOD))
     return fb.rollout(
@@ -265,48 +242,6 @@ EXERCISES = (
     ),
     Exercise(
         name="09.2",
-        statement="Talos gets soles with six corners each. Find three numbers: the dimensions "
-        "of λ without any effect on motion or torques, the dimensions of λ without any effect "
-        "on the base, and the dimension of all motions, dim β.",
-        stub="counted = np.array([12, 18, 44])  # of the lesson; replace all three",
-        solution="k, r, d = 36, 12, 32\ncounted = np.array([k - r, k - 6, d + k - r])",
-        judge=ShapeJudge(
-            NumericJudge(
-                right=_counted,
-                praise="More corners do not increase what a sole can do. They only increase "
-                "what cannot be known.",
-                tolerance=1e-6,
-                is_count=True,
-                mistakes={
-                    "four_corners": lambda: np.array([12, 18, 44]),
-                    "one_sole": lambda: np.array([12, 12, 50]),
-                    "rank": lambda: np.array([12, 30, 44]),
-                    "rows_of_corners": lambda: np.array([0, 30, 32]),
-                    "swapped": lambda: np.array([30, 24, 56]),
-                    "beta": lambda: np.array([24, 30, 44]),
-                    "base_twelve": lambda: np.array([24, 24, 56]),
-                    "length_of_forces": lambda: np.array([36, 30, 56]),
-                },
-                hints={
-                    "four_corners": "That is for four corners per sole.",
-                    "one_sole": "That is for one sole. There are two.",
-                    "rank": "J has rank 12, whatever the number of corners of a rigid sole.",
-                    "rows_of_corners": "The rows of the corners are not independent: J has 36 "
-                    "rows and rank 12.",
-                    "swapped": "The first two numbers are swapped.",
-                    "beta": "The first two numbers are right. dim β = d + k - r, with k = 36.",
-                    "base_twelve": "The first and the last number are right. The wrench on the "
-                    "base has six dimensions, not twelve.",
-                    "length_of_forces": "36 is the length of λ. What remains after subtracting "
-                    "the six numbers of each sole?",
-                },
-            ),
-            {(): "The answer must be three numbers: np.array([…, …, …])."},
-        ),
-        explanation="k = 36 and r = 12: k - r = 24, k - rank J_b = 30, d + k - r = 56.",
-    ),
-    Exercise(
-        name="09.3",
         statement="The largest twist, N·m, that a sole of 24 cm × 10 cm withstands on a floor "
         "with μ = 0.6. It is pressed with 400 N in its middle, without a tangential force, and "
         "stands on four corners with round cones.",
@@ -352,7 +287,7 @@ EXERCISES = (
         "distance, however they share the load.",
     ),
     Exercise(
-        name="09.4",
+        name="09.3",
         statement="Two numbers for a lean of 6 cm forwards: its duration in seconds and the "
         "weight of the posture. The lean must end within 2 mm of its goal, keep the centre of "
         "pressure 15 mm away from every edge, and take at most 1.5 s.",

@@ -7,7 +7,6 @@ from floatbase.lessons.lessonC.helpers import (
     answer_or_default,
     beale_problem,
     braking_qp,
-    central_path,
     corner_table,
     hexagon_table,
     longest_step,
@@ -19,7 +18,6 @@ from floatbase.lessons.lessonC.helpers import (
 from floatbase.lessons.lessonC.pictures import (
     ActiveSetGame,
     plot_problem,
-    plot_rounds,
     show_solver_path,
     show_table,
 )
@@ -32,12 +30,10 @@ __all__ = [
     "answer_or_default",
     "beale_problem",
     "braking_qp",
-    "central_path",
     "corner_table",
     "hexagon_table",
     "longest_step",
     "plot_problem",
-    "plot_rounds",
     "rounds_from_guess",
     "row_to_drop",
     "run_with_push",

@@ -190,45 +190,6 @@ def braking_qp() -> fb.QP:
     return controller.qp(run_with_push(controller, 120.0, 0.101, 45.0).state(100))
 
 
-def central_path(qp: fb.QP, start: npt.ArrayLike, softness: npt.ArrayLike) -> list[Array]:
-    """Return points on the central path of a QP, as interior-point methods follow it.
-
-    Each point minimizes ψ - t Σ log(h - G x): every inequality constraint repels the marble with
-    softness t. A damped Newton method finds each point. Source: Boyd and Vandenberghe, Convex
-    Optimization, ch. 11.2.
-
-    Parameters
-    ----------
-    qp : QP
-        The problem.
-    start : array_like, shape (n,)
-        Strictly feasible starting point.
-    softness : array_like, shape (k,)
-        Values of t, from soft to hard. Each point starts from the one before.
-
-    Returns
-    -------
-    list of ndarray, shape (n,)
-        The points.
-
-    Notes
-    -----
-    [Boyd2004]_.
-    """
-    x, points = as_array("start", start, (qp.n,)), []
-    for t in as_array("softness", softness, (None,)):
-        for _ in range(60):
-            slack = qp.h - qp.G @ x
-            slope = qp.H @ x + qp.g + t * qp.G.T @ (1.0 / slack)
-            step = -np.linalg.solve(qp.H + t * (qp.G.T / slack**2) @ qp.G, slope)
-            length = min(1.0, 0.9 / max(float(np.max(qp.G @ step / slack)), 0.1))  # stays inside
-            x = x + length * step
-            if np.max(np.abs(step)) < 1e-12:
-                break
-        points.append(x)
-    return points
-
-
 def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
     """Return the answer to an exercise if it is right, or else a default; print which one it is.
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
 import ipywidgets as widgets
-import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -24,7 +23,7 @@ from floatbase.lessons.lessonC.helpers import corner_table, table_top
 from floatbase.lessons.rounding import rounded
 from floatbase.qp import QP
 from floatbase.viewer.export.display_mode import display_mode
-from floatbase.viewer.scene.colours import GREYS, hex_code
+from floatbase.viewer.scene.colours import GREYS
 
 _BESIDE = (-4.2, 3.4, -2.3, 3.2)  # visible range of the table and its walls
 _COLOURS = 48
@@ -244,41 +243,9 @@ def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds
     passed = [point for point, _ in ways[: whole + 1]]
     axis.plot(*np.transpose([*passed, x]), "o-", color=GREYS[0], markersize=4, linewidth=1.5)
     return (
-        _image(axis) + f"<div>on: {', '.join(names) or 'no constraint'}; objective "
+        _image(axis) + f"<div>W: {', '.join(names) or 'no constraint'}; objective "
         f"{rounded(qp.objective(x), digits=3)}</div>"
     )
-
-
-def plot_rounds(curves: Mapping[str, npt.ArrayLike], label: str) -> Figure:
-    """Plot numbers over the iterations.
-
-    Parameters
-    ----------
-    curves : mapping of str to array_like, shape (n,)
-        For each name: a number before the first iteration and one after each.
-    label : str
-        Label of the vertical axis.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
-    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    for (name, numbers), colour, style in zip(curves.items(), GREYS, _STYLES, strict=False):
-        ax.plot(
-            np.atleast_1d(numbers),
-            style,
-            color=hex_code(colour),
-            marker="o",
-            label=name,
-            linewidth=2,
-        )
-    ax.set(xlabel="iterations", ylabel=label)
-    ax.grid(alpha=0.3)
-    ax.legend()
-    plt.close(figure)
-    return figure
 
 
 def _hexagon_example() -> tuple[float, float, float, float]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.publish import (
     NOTEBOOKS,
@@ -130,9 +131,10 @@ def _run(lessons: Sequence[Path]) -> None:
 def _map() -> None:
     from floatbase.lessons.publish import conventions, equations
 
-    (NOTEBOOKS / "equations.md").write_text(equations.table(), encoding="utf-8")
-    (NOTEBOOKS / "conventions.md").write_text(conventions.page(), encoding="utf-8")
-    README.write_text(readme_with_table(README.read_text(encoding="utf-8")), encoding="utf-8")
+    readme = readme_with_table(README.read_text(encoding="utf-8"))
+    write_whole(NOTEBOOKS / "equations.md", equations.table().encode())
+    write_whole(NOTEBOOKS / "conventions.md", conventions.page().encode())
+    write_whole(README, readme.encode())
 
 
 def _roses(lessons: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ No code of a learner is run.
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import os
@@ -21,6 +22,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
@@ -281,10 +283,11 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
                 f"{path} was not written by an earlier grading, so it is not replaced. Give "
                 f"another file: --table CSV."
             )
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(_COLUMNS)
-            writer.writerows([_csv_safe(part) for part in row] for row in rows)
+        text = io.StringIO(newline="")
+        writer = csv.writer(text)
+        writer.writerow(_COLUMNS)
+        writer.writerows([_csv_safe(part) for part in row] for row in rows)
+        write_whole(path, text.getvalue().encode(), keep_link=True)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}.") from None
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from tqdm.auto import tqdm
 
+from floatbase._files import whole_file
 from floatbase._validation import as_array, short_repr
 from floatbase.errors import InputError, ViewerError
 from floatbase.viewer.scene.colours import LEGEND
@@ -110,24 +111,17 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     ViewerError
         If the browser or a package is missing, or if the recording is too long.
     """
-    unfinished = target.with_name(f"{target.stem}.part{target.suffix}")
-    unfinished.touch()  # raises `OSError` now instead of after the work
-    try:
-        with ThreadPoolExecutor(
-            1
-        ) as thread:  # playwright refuses a thread with an event loop, such as a notebook's
-            thread.submit(_capture, page, unfinished, size).result()
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    # the new file is created first, so that `OSError` is raised now instead of after the work;
+    # playwright refuses a thread with an event loop, such as a notebook's
+    with whole_file(target, keep_link=True) as part, ThreadPoolExecutor(1) as thread:
+        thread.submit(_capture, page, part, target.suffix.lower(), size).result()
 
 
-def _capture(page: str, target: Path, size: tuple[int, int]) -> None:
-    """Write the file, in a thread without an event loop."""
-    kind = target.suffix.lower()
+def _capture(page: str, target: Path, kind: str, size: tuple[int, int]) -> None:
+    """Write a file of a kind such as ".png", in a thread without an event loop."""
     pictures = _frames(page, size, FRAME_RATES[kind])
     if kind == ".png":
-        next(pictures).save(target)
+        next(pictures).save(target, "png")
         pictures.close()  # type: ignore[attr-defined]
     elif kind == ".gif":
         _write_gif(target, pictures)
@@ -194,9 +188,8 @@ def _write_gif(target: Path, pictures: Iterator[Image]) -> None:
     palette = samples.quantize(method=Quantize.FASTOCTREE, dither=none)
     first = first.quantize(palette=palette, dither=none)
     rest = (picture.quantize(palette=palette, dither=none) for picture in pictures)
-    first.save(
-        target, save_all=True, append_images=rest, duration=1000 // FRAME_RATES[".gif"], loop=0
-    )
+    duration = 1000 // FRAME_RATES[".gif"]
+    first.save(target, "gif", save_all=True, append_images=rest, duration=duration, loop=0)
 
 
 def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -> None:
@@ -207,7 +200,7 @@ def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -
         raise ViewerError(
             f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
-    with av.open(str(target), "w", options={"movflags": "faststart"}) as film:
+    with av.open(str(target), "w", format="mp4", options={"movflags": "faststart"}) as film:
         stream = film.add_stream(
             "libx264", rate=Fraction(FRAME_RATES[".mp4"]), options={"crf": "20"}
         )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from floatbase._geometry import rotation_z
 from floatbase._validation import Array, as_instance, as_number, short_repr
-from floatbase.behaviours import LIPM, StepPlan, Swing, Walk, capture_point
+from floatbase.behaviours import LIPM, StepPlan, Swing, SwingPath, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 from floatbase.viewer.scene import geometry, threejs
@@ -167,7 +167,7 @@ def _capture_point_and_zmp(plan: LIPM, t: float, state: State, style: Style) -> 
 
 def _footholds_and_swings(
     footholds: Mapping[str, Array],
-    swings: Mapping[str, Swing],
+    swings: Mapping[str, SwingPath],
     yaw_changes: Mapping[str, float],
     state: State,
     size: float,
@@ -224,7 +224,7 @@ def _offset_to_ground(foot: Foot, standing: State) -> Array:
     return offset
 
 
-def _swing_path(swing: Swing, offset: Array) -> Item:
+def _swing_path(swing: SwingPath, offset: Array) -> Item:
     """Draw the path of a swing, displaced by an offset, shape (3,) [m].
 
     One unit curve is stretched, so a path with a new target at each control step costs a matrix but

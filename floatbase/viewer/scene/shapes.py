@@ -8,14 +8,20 @@ opening of a cone.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, as_array, as_positive, read_only
+from floatbase._validation import (
+    Array,
+    as_array,
+    as_instance,
+    as_positive,
+    as_string,
+    read_only,
+)
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs, unit_shapes
@@ -55,11 +61,19 @@ class Item(NamedTuple):
 
 _IDENTITY = read_only(np.eye(3))
 
+# names that every JavaScript object has: the page would take its own function for an object of the
+# picture, so a link with such a name would not be drawn
+_JAVASCRIPT_NAMES = (
+    "__defineGetter__", "__defineSetter__", "__lookupGetter__", "__lookupSetter__", "__proto__",
+    "constructor", "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString",
+    "toString", "valueOf",
+)  # fmt: skip
+
 # path -> item. No path may lie below another one, because a matrix moves everything below its path.
 Picture = dict[str, Item]
 
 
-def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
+def with_normal_paths(picture: Picture) -> Picture:
     """Return the picture with normalized paths: "com/ball" instead of "/com//ball".
 
     Parameters
@@ -75,15 +89,20 @@ def with_normal_paths(picture: Mapping[str, Item]) -> Picture:
     Raises
     ------
     InputError
-        If a path has no name, because its matrix would move the whole picture.
+        If the picture is not a dictionary of items, or if a path has no name, because its matrix
+        would move the whole picture.
     """
-    return {_normal_path(path): item for path, item in picture.items()}
+    normal = {}
+    for path, item in as_instance("picture", picture, dict).items():
+        normal[_normal_path(path)] = as_instance("an item of the picture", item, Item)
+    return normal
 
 
 @lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def _normal_path(path: str) -> str:
-    """Return a path without empty parts; raise `InputError` if nothing remains."""
-    normal = "/".join(part for part in path.split("/") if part) if isinstance(path, str) else ""
+    """Return a path without empty parts and names of JavaScript; raise `InputError` if empty."""
+    parts = path.split("/") if isinstance(path, str) else []
+    normal = "/".join(f"{part}'" if part in _JAVASCRIPT_NAMES else part for part in parts if part)
     if not normal:
         raise InputError(
             f"The path {path!r} in a picture has no name. Give it one, as in "
@@ -92,7 +111,7 @@ def _normal_path(path: str) -> str:
     return normal
 
 
-def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
+def prefixed(path: str, items: Picture) -> Picture:
     """Put items below a path.
 
     Parameters
@@ -106,8 +125,14 @@ def prefixed(path: str, items: Mapping[str, Item]) -> Picture:
     -------
     Picture
         The same items with longer paths.
+
+    Raises
+    ------
+    InputError
+        If the path is not a string, or if `items` is not a dictionary.
     """
-    return {path + name: item for name, item in items.items()}
+    as_string("path", path)
+    return {path + name: item for name, item in as_instance("items", items, dict).items()}
 
 
 def path_part(name: str) -> str:

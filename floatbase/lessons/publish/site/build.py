@@ -12,6 +12,7 @@ from typing import Any
 import nbformat
 from nbformat.v4 import new_code_cell, new_notebook
 
+from floatbase._files import write_whole
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
 from floatbase.lessons.publish.contents import equation_ranges, title_of
@@ -109,7 +110,7 @@ def replace_site(built: Path, folder: Path) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     # listed before they are copied, so that an interrupted build can be repeated
-    listed.write_text("".join(f"{name}\n" for name in sorted(names)), encoding="utf-8")
+    write_whole(listed, "".join(f"{name}\n" for name in sorted(names)).encode())
     for name in sorted(earlier - names):
         (folder / name).unlink(missing_ok=True)
     shutil.copytree(built, folder, dirs_exist_ok=True)

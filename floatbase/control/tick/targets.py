@@ -1,0 +1,169 @@
+"""The targets of a problem's tasks as one array, which the compiled tick reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import prod
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from floatbase._validation import Array, as_array
+from floatbase.control.problem import Problem
+from floatbase.errors import InputError
+from floatbase.objectives import Task
+from floatbase.objectives._task import TargetTask
+
+COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
+_TASK_KINDS = {
+    "com": COM, "orientation": ORIENTATION, "frame": FRAME, "posture": POSTURE, "force": FORCE,
+    "torque": TORQUE
+}  # fmt: skip
+
+
+def task_kind(task: Task) -> int | None:
+    """Return the compiled form of a task, which its own class declares, or None.
+
+    The residual of a task without a compiled form is called.
+    """
+    return _TASK_KINDS.get(vars(type(task)).get("compiled_as", ""))
+
+
+class TaskTargets(NamedTuple):
+    """The targets of one task."""
+
+    task_index: int  # in the problem's tasks
+    kind: int  # COM, ORIENTATION, ...
+    task: TargetTask
+    shapes: Mapping[str, tuple[int, ...]]  # of the target and its derivatives, by field
+    entries: slice  # in the array of all targets
+
+
+class TargetLayout:
+    """Positions of all targets in one array: those of the tasks with a compiled form.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Attributes
+    ----------
+    tasks : list of TaskTargets
+        The tasks, in the problem's order.
+    size : int
+        Length of the array.
+    names : mapping of str to slice
+        Entries of each task: the target, then its derivatives, each row by row.
+    """
+
+    def __init__(self, problem: Problem):
+        self._problem, self.size, self.tasks = problem, 0, list[TaskTargets]()
+        robot, k = problem.robot, problem.contacts.k
+        for i, task in enumerate(problem.tasks):
+            if (kind := task_kind(task)) is not None:
+                target_task = cast(TargetTask, task)
+                shapes = target_task.shapes_for(robot, k)
+                end = self.size + sum(prod(shape) for shape in shapes.values())
+                self.tasks.append(TaskTargets(i, kind, target_task, shapes, slice(self.size, end)))
+                self.size = end
+        # of several tasks with the same name, the first one
+        self.names = MappingProxyType(
+            {each.task.name: each.entries for each in reversed(self.tasks)}
+        )
+        self._varying = [each for each in self.tasks if each.task.is_time_varying]
+        self._constant: Array | None = None
+
+    @property
+    def varies(self) -> bool:
+        """Whether a target is a function of time."""
+        return bool(self._varying)
+
+    def at(self, t: float) -> Array:
+        """Return all targets at a time, a new array.
+
+        Parameters
+        ----------
+        t : float
+            The time [s].
+
+        Raises
+        ------
+        InputError
+            If a target is not valid.
+        """
+        targets, each_varying = self.constant.copy(), self._varying
+        for each in each_varying:
+            self._write(each, targets, t)
+        return targets
+
+    @property
+    def constant(self) -> Array:
+        """Array with the constant targets, and zeros for those that are functions of time."""
+        if self._constant is None:
+            targets = np.zeros(self.size)
+            for each in self.tasks:
+                if not each.task.is_time_varying:
+                    self._write(each, targets, 0.0)
+            self._constant = targets
+        return self._constant
+
+    def _write(self, each: TaskTargets, targets: Array, t: float) -> None:
+        """Write the targets of one task at a time into the array."""
+        first = each.entries.start
+        for value in each.task.targets_at(self._problem.robot, self._problem.contacts.k, t):
+            targets[first : first + value.size] = value.ravel()
+            first += value.size
+
+    def fixed_tasks(self, targets: Array) -> list[Task]:
+        """Return the problem's tasks with constant targets from an array.
+
+        Parameters
+        ----------
+        targets : ndarray, shape (n,)
+            All targets.
+
+        Raises
+        ------
+        InputError
+            If a target is not valid.
+        """
+        tasks: list[Task] = list(self._problem.tasks)
+        for each in self.tasks:
+            values, first = {}, each.entries.start
+            for name, shape in each.shapes.items():
+                values[name] = targets[first : first + prod(shape)].reshape(shape)
+                first += prod(shape)
+            tasks[each.task_index] = replace(cast(Any, each.task), **values)
+        return tasks
+
+    def fixed_problem(self, targets: Array) -> Problem:
+        """Return the problem with constant targets from an array.
+
+        Parameters
+        ----------
+        targets : ndarray, shape (n,)
+            All targets.
+
+        Raises
+        ------
+        InputError
+            If a target is not valid.
+        """
+        tasks = self.fixed_tasks(as_array("targets", targets, (self.size,)))
+        for each in self.tasks:  # checks that need the robot
+            cast(TargetTask, tasks[each.task_index]).targets_at(
+                self._problem.robot, self._problem.contacts.k, 0.0
+            )
+        return replace(self._problem, tasks=tasks)
+
+    def check_size(self, targets: Array) -> None:
+        """Raise `InputError` if an array does not have one entry for each target."""
+        if targets.shape != (self.size,):
+            raise InputError(
+                f"targets has shape {targets.shape}; it must have shape ({self.size},). Start from "
+                f"controller.targets_at(t), and write into the entries that controller.targets "
+                f"names: {', '.join(self.names)}."
+            )

@@ -1,0 +1,170 @@
+"""What a user can change in a `Walk`: tasks, footholds, adjustment, swings, ground, pose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import judges
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import floatbase as fb
+from floatbase.behaviours import Gait, StepPlan, Swing, Walk, raibert_foothold
+from floatbase.simulation import Rollout
+
+PERIOD = 2e-3  # s
+
+
+def trot(name: str = "go2", velocity: tuple[float, float] = (0.2, 0.0), **options: Any) -> Walk:
+    robot = judges.load(name)
+    return Walk(
+        robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.2), velocity, **options
+    )
+
+
+def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollout:
+    return fb.rollout(fb.Simulation(walk.robot, **options), walk, duration, pushes, PERIOD)
+
+
+def test_a_hand_draws_a_circle_in_the_world_while_its_robot_trots_and_is_pushed() -> None:
+    robot = judges.load("anymal_kinova")
+    hand = robot.standing().point(HAND)
+
+    def circle(t: float) -> tuple[npt.ArrayLike, ...]:
+        rate = 2.0
+        c, s = 0.1 * np.cos(rate * t), 0.1 * np.sin(rate * t)
+        position = hand + [0.0, s, c - 0.1]
+        return position, [0.0, rate * c, -rate * s], [0.0, -(rate**2) * s, -(rate**2) * c]
+
+    walk = trot("anymal_kinova", (0.0, 0.0), tasks=[fb.FrameTask(HAND, circle)])
+    record = run(walk, 2.5, fb.Push([0.0, 150.0, 0.0], start=1.2))
+    assert record.outcome == "completed"
+    error = [
+        np.linalg.norm(record.state(i).point(HAND) - circle(record.time[i])[0])
+        for i in range(0, len(record), 10)
+    ]
+    assert max(error) < 0.005  # m
+    assert np.allclose(record.targets[f"position of {HAND}"][100, :3], circle(0.2)[0], atol=1e-9)
+
+
+HAND = "j2s6s200_end_effector"
+
+
+@pytest.mark.parametrize("height", [None, 0.05])
+def test_a_foothold_may_have_a_height(height: float | None) -> None:
+    def rule(foot: str, touchdown: float, walk: Walk) -> npt.ArrayLike:
+        xy = raibert_foothold(foot, touchdown, walk)
+        return xy if height is None else [*xy, height]
+
+    walk = trot(foothold=rule)
+    run(walk, 0.4)
+    level = walk.robot.standing().point("FL_foot")[2]
+    for foot, place in walk.footholds.items():
+        assert np.isclose(place[2], level if height is None else height, atol=1e-3), foot
+
+
+def test_a_user_defined_adjustment_decides_where_feet_land() -> None:
+    asked = set()
+
+    def none(
+        plan: StepPlan, path: Any, com: np.ndarray, com_velocity: np.ndarray, t: float
+    ) -> dict[str, np.ndarray]:
+        asked.update(plan.swings)
+        assert com.shape == com_velocity.shape == (3,) and path.time == t
+        return {foot: each.planned_end[:2] for foot, each in plan.planned_swings.items()}
+
+    walk = trot(adjustment=none)
+    push = fb.Push([0.0, 60.0, 0.0], start=0.45, duration=0.02)
+    record = run(walk, 1.0, push)
+    assert record.outcome == "completed" and asked == {foot.frame for foot in walk.robot.feet}
+    default = trot()
+    run(default, 1.0, push)
+    for each in list(walk.history)[1:]:
+        for foot, swing in each.planned_swings.items():
+            assert np.allclose(each.footholds[foot][:2], swing.planned_end[:2], atol=0.03)
+    moved = [
+        np.abs(b.feet[foot][1] - a.planned_swings[foot].planned_end[1])
+        for plans in (walk.history, default.history)
+        for a, b in [list(plans)[2:4]]
+        for foot in a.planned_swings
+    ]
+    assert max(moved[:2]) < 0.01 < min(moved[2:])  # m
+
+
+def test_swings_may_have_another_shape_or_class() -> None:
+    class Wrapped:
+        """A `Swing` that the compiled function does not know."""
+
+        def __init__(self, swing: Swing):
+            self._swing = swing
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._swing, name)
+
+        def __call__(self, t: float) -> Any:
+            return self._swing(t)
+
+        def with_end(self, end: npt.ArrayLike) -> Wrapped:
+            return Wrapped(self._swing.with_end(end))
+
+    def high(start: np.ndarray, end: np.ndarray, *others: float) -> Swing:
+        return replace(Swing(start, end, *others), height=0.09)
+
+    records = [
+        run(trot(swing=swing), 0.6) for swing in (high, lambda *given: Wrapped(high(*given)))
+    ]
+    for record in records:
+        assert record.outcome == "completed"
+    height = records[0].foot_positions[:, :, 2].max(axis=0)
+    assert np.all(height[[0, 3]] > 0.08)
+    assert np.abs(records[0].q - records[1].q).max() < 1e-9
+
+
+def test_the_body_may_be_lower_and_pitched_while_it_walks() -> None:
+    walk = trot(height=-0.03)
+    sim = fb.Simulation(walk.robot)
+    assert fb.rollout(sim, walk, 1.0, control_period=PERIOD).outcome == "completed"
+    walk.pitch = 0.1
+    record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)
+    standing = walk.robot.standing()
+    assert record.outcome == "completed"
+    assert np.isclose(record.com[-1, 2] - standing.com[2], -0.03, atol=0.005)
+    x_axis = record.final.frame_pose("base").rotation[:, 0]
+    assert np.isclose(np.arcsin(-x_axis[2]), 0.1, atol=0.02)
+
+
+def test_the_commanded_motion_approaches_its_goal_at_the_largest_acceleration() -> None:
+    walk = trot(velocity=(0.4, 0.0), yaw_rate=0.3, acceleration=(0.5, 2.0))
+    standing = walk.robot.standing()
+    for t in np.arange(0.0, 0.61, 0.1):
+        walk(standing.q, standing.v, float(t))
+    assert np.allclose(walk.path.velocity, [0.5 * 0.4, 0.0, 0.3])
+    assert np.allclose(walk.path_at(2.0).velocity, [0.4, 0.0, 0.3])
+
+
+class KnownPlane:
+    """A plane through the origin, as a ground that a walk knows."""
+
+    def __init__(self, normal: np.ndarray):
+        self._normal = normal
+
+    def height(self, xy: np.ndarray) -> float:
+        return float(-self._normal[:2] @ xy / self._normal[2])
+
+    def normal(self, xy: np.ndarray) -> np.ndarray:
+        return self._normal
+
+
+def test_soles_follow_a_ground_that_is_known() -> None:
+    """With level soles, talos slid 20 mm in each stance on a slope of 5°."""
+    robot, angle = judges.load("talos"), np.deg2rad(5.0)
+    normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
+    contacts, slides = fb.Contacts.feet(robot, mu=0.6, normals=normal), {}
+    for ground in (None, KnownPlane(normal)):
+        walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=ground)
+        record = run(walk, 3.2, ground=fb.Ground(normal=normal))
+        assert record.outcome == "completed"
+        slides[ground is None] = record.slip(include_rolling=False).max()
+    assert slides[False] < 2e-3 < 5e-3 < slides[True]  # m

@@ -1,0 +1,131 @@
+"""The compiled targets of a walk against the functions that define them, at random states.
+
+A walk on the reference backend evaluates the functions. Both walks see the same states and times,
+with pushes, turns, changes of stance, known slopes, and a body that is lowered and pitched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import judges
+import numpy as np
+import pytest
+
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+from floatbase.control import Command
+
+ROBOTS = {"go2": Gait.trot, "hyq": Gait.crawl, "talos": Gait.walk}
+
+
+class Slope(NamedTuple):
+    """A plane as a ground that a walk knows."""
+
+    gradient: np.ndarray
+    level: float
+
+    def height(self, xy: np.ndarray) -> float:
+        return float(self.gradient @ xy + self.level)
+
+    def normal(self, xy: np.ndarray) -> np.ndarray:
+        normal = np.array([*-self.gradient, 1.0])
+        return normal / np.linalg.norm(normal)
+
+
+def walks(name: str, backends: tuple[str, ...], **options: Any) -> list[Walk]:
+    robot = judges.load(name)
+    gait, contacts = ROBOTS[name](robot, start=0.05), fb.Contacts.feet(robot, mu=0.6)
+    return [
+        Walk(robot, contacts, gait, (0.2, 0.05), 0.3, backend=backend, **options)
+        for backend in backends
+    ]
+
+
+def random_steps(
+    name: str, n: int, rng: np.random.Generator
+) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+    """Yield states near standing, with random velocities, at times that differ by up to 60 ms."""
+    t = 0.0
+    for state in judges.states(name, n, 0.02):
+        yield state.q, rng.normal(0.0, 0.2, state.robot.nv), t
+        t += float(rng.uniform(0.001, 0.06))
+
+
+# a crawl of hyq is slower than asked
+@pytest.mark.filterwarnings("ignore::floatbase.errors.SimulationWarning")
+@pytest.mark.parametrize("known_ground", [False, True])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_one_compiled_function_writes_what_the_definitions_say(
+    name: str, known_ground: bool
+) -> None:
+    rng = np.random.default_rng(2)
+    ground = Slope(rng.normal(0.0, 0.15, 2), 0.01) if known_ground else None
+    fast, slow = walks(name, ("compiled", "reference"), ground=ground, pitch=0.05)
+    swinging = 0
+    for i, (q, v, t) in enumerate(random_steps(name, 40, rng)):
+        if i == 20:
+            for walk in (fast, slow):
+                walk.velocity, walk.yaw_rate, walk.height = (-0.1, 0.1), -0.2, -0.02
+        commands = [walk(q, v, t) for walk in (fast, slow)]
+        assert [command.backend for command in commands] == ["compiled", "reference"]
+        targets = [command.targets for command in commands]
+        assert targets[0].keys() == targets[1].keys() and fast.stance == slow.stance
+        for task, values in targets[1].items():
+            assert np.allclose(targets[0][task], values, rtol=0.0, atol=1e-9), task
+        assert np.allclose(fast.path.position, slow.path.position, rtol=0.0, atol=1e-9)
+        for foot, swing in slow.swings.items():
+            assert np.allclose(fast.swings[foot].end, swing.end, rtol=0.0, atol=1e-9)
+            swinging += 1
+    assert swinging > 10
+
+
+def angular_velocity(before: np.ndarray, R: np.ndarray, after: np.ndarray, dt: float) -> np.ndarray:
+    spin = (after - before).reshape(3, 3) / dt @ R.reshape(3, 3).T
+    return np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name: str) -> None:
+    """By central differences, on a slope, while the robot turns."""
+    (walk,) = walks(name, ("compiled",), ground=Slope(np.array([0.1, -0.05]), 0.0))
+    state, step, t = judges.load(name).standing(), 1e-5, 0.0
+    while t < 0.15:
+        walk(state.q, state.v, t)
+        t += 0.01
+    before, now, after = (
+        walk(state.q, state.v, time).targets for time in (t, t + step, t + 2.0 * step)
+    )
+    for task, values in now.items():
+        if task == "centre of mass":
+            rates = (after[task] - before[task]) / (2.0 * step)
+            assert np.allclose(rates[:3], values[3:6], atol=1e-5)
+            assert np.allclose(rates[3:6], values[6:9], atol=1e-4)
+        elif task.startswith("orientation"):
+            parts = [each[task][:9] for each in (before, now, after)]
+            omega = angular_velocity(*parts, 2.0 * step)
+            assert np.allclose(omega, values[9:12], atol=1e-3)
+
+
+def test_a_rollout_records_the_targets_of_each_step() -> None:
+    (walk,) = walks("go2", ("compiled",))
+    robot, commands = judges.load("go2"), []
+
+    class Kept:
+        contacts = property(lambda self: walk.contacts)
+
+        def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> Command:
+            commands.append(walk(q, v, t))
+            return commands[-1]
+
+    run = fb.rollout(fb.Simulation(robot), Kept(), 0.5, control_period=2e-3)
+    assert np.abs(run.targets["centre of mass"][:, :3] - run.com).max() < 0.02
+    for i in (0, 40, 249):
+        targets = commands[i].targets
+        for task, rows in run.targets.items():
+            if task in targets:
+                assert np.array_equal(rows[i][: targets[task].size], targets[task])
+            else:
+                assert np.isnan(rows[i]).all()
+    assert {"position of FL_foot", "posture"} <= set(run.targets)

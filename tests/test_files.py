@@ -1,0 +1,132 @@
+"""A file is written whole or not at all, whatever ends the writing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import judges
+import pytest
+from PIL import Image
+
+import floatbase as fb
+from floatbase._files import whole_file, write_whole
+from floatbase.errors import InputError, ViewerError
+from floatbase.lessons.publish.grades import write_table
+from floatbase.viewer.export import film
+
+KILLED = """
+import sys
+from pathlib import Path
+from floatbase._files import whole_file
+with whole_file(Path(sys.argv[1])) as part:
+    with part.open("wb") as file:
+        file.write(b"half")
+        file.flush()
+        print("written", flush=True)
+        sys.stdin.read()
+"""
+
+
+def test_a_process_that_is_killed_leaves_the_former_file(tmp_path: Path) -> None:
+    target = tmp_path / "film.mp4"
+    target.write_bytes(b"former")
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, target], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    with process:
+        assert process.stdout is not None and process.stdout.readline() == b"written\n"
+        process.send_signal(signal.SIGKILL)
+    assert target.read_bytes() == b"former"
+    write_whole(target, b"new")  # what the killed process left is in nobody's way
+    assert target.read_bytes() == b"new"
+
+
+def test_the_permissions_of_a_file_are_kept(tmp_path: Path) -> None:
+    target = tmp_path / "answers.json"
+    target.write_bytes(b"former")
+    target.chmod(0o600)
+    write_whole(target, b"new")
+    assert target.read_bytes() == b"new" and target.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_pipe_is_written_and_not_replaced(linked: bool, tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    received: list[bytes] = []
+    reader = threading.Thread(target=lambda: received.append(pipe.read_bytes()), daemon=True)
+    reader.start()
+    write_table([], link if linked else pipe)  # such as --table /dev/stdout
+    reader.join(20.0)
+    assert received[0].startswith(b"file,name") and pipe.is_fifo() and link.is_symlink()
+
+
+def test_two_files_of_one_folder_can_be_written_at_once(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a") as a, whole_file(tmp_path / "b") as b:
+        a.write_text("a")
+        b.write_text("b")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "a", "b": "b"}
+
+
+@pytest.mark.parametrize("extension", [".png", ".gif", ".mp4", ".html"])
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_picture_that_fails_leaves_all_other_files(
+    extension: str, linked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if extension == ".mp4":
+        pytest.importorskip("av", reason="av writes films")
+    target, other = tmp_path / f"run{extension}", tmp_path / f"run.part{extension}"
+    former = tmp_path / "former" if linked else target
+    former.write_bytes(b"former")
+    other.write_bytes(b"other")
+    if linked:
+        target.symlink_to(former)
+
+    def pictures(*_: object) -> Iterator[Image.Image]:
+        if broken and extension == ".png":
+            raise OSError(28, "No space left on device")
+        yield Image.new("RGB", (320, 200), "red")
+        if broken:
+            raise OSError(28, "No space left on device")
+
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(film, "_frames", pictures)
+    broken = True
+    with closing(fb.Viewer(robot := judges.load("ur5"))) as view:
+        view.show(robot.standing())
+        with monkeypatch.context() as patch, pytest.raises(ViewerError, match="No space"):
+            if extension == ".html":
+                patch.setattr(Path, "write_bytes", full_disk)
+            view.save(target, size=(320, 200))
+        assert former.read_bytes() == b"former" and other.read_bytes() == b"other"
+        broken = False
+        view.save(target, size=(320, 200))
+    assert former.read_bytes() not in (b"", b"former") and other.read_bytes() == b"other"
+    assert target.is_symlink() == linked
+    assert {path.name for path in tmp_path.iterdir()} == {target.name, former.name, other.name}
+
+
+def test_a_table_that_cannot_be_written_leaves_the_former_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = tmp_path / "marks.csv"
+    write_table([], table)
+    former = table.read_bytes()
+
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    with pytest.raises(InputError, match="No space"):
+        write_table([], table)
+    assert former and table.read_bytes() == former
