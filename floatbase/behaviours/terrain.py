@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy as np
 from floatbase._validation import Array
 
 _RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
+
+_LARGEST_EDGE = 0.01  # m: a foot may stand on lower edges
+_SEARCH_STEP = 0.02  # m between the places that are tried
 
 
 @runtime_checkable
@@ -21,6 +25,59 @@ class Terrain(Protocol):
 
     def normal(self, xy: Array) -> Array:
         """Return the upward unit normal at a horizontal position, shape (3,), world frame."""
+
+
+def level_place(terrain: Terrain, point: Array, around: Array, reach: float) -> Array:
+    """Return the place nearest to a point where a foot does not touch an edge of the terrain.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        The terrain.
+    point : ndarray, shape (2,)
+        Desired place in the world frame [m].
+    around : ndarray, shape (n, 2)
+        Points relative to the place, such as the corners of a sole, at which the terrain must be in
+        the tangent plane of the place [m].
+    reach : float
+        Largest distance of the place from the point [m].
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        The nearest such place on a grid, or the point if there is none [m].
+    """
+    places = point + np.concatenate([[np.zeros(2)], _search_grid(reach)])
+    for first, last in ((0, 1), (1, len(places))):  # the point itself is good enough, in general
+        heights = _heights(terrain, places[first:last, None] + around)
+        middles = _heights(terrain, places[first:last])
+        normals = np.array([terrain.normal(place) for place in places[first:last]])
+        slopes = -normals[:, :2] / normals[:, 2:]
+        steps = np.abs(heights - middles[:, None] - slopes @ around.T).max(axis=1)
+        good = np.flatnonzero(steps < _LARGEST_EDGE)
+        if len(good):
+            return np.asarray(places[first + good[0]])
+    return point
+
+
+@lru_cache(maxsize=16)
+def _search_grid(reach: float) -> Array:
+    """Return displacements of at most a distance, shape (n, 2), the shortest ones first [m]."""
+    n = int(reach / _SEARCH_STEP)
+    steps = _SEARCH_STEP * np.arange(-n, n + 1)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    lengths = np.linalg.norm(grid, axis=1)
+    order = np.argsort(lengths, kind="stable")
+    return grid[order[(lengths[order] > 0.0) & (lengths[order] <= reach)]]
+
+
+def _heights(terrain: Terrain, points: Array) -> Array:
+    """Return the heights at points, shape (..., 2); the terrain may accept one at a time only."""
+    heights = np.asarray(terrain.height(points))
+    if heights.shape != points.shape[:-1]:
+        flat = [terrain.height(point) for point in points.reshape(-1, 2)]
+        heights = np.reshape(flat, points.shape[:-1])
+    return heights
 
 
 @dataclass(frozen=True, eq=False)

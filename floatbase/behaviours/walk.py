@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import inf
+from math import cos, inf, sin
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,14 +47,18 @@ from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import Adjustment, BodyPose
-from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.terrain import Terrain, level_place
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import Task
-from floatbase.robots import Robot, State
+from floatbase.robots import Foot, Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
+_EDGE_MARGIN = 0.02  # m between a ball of a foot and an edge of a known ground
+_SOLE_MARGIN = 1.1  # size of a sole for which a known ground must be flat, relative to its own
+_EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
+_CIRCLE = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
@@ -221,6 +225,11 @@ class Walk:
     def reach(self) -> float:
         """Largest distance of a foothold from the nominal one below the body [m]."""
         return self._options.reach
+
+    @property
+    def ground(self) -> Terrain | None:
+        """The ground, if the walk knows it."""
+        return self._options.ground
 
     @property
     def ramp(self) -> float:
@@ -633,4 +642,15 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
     point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
     foothold: Array = point - centripetal / walk.omega**2
-    return foothold
+    if walk.ground is None:
+        return foothold
+    around = _outline(walk.robot.foot(foot), path.yaw)
+    return level_place(walk.ground, foothold, around, _EDGE_REACH)
+
+
+def _outline(foot: Foot, yaw: float) -> Array:
+    """Return points around the middle of a foot that must not be beyond an edge, (n, 2) [m]."""
+    if foot.corners is None:
+        return (2.0 * foot.radius + _EDGE_MARGIN) * _CIRCLE
+    c, s = cos(yaw), sin(yaw)
+    return np.asarray(_SOLE_MARGIN * foot.corners[:, :2] @ np.array([[c, s], [-s, c]]))
