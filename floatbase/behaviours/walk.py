@@ -55,6 +55,7 @@ from floatbase.objectives import Task
 from floatbase.robots import Foot, Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
+_LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
 _EDGE_MARGIN = 0.02  # m between a ball of a foot and an edge of a known ground
 _SOLE_MARGIN = 1.1  # size of a sole for which a known ground must be flat, relative to its own
 _EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
@@ -496,7 +497,7 @@ class Walk:
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._active, self._planning_path = None, None
+        self._active, self._planning_path, self._lean = None, None, 0.0
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _prepare(self, gait: Gait) -> None:
@@ -528,7 +529,7 @@ class Walk:
         if active is not None:
             swinging, time = bool(active.plan.planned_swings), active.path.time
             self._desired = self._desired_motion(swinging, time)
-            self._active = active.changed(self._desired, self._pose)
+            self._active = active.changed(self._desired, self._leaning_pose)
 
     def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
         """Return the motion that the path approaches from t [s] on.
@@ -575,12 +576,31 @@ class Walk:
         finally:
             self._planning_path = None
         self._history.append(plan)
+        self._update_lean(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
         self._active = ActivePlan(
-            posture, plan, self._desired, self._pose, self._options.reach, controller.targets,
+            posture, plan, self._desired, self._leaning_pose, self._options.reach,
+            controller.targets,
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._change_after(t, plan)
+
+    @property
+    def _leaning_pose(self) -> BodyPose:
+        """The requested height and pitch, with the lean of the body on a known ground."""
+        return BodyPose(self._pose.height, self._pose.pitch + self._lean)
+
+    def _update_lean(self, plan: StepPlan) -> None:
+        """Turn the body towards the slope below the feet, if the ground is known.
+
+        On stairs, the legs of a long body that stays level become too short. A body on two feet
+        stays upright.
+        """
+        if self._options.ground is None or len(self._posture.nominal_feet) <= 2:
+            return
+        heading = np.array([cos(plan.path.yaw), sin(plan.path.yaw)])
+        uphill = float(np.arctan(plan.ground.slope @ heading))
+        self._lean += _LEAN_FRACTION * (-uphill - self._lean)
 
     def _change_after(self, t: float, plan: StepPlan) -> float:
         """Return until when a plan that is in use at t needs no change [s]."""
