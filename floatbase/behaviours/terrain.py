@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from floatbase._validation import Array
+from floatbase._validation import Array, read_only
 
 _RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
 
@@ -47,17 +47,18 @@ def level_place(terrain: Terrain, point: Array, around: Array, reach: float) -> 
     ndarray, shape (2,)
         The nearest such place on a grid, or the point if there is none [m].
     """
-    places = point + np.concatenate([[np.zeros(2)], _search_grid(reach)])
-    for first, last in ((0, 1), (1, len(places))):  # the point itself is good enough, in general
-        heights = _heights(terrain, places[first:last, None] + around)
-        middles = _heights(terrain, places[first:last])
-        normals = np.array([terrain.normal(place) for place in places[first:last]])
-        slopes = -normals[:, :2] / normals[:, 2:]
-        steps = np.abs(heights - middles[:, None] - slopes @ around.T).max(axis=1)
-        good = np.flatnonzero(steps < _LARGEST_EDGE)
-        if len(good):
-            return np.asarray(places[first + good[0]])
+    for displacement in _search_grid(reach):
+        if _is_flat(terrain, point + displacement, around):
+            return np.asarray(point + displacement)
     return point
+
+
+def _is_flat(terrain: Terrain, place: Array, around: Array) -> bool:
+    """Return whether a terrain is in its tangent plane at points around a place, (n, 2) [m]."""
+    plane = Plane.tangent(terrain, place)
+    return all(
+        abs(terrain.height(point) - plane.height(point)) < _LARGEST_EDGE for point in place + around
+    )
 
 
 @lru_cache(maxsize=16)
@@ -68,16 +69,7 @@ def _search_grid(reach: float) -> Array:
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     lengths = np.linalg.norm(grid, axis=1)
     order = np.argsort(lengths, kind="stable")
-    return grid[order[(lengths[order] > 0.0) & (lengths[order] <= reach)]]
-
-
-def _heights(terrain: Terrain, points: Array) -> Array:
-    """Return the heights at points, shape (..., 2); the terrain may accept one at a time only."""
-    heights = np.asarray(terrain.height(points))
-    if heights.shape != points.shape[:-1]:
-        flat = [terrain.height(point) for point in points.reshape(-1, 2)]
-        heights = np.reshape(flat, points.shape[:-1])
-    return heights
+    return read_only(grid[order[lengths[order] <= reach]])
 
 
 @dataclass(frozen=True, eq=False)

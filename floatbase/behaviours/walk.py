@@ -132,8 +132,9 @@ class Walk:
         returns the path of the foot, such as a `Swing`, which is the default.
     ground : Terrain, optional
         The ground, if the walk knows it: an object with the methods height(xy) and normal(xy), such
-        as `fb.Ground`. Footholds then lie on it, swings clear its steps, and soles follow its
-        normal. Without it, the ground is the plane through the feet.
+        as `fb.Ground`. Footholds then lie on it and keep clear of its edges, swings clear its
+        steps, soles follow its normal, and the body of a robot with more than two feet leans with
+        the slope below the feet. Without it, the ground is the plane through the feet.
     tasks : sequence of Task, optional
         Further tasks, for example for a hand.
     height : float, optional
