@@ -3,13 +3,15 @@ playwright and a Chromium.
 
 They show the course text's figures, every robot of the catalogue with its forces and friction
 cones, go2 with four-sided cones, and the feet of talos. The animation shows go2 stepping after a
-push; it also needs the extra `video`.
+push; it also needs the extra `video`. So does `docs/priorities.png`, which shows weighted tasks
+beside strict priorities.
 """
 
 from __future__ import annotations
 
 import shutil
 import sys
+import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -32,7 +34,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
 ]
 SIZE = {"width": 1000, "height": 640}
-FILM = "go2_steps"
+FILM, PRIORITIES = "go2_steps", "priorities"
 
 
 def standing(name: str, facets: int | None = None) -> Viewer:
@@ -72,9 +74,65 @@ def film() -> None:
     print(f"{FILM}: {path.stat().st_size / 1000:.0f} KB")
 
 
+def priorities() -> None:
+    """Draw the example of docs/constraints.md: weighted tasks beside strict priorities."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    robot, angle = fb.load("go2"), 0.2
+    state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.7)
+    c, s = np.cos(angle), np.sin(angle)
+    pitched = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    trunk = [
+        fb.standing_tasks(state)[0],
+        fb.OrientationTask("base", pitched, kp=100.0, weight=10.0),
+    ]
+    posture = [fb.PostureTask(state.q, kp=100.0, weight=1.0)]
+    figure, axes = plt.subplot_mosaic(
+        [["weighted", "strict"], ["pitch", "posture"]],
+        figsize=(9.0, 6.2),
+        height_ratios=[1.25, 1.0],
+        layout="constrained",
+    )
+    for name, tasks, colour in (
+        ("weighted", [*trunk, *posture], "tab:orange"),
+        ("strict", [trunk, posture], "tab:blue"),
+    ):
+        controller = fb.WholeBodyController(robot, contacts, tasks)
+        run = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=4e-3)
+        with tempfile.TemporaryDirectory() as folder:
+            view = Viewer(robot, background="white").show(
+                run.final, contacts, run.measured[-1], cones=False
+            )
+            view.camera("right")
+            axes[name].imshow(plt.imread(view.save(Path(folder) / "robot.png", size=(640, 400))))
+            view.close()
+        axes[name].set_title({"weighted": "Weighted tasks", "strict": "Strict priorities"}[name])
+        axes[name].axis("off")
+        rotations = [run.state(i).frame_pose("base").rotation for i in range(len(run))]
+        pitch = [np.arctan2(R[0, 2], R[2, 2]) for R in rotations]
+        errors = np.abs(run.q[:, 7:] - state.q[7:]).max(axis=1)
+        axes["pitch"].plot(run.time, pitch, colour, label=name)
+        axes["posture"].plot(run.time, errors, colour, label=name)
+    axes["pitch"].axhline(angle, color="black", linestyle=":", label="target")
+    axes["pitch"].set(xlabel="time [s]", ylabel="pitch of the trunk [rad]")
+    axes["posture"].set(xlabel="time [s]", ylabel="largest posture error [rad]")
+    for name in ("pitch", "posture"):
+        axes[name].legend()
+        axes[name].grid(alpha=0.3)
+    path = OUT.parents[1] / "docs" / f"{PRIORITIES}.png"
+    figure.savefig(path, dpi=100)
+    print(f"{PRIORITIES}: {path.stat().st_size / 1000:.0f} KB")
+
+
 def main(names: list[str]) -> None:
     """Draw each scene, take a screenshot of its page, and save it with 255 colours."""
     OUT.mkdir(exist_ok=True)
+    if PRIORITIES in names:
+        priorities()
+        names = [name for name in names if name != PRIORITIES]
     if FILM in names:
         film()
         names = [name for name in names if name != FILM]
@@ -105,4 +163,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [FILM, *SCENES])
+    main(sys.argv[1:] or [FILM, PRIORITIES, *SCENES])

@@ -16,7 +16,10 @@ _MIN_EDGE = 1e-6  # m: rounding decides the direction of shorter edges
 
 
 def capture_point_inequality(
-    margin: float = 0.0, horizon: float = 0.1, name: str = "capture point"
+    margin: float = 0.0,
+    horizon: float = 0.1,
+    name: str = "capture point",
+    weight: float | None = None,
 ) -> LinearInequality:
     """Make inequalities that keep the capture point inside the support polygon.
 
@@ -34,6 +37,9 @@ def capture_point_inequality(
         Horizon T [s]. With a shorter horizon, the capture point may approach an edge faster.
     name : str, optional
         Name in messages.
+    weight : float, optional
+        None makes the inequalities hard. A number makes them soft: their violation times this
+        weight is added to the objective [units of the objective per m/s²].
 
     Returns
     -------
@@ -47,7 +53,7 @@ def capture_point_inequality(
     The constraint is from [Ramos2014]_, and the capture point from [Pratt2006]_. The inequalities
     keep tasks from moving the robot to a state from which it must step or fall. A disturbance can
     still move the capture point so far that no contact forces bring it back within the horizon.
-    Then the problem is infeasible.
+    Then the problem is infeasible, unless the inequalities are soft.
 
     Examples
     --------
@@ -61,7 +67,7 @@ def capture_point_inequality(
     """
     margin = as_positive("margin", margin, "m", allow_zero=True)
     horizon = as_positive("horizon", horizon, "s")
-    return LinearInequality(name, "qdd", partial(_coefficients, margin, horizon))
+    return LinearInequality(name, "qdd", partial(_coefficients, margin, horizon), weight=weight)
 
 
 def _coefficients(

@@ -14,13 +14,11 @@ from floatbase._validation import (
     MAX_MAGNITUDE,
     Array,
     as_array,
-    as_instance,
     as_number,
     cached_property,
     numeric_copy,
     read_only,
     refuse_new_attributes,
-    short_repr,
 )
 from floatbase.control.command import Command
 from floatbase.control.joint_limits import JointLimits
@@ -44,7 +42,6 @@ from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
-from floatbase.robots._checks import as_torque_limits
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
@@ -69,7 +66,8 @@ class WholeBodyController:
         priorities instead: the first list has the highest priority, and each list is fulfilled as
         well as the lists before it allow. Only the reference backend supports priorities. If no
         task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small weight
-        is added, so that the optimum is unique.
+        is added, so that the optimum is unique. A `CentreOfPressureTask` does not count here, since
+        it leaves most forces open.
     facets : int, optional
         Number of facets of the friction polyhedra; see `floatbase.friction.FrictionPolyhedron`.
     inner_approximation : bool, optional
@@ -88,8 +86,9 @@ class WholeBodyController:
         User-defined inequality constraints on q̈, τ or λ.
     joint_limits : JointLimits or {"robot"}, optional
         Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
-        `JointLimits.of(robot)`, as soft constraints with a weight of 100: a limit yields only if
-        torques, contacts or tasks of larger weight oppose it. None switches them off.
+        `JointLimits.of(robot, torque_limits=torque_limits)`, as soft constraints with a weight of
+        100: a limit yields only if torques, contacts or tasks of larger weight oppose it. None
+        switches them off.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation
         times this weight is added to the objective [1/N].
@@ -184,19 +183,17 @@ class WholeBodyController:
         solver: str = "daqp",
         backend: Backend = "auto",
     ):
-        as_instance("robot", robot, Robot)
-        if torque_limits is None:
-            torque_limits = robot.torque_limits
-        limits = Limits(
-            as_torque_limits(robot.d, torque_limits),
-            facets,
-            inner_approximation,
-            min_normal_force,
-            max_normal_force,
-            inequalities,
-            facet_rotation,
-            _joint_limits(robot, joint_limits),
-            normal_force_weight,
+        limits = Limits.of(
+            robot,
+            torque_limits=torque_limits,
+            joint_limits=joint_limits,
+            facets=facets,
+            inner_approximation=inner_approximation,
+            facet_rotation=facet_rotation,
+            min_normal_force=min_normal_force,
+            max_normal_force=max_normal_force,
+            inequalities=inequalities,
+            normal_force_weight=normal_force_weight,
         )
         # `Problem` takes levels apart
         problem = Problem(robot, contacts, cast("Sequence[Task]", tasks), limits, modify_qp)
@@ -304,9 +301,9 @@ class WholeBodyController:
         return self._problem.contacts
 
     @property
-    def tasks(self) -> Sequence[Task]:
-        """All tasks, including the regularization that was added."""
-        return self._problem.tasks
+    def tasks(self) -> Sequence[Task] | Sequence[Sequence[Task]]:
+        """All tasks, including the regularization that was added; levels if they are in levels."""
+        return self._problem.levels or self._problem.tasks
 
     @property
     def limits(self) -> Limits:
@@ -481,7 +478,7 @@ class WholeBodyController:
         limits = problem.limits.softened(SOFT_LIMIT_WEIGHT)
         if limits is not problem.limits:
             problem = replace(problem, limits=limits)
-        elif contact_weight_of(self.tasks) is None:
+        elif contact_weight_of(problem.tasks) is None:
             problem = _softened(problem, SOFT_CONTACT_WEIGHT)
         else:
             return None
@@ -515,6 +512,7 @@ class WholeBodyController:
             self._softened,
             inputs.packed[: tick.layout.size],
             tick.layout.names,
+            self._problem.limits.joint_limits,
         )
 
     def _reference_attempt(
@@ -539,7 +537,7 @@ class WholeBodyController:
         tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
         return Command(
             tau, qdd, forces, self.contacts, "reference", solution, self._softened,
-            read_only(values), self._layout.names,
+            read_only(values), self._layout.names, self._problem.limits.joint_limits,
         )  # fmt: skip
 
     def _solution_of(
@@ -571,7 +569,8 @@ class WholeBodyController:
         contacts : Contacts, optional
             New contacts.
         tasks : sequence of Task, or sequence of sequences of Task, optional
-            New tasks, or levels of tasks.
+            New tasks, or levels of tasks. To add to the attribute `tasks`, append a task to it, or
+            a level to levels.
         limits : Limits, optional
             New limits.
 
@@ -583,11 +582,11 @@ class WholeBodyController:
         problem = replace(
             self._problem,
             contacts=self.contacts if contacts is None else contacts,
-            tasks=self.tasks if tasks is None else cast("Sequence[Task]", tasks),
+            tasks=self._problem.tasks if tasks is None else cast("Sequence[Task]", tasks),
             level_sizes=self._problem.level_sizes if tasks is None else (),
             limits=self.limits if limits is None else limits,
         )
-        if (weight := contact_weight_of(self.tasks)) is not None:
+        if (weight := contact_weight_of(self._problem.tasks)) is not None:
             problem = _softened(problem, weight)
         if limits is not None:
             limits.check_names(
@@ -607,7 +606,7 @@ class WholeBodyController:
     def __repr__(self) -> str:
         return (
             f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, "
-            f"{len(self.tasks)} tasks, {self.backend})"
+            f"{len(self._problem.tasks)} tasks, {self.backend})"
         )
 
 
@@ -615,20 +614,6 @@ def _check_choice(name: str, value: object, choices: object) -> None:
     """Raise `UnknownNameError` if a value is none of the choices of a `Literal`."""
     if not isinstance(value, str) or value not in get_args(choices):
         raise unknown_name(name, value, get_args(choices))
-
-
-def _joint_limits(robot: Robot, given: object) -> JointLimits | None:
-    """Return joint limits from the argument of a controller, checked."""
-    if given is None:
-        return None
-    if isinstance(given, JointLimits):
-        return given
-    if not isinstance(given, str) or given != "robot":
-        raise InputError(
-            f'joint_limits must be "robot", None or JointLimits, such as '
-            f"floatbase.control.JointLimits.of(robot, weight=1e4), not {short_repr(given)}."
-        )
-    return JointLimits.of(robot)
 
 
 def _softened(problem: Problem, weight: float) -> Problem:

@@ -25,6 +25,7 @@ from floatbase._validation import (
 from floatbase.errors import InputError
 from floatbase.qp import ConstraintLabel
 from floatbase.robots import Robot, State
+from floatbase.robots._checks import as_torque_limits
 from floatbase.robots._checks import joint_limits as position_limits
 
 # per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much
@@ -168,7 +169,9 @@ class JointLimits(Value):
             raise InputError("braking must be finite.")
 
     @classmethod
-    def of(cls, robot: Robot, **changes: Any) -> JointLimits:
+    def of(
+        cls, robot: Robot, *, torque_limits: npt.ArrayLike | None = None, **changes: Any
+    ) -> JointLimits:
         """Return the limits in a robot's URDF.
 
         Parameters
@@ -176,6 +179,9 @@ class JointLimits(Value):
         robot : Robot
             The robot. Joints without position or velocity limits in the URDF have none, and neither
             have joints whose lower and upper limits are equal there.
+        torque_limits : float or array_like, shape (d,), optional
+            Torque limits that determine `braking` [N·m]. The default is those of the robot. Give
+            the controller's torque limits if they are different.
         **changes
             Parameters of the class to change, such as velocity=... or weight=1e4.
 
@@ -183,8 +189,8 @@ class JointLimits(Value):
         -------
         JointLimits
             The limits. The URDF has no acceleration limits. `braking` is half of the acceleration
-            that each motor gives its joint in the standing posture with the base fixed, but at
-            most 300 rad/s².
+            that the torque limit gives each joint in the standing posture with the base fixed, but
+            at most 300 rad/s².
 
         Raises
         ------
@@ -198,6 +204,9 @@ class JointLimits(Value):
                 f"JointLimits has no parameter {unknown[0]!r}. It has "
                 f"{', '.join(cls.__dataclass_fields__)}."
             )
+        if torque_limits is not None:
+            torques = as_torque_limits(robot.d, torque_limits)
+            changes = {"braking": _braking(robot, torques), **changes}
         limits = replace(limits, **changes)
         limits.check_size(robot)
         return limits
@@ -442,13 +451,24 @@ def _limits_of(robot: Robot) -> JointLimits:
     lower[index], upper[index] = least, largest
     at = _position_indices(robot)
     velocity = np.array(model.velocityLimit[robot.nv - d :])
-    inertia = pin.crba(model, model.createData(), np.array(robot.posture)).diagonal()
     return JointLimits(
         lower=np.where(at >= 0, lower[at], -np.inf),
         upper=np.where(at >= 0, upper[at], np.inf),
         velocity=np.where(velocity > 0.0, velocity, np.inf),  # 0: not in the URDF
         acceleration=np.full(d, np.inf),
-        braking=np.minimum(
-            _BRAKING_FRACTION * robot.torque_limits / inertia[robot.nv - d :], _MAX_BRAKING
-        ),
+        braking=_braking(robot, robot.torque_limits),
     )
+
+
+def _braking(robot: Robot, torque_limits: Array) -> Array:
+    """Return decelerations that torque limits (d,) allow in the standing posture, (d,)."""
+    reachable = _BRAKING_FRACTION * torque_limits / _joint_inertias(robot)
+    return np.minimum(reachable, _MAX_BRAKING)
+
+
+@lru_cache(maxsize=64)
+def _joint_inertias(robot: Robot) -> Array:
+    """Return the inertia of each joint with the base fixed, standing, (d,) [kg·m² or kg]."""
+    model = robot.model
+    inertia = pin.crba(model, model.createData(), np.array(robot.posture)).diagonal()
+    return read_only(inertia[robot.nv - robot.d :].copy())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -257,7 +257,8 @@ class Limits(Value):
     facet_rotation : float, optional
         Angle by which the facets are rotated about the normal [rad].
     joint_limits : JointLimits, optional
-        Position, velocity and acceleration limits of the joints; none by default.
+        Position, velocity and acceleration limits of the joints; none by default. `of` takes those
+        of the robot.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation
         times this weight is added to the objective [units of the objective per N]. Normal forces
@@ -286,8 +287,64 @@ class Limits(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.joint_limits is not None:
-            as_instance("joint_limits", self.joint_limits, JointLimits)
+        if self.joint_limits is not None and not isinstance(self.joint_limits, JointLimits):
+            raise InputError(
+                f"joint_limits must be JointLimits or None, not {short_repr(self.joint_limits)}. "
+                f"floatbase.control.Limits.of(robot) has the joint limits of a robot."
+            )
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        *,
+        torque_limits: npt.ArrayLike | None = None,
+        joint_limits: JointLimits | Literal["robot"] | None = "robot",
+        **options: Any,
+    ) -> Limits:
+        """Return the limits that a controller of a robot has with the same arguments.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        torque_limits : float or array_like, shape (d,), optional
+            Torque limits [N·m]; np.inf for none. The default is those of the robot.
+        joint_limits : JointLimits or {"robot"}, optional
+            Limits of the joints. "robot" uses those of the URDF, with a braking acceleration that
+            the torque limits allow. None for no limits.
+        **options
+            Other parameters of the class, such as facets=8.
+
+        Returns
+        -------
+        Limits
+            The limits.
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type, shape or value.
+        """
+        as_instance("robot", robot, Robot, 'fb.load("go2")')
+        unknown = [name for name in options if name not in cls.__dataclass_fields__]
+        if unknown:
+            raise InputError(
+                f"Limits has no parameter {unknown[0]!r}. It has "
+                f"{', '.join(cls.__dataclass_fields__)}."
+            )
+        torques = as_torque_limits(
+            robot.d, robot.torque_limits if torque_limits is None else torque_limits
+        )
+        if isinstance(joint_limits, str) and joint_limits == "robot":
+            joint_limits = JointLimits.of(robot, torque_limits=torques)
+        elif joint_limits is not None and not isinstance(joint_limits, JointLimits):
+            raise InputError(
+                f'joint_limits must be "robot", None or JointLimits, such as '
+                f"floatbase.control.JointLimits.of(robot, weight=1e4), not "
+                f"{short_repr(joint_limits)}."
+            )
+        return cls(torques, joint_limits=joint_limits, **options)
 
     def softened(self, weight: float) -> Limits:
         """Return limits whose hard constraints are soft, except the physical ones.
@@ -428,9 +485,10 @@ class Limits(Value):
         tuple of LinearInequality
             The inequalities.
         """
-        if self.normal_force_weight is None or not contacts.n_points:
-            return tuple(self.inequalities)
-        return *self.inequalities, _soft_force_bounds(contacts, self)
+        bounds = None
+        if self.normal_force_weight is not None:
+            bounds = _soft_force_bounds(contacts, self)
+        return tuple(self.inequalities) if bounds is None else (*self.inequalities, bounds)
 
     def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
         """Return minimum and maximum normal force of each contact point at time t."""
@@ -440,7 +498,7 @@ class Limits(Value):
         return least, largest
 
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
-        """Return which contact points have a maximum normal force, hard or soft.
+        """Return which contact points have bounds of their normal force, hard or soft.
 
         Parameters
         ----------
@@ -449,26 +507,34 @@ class Limits(Value):
 
         Returns
         -------
-        ndarray of bool, shape (P,)
-            True for points with a maximum.
+        ndarray of bool, shape (2, P)
+            True for points with a minimum that is not always 0, and for points with a maximum.
         """
-        given = self.max_normal_force
-        names = given if isinstance(given, Mapping) else contacts.names
-        return np.array(
-            [c.name in names for c in contacts.friction_contacts for _ in c.point_names],
-            dtype=np.bool_,
-        )
+        least, largest = self.min_normal_force, self.max_normal_force
+        assert largest is not None  # __post_init__ replaces None
+        bounded = [
+            (
+                _bound_of(least, each.name, 0.0) != 0.0,
+                _bound_of(largest, each.name, None) is not None,
+            )
+            for each in contacts.friction_contacts
+            for _ in each.point_names
+        ]
+        return np.array(bounded, dtype=np.bool_).reshape(-1, 2).T
+
+
+def _bound_of(given: NormalForces, name: str, otherwise: Any) -> Any:
+    """Return the bound of the normal forces of a contact: a number, a function or `otherwise`."""
+    return given.get(name, otherwise) if isinstance(given, Mapping) else given
 
 
 def _bounds_at(
     name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float
 ) -> Array:
     """Return bounds of normal forces at time t, (P,)."""
-    if not isinstance(given, Mapping):
-        return np.full(contacts.n_points, given)
     found = []
     for each in contacts.friction_contacts:
-        value = given.get(each.name, otherwise)
+        value = _bound_of(given, each.name, otherwise)
         if callable(value):
             value = as_positive(f"{name} at {each.name}", value(t), "N", allow_zero=True)
         found += [value] * len(each.point_names)
@@ -484,23 +550,25 @@ def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, 
 
 
 @lru_cache(maxsize=64)
-def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality:
-    """Return soft bounds of the normal forces as an inequality on λ."""
-    bounded = np.flatnonzero(limits.bounded_points(contacts))
+def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality | None:
+    """Return soft bounds of the normal forces as an inequality on λ, or None if there are none."""
+    has_minimum, has_maximum = limits.bounded_points(contacts)
+    if not np.any(has_minimum | has_maximum):
+        return None
     G = np.zeros((contacts.n_points, contacts.k))
     for i in range(contacts.n_points):
         at = contacts.point_force_indices[3 * i : 3 * i + 3]
         G[i, at] = contacts.normals[i]
-    rows = read_only(np.vstack([-G, G[bounded]]))
+    rows = read_only(np.vstack([-G[has_minimum], G[has_maximum]]))
 
     def coefficients(eom: EquationsOfMotion, t: float) -> Coefficients:
         """Return the rows and the bounds at time t."""
         least, largest = limits.normal_forces(contacts, t)
-        return rows, np.concatenate([-least, largest[bounded]])
+        return rows, np.concatenate([-least[has_minimum], largest[has_maximum]])
 
-    points = contacts.point_names
-    names = [f"smallest {point}" for point in points]
-    names += [f"largest {points[i]}" for i in bounded]
+    points = np.array(contacts.point_names)
+    names = [f"smallest {point}" for point in points[has_minimum]]
+    names += [f"largest {point}" for point in points[has_maximum]]
     weight = limits.normal_force_weight
     return LinearInequality("soft normal force", "forces", coefficients, names, weight)
 
@@ -588,7 +656,8 @@ def hard_maximum(contacts: Contacts, limits: Limits) -> npt.NDArray[np.bool_]:
     ndarray of bool, shape (P,)
         True for points with a hard maximum.
     """
-    return limits.bounded_points(contacts) & (limits.normal_force_weight is None)
+    has_maximum: npt.NDArray[np.bool_] = limits.bounded_points(contacts)[1]
+    return has_maximum & (limits.normal_force_weight is None)
 
 
 @lru_cache(maxsize=64)

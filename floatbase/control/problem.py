@@ -32,7 +32,7 @@ from floatbase.dynamics import (
     resolved_constraint,
 )
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
-from floatbase.objectives import ForceTask, Task, TorqueTask
+from floatbase.objectives import CentreOfPressureTask, ForceTask, Task, TorqueTask
 from floatbase.qp import QP, ConstraintLabel, Solution, solve
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
@@ -57,7 +57,8 @@ class Problem(Value):
     tasks : sequence of Task, or sequence of sequences of Task
         Tasks, or levels of tasks with strict priorities, the highest first. A `ForceTask()` or a
         `TorqueTask()` of small weight is added, to the last level, if no task acts on forces, or
-        none on torques. The attribute is the list of all tasks.
+        none on torques. A `CentreOfPressureTask` does not count, since it leaves most forces open.
+        The attribute is the list of all tasks.
     limits : Limits
         Inequality constraints.
     modify_qp : callable, optional
@@ -112,6 +113,15 @@ class Problem(Value):
 
     def _label(self) -> str:
         return "the control problem"
+
+    @property
+    def levels(self) -> tuple[tuple[Task, ...], ...]:
+        """Tasks of each priority level; empty if the tasks are weighted."""
+        ends = np.cumsum(self.level_sizes)
+        return tuple(
+            tuple(self.tasks[end - size : end])
+            for end, size in zip(ends, self.level_sizes, strict=True)
+        )
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """Return the QP at a state and a time.
@@ -183,10 +193,7 @@ class Problem(Value):
             return [solve(self.qp(state, t), solver)]
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
-        ends = np.cumsum(self.level_sizes)
-        levels = [
-            self.tasks[end - size : end] for end, size in zip(ends, self.level_sizes, strict=True)
-        ]
+        levels = self.levels
         costs = [
             [(task.block, task.weight, residual_of(task, eom, t)) for task in level]
             for level in levels
@@ -390,8 +397,8 @@ def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
 def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
     """Return the tasks with small regularization tasks where they are missing, and level sizes.
 
-    A `ForceTask` or `TorqueTask` is added if no task acts on forces, or none on torques. There are
-    no level sizes if the tasks are not in levels.
+    A `ForceTask` or `TorqueTask` is added if no task determines the forces, or none the torques.
+    There are no level sizes if the tasks are not in levels.
     """
     if hasattr(tasks, "residual") or not isinstance(tasks, Sequence):
         raise InputError(
@@ -419,7 +426,10 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[
     missing = [
         kind()
         for kind in (ForceTask, TorqueTask)
-        if not any(task.block == kind.block for task in tasks)
+        if not any(
+            task.block == kind.block and not isinstance(task, CentreOfPressureTask)
+            for task in tasks
+        )
     ]
     return tuple(tasks + cast("list[Task]", missing)), sizes
 

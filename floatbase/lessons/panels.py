@@ -27,7 +27,7 @@ from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, reco
 from floatbase.simulation import Controller, LiveSimulation, Rollout, Simulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
-from floatbase.viewer.export.recording import planned_qdd_at, push_at
+from floatbase.viewer.export.recording import joint_limits_at, push_at
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.transport.notebook_events import receive_during_cells
 
@@ -290,7 +290,7 @@ def live_run(
             contacts=record.contacts,
             forces=record.measured[-1],
             push=push_at(record, -1, PUSH_DISPLAY_TIME),
-            qdd=planned_qdd_at(record, -1),
+            **joint_limits_at(record, -1),
         )
 
     options = {"push_memory": PUSH_DISPLAY_TIME} | options

@@ -132,9 +132,12 @@ def plot_optimum(qp: QP, box: Box = (-3.0, 3.0, -2.0, 3.0), axis: Axes | None = 
     return axis
 
 
-def _plot_arrow(axis: Axes, start: Array, tip: Array, colour: str, width: float) -> None:
+def _plot_arrow(
+    axis: Axes, start: Array, tip: Array, colour: tuple[float, float, float], width: float
+) -> None:
+    (x, y), (x0, y0) = tip.tolist(), start.tolist()
     axis.annotate(
-        "", tip, xytext=start, zorder=6,
+        "", (x, y), xytext=(x0, y0), zorder=6,
         arrowprops={
             "arrowstyle": "-|>", "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0,
         },

@@ -42,9 +42,9 @@ class CentreOfPressureTask(TargetTask):
     is fixed. Tasks for both conflict unless their targets satisfy this equation, as those of
     `floatbase.behaviours.LIPM` do.
 
-    The task leaves most of λ open. Add a `ForceTask` with a small weight, in particular with flat
-    feet. Otherwise the forces are not unique, and some control steps may fall back to the slower
-    reference backend.
+    The task leaves most of λ open. A flat foot, for example, has 12 force components at its four
+    corners, which produce only 6 components of a wrench. A controller therefore adds a small
+    `ForceTask` to this task.
     """
 
     position: Target

@@ -26,7 +26,7 @@ from floatbase.robots import Robot
 from floatbase.simulation import ACTIVE_STATUSES, LiveSimulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Picture, status_message
 from floatbase.viewer.export.display_mode import MIMEBUNDLES, display_mode
-from floatbase.viewer.export.recording import planned_qdd_at, push_at
+from floatbase.viewer.export.recording import joint_limits_at, push_at
 
 _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
@@ -423,7 +423,7 @@ class Playground:
             )
             self.view.show(
                 record.final, record.contacts, record.measured[-1], _last_planned_forces(record),
-                push=push_at(record, -1, PUSH_DISPLAY_TIME), qdd=planned_qdd_at(record, -1),
+                push=push_at(record, -1, PUSH_DISPLAY_TIME), **joint_limits_at(record, -1),
                 cones=self.shown_terms["cones"], arrows=self.shown_terms["forces"], support=True,
                 extra=self._term_arrows(record),
                 title="\n".join(filter(None, [headline, self.outcome, session.refusal])),

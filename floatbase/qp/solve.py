@@ -92,8 +92,9 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     """
     assert qp.penalties is not None
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
-        hard = solve(replace(qp, penalties=None), solver)
-        if np.all(hard.inequality_multipliers <= qp.penalties):
+        # without a search for the names of a conflict, which soft rows may resolve
+        hard = _BACK_ENDS[solver](replace(qp, penalties=None))
+        if hard is not None and np.all(hard.inequality_multipliers <= qp.penalties):
             return replace(hard, qp=qp)
     found = solve(qp.with_slacks(), solver)
     multipliers = found.inequality_multipliers[: len(qp.G)]

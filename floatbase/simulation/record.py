@@ -19,6 +19,7 @@ from floatbase._validation import (
     frozen,
     read_only,
 )
+from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
@@ -81,6 +82,8 @@ class Rollout(Value):
         The controller's targets, as in `Command.targets`: for each task, its target and the
         derivatives of it. Rows in which the controller had no such task have NaN, as does the end
         of rows with fewer contact forces.
+    joint_limits : JointLimits or None
+        Joint limits in the last plan, as in `Command.joint_limits`.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -101,6 +104,7 @@ class Rollout(Value):
     controller_off_time: float | None = None
     planned_qdd: Array | None = None
     targets: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
+    joint_limits: JointLimits | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -280,6 +284,7 @@ class Recorder:
         )
         self._tau_desired = np.empty((ticks, d))
         self._planned_qdd = np.full((ticks, sim.robot.nv), np.nan)
+        self._joint_limits: JointLimits | None = None
         # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
@@ -331,6 +336,7 @@ class Recorder:
         planned: Array | None,
         planned_qdd: Array | None = None,
         targets: tuple[Array, Mapping[str, slice]] | None = None,
+        joint_limits: JointLimits | None = None,
     ) -> None:
         """Complete a row.
 
@@ -346,12 +352,14 @@ class Recorder:
             Accelerations that the controller planned [m/s² or rad/s²].
         targets : (ndarray, mapping of str to slice), optional
             The controller's targets, as `Command.target_values` and `Command.target_entries`.
+        joint_limits : JointLimits or None
+            Limits of these accelerations.
         """
         n = self._n
         if targets is not None:
             self._targets.append((n, *targets))
         if planned_qdd is not None:
-            self._planned_qdd[n] = planned_qdd
+            self._planned_qdd[n], self._joint_limits = planned_qdd, joint_limits
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
@@ -426,6 +434,7 @@ class Recorder:
             controller_off_time=controller_off_time,
             planned_qdd=self._complete_rows(self._planned_qdd),
             targets=MappingProxyType(self._targets_by_name()),
+            joint_limits=self._joint_limits,
         )
 
     def _targets_by_name(self) -> dict[str, Array]:

@@ -20,6 +20,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
+from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning
 from floatbase.simulation.after_fall import record_settling
@@ -187,8 +188,10 @@ def rollout(
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
             accelerations = _planned_accelerations(sim, command)
+            limits = getattr(command, "joint_limits", None)
+            known = limits if isinstance(limits, JointLimits) else None
             targets = _targets(command)
-            record.complete_tick(desired, stance, planned, accelerations, targets)
+            record.complete_tick(desired, stance, planned, accelerations, targets, known)
             if sim.diverged:
                 return record.to_rollout(pushes, "diverged")
             if sim.fallen:

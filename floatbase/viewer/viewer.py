@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -413,7 +413,8 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         **options
-            As for `show`. The rollout itself determines `push`, `swing_feet` and `qdd`.
+            As for `show`. The rollout itself determines `push`, `swing_feet` and, unless they are
+            given, `joint_limits` and `qdd`.
 
         Returns
         -------
@@ -449,7 +450,7 @@ class Viewer(Controls, Output):
             chosen: PictureKeywords = {**options, "extra": overlay}
             chosen["push"] = recording.push_at(rollout, i)
             chosen["swing_feet"] = recording.swing_feet_at(rollout, i)
-            chosen["qdd"] = recording.planned_qdd_at(rollout, i)
+            chosen = cast(PictureKeywords, recording.joint_limits_at(rollout, i) | dict(chosen))
             pictures.append(
                 self.painter.picture(
                     state,

@@ -12,7 +12,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import JointLimits, LinearInequality
+from floatbase.control import JointLimits, Limits, LinearInequality
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
 
@@ -313,6 +313,51 @@ def test_limits_are_the_robots_by_default_and_can_be_off() -> None:
     assert not {name.kind for name in off.qp(robot.standing()).inequality_names} & {
         "upper position limit", "lower velocity limit"
     }  # fmt: skip
+
+
+def test_braking_follows_the_torque_limits_of_the_controller() -> None:
+    robot = judges.load("go2")
+    weak = judges.controller_of("go2", torque_limits=2.0).limits.joint_limits
+    assert np.array_equal(weak.braking, JointLimits.of(robot, torque_limits=2.0).braking)
+    posture = np.array(robot.posture)
+    inertia = pin.crba(robot.model, robot.model.createData(), posture).diagonal()[6:]
+    assert np.allclose(weak.braking, np.minimum(0.5 * 2.0 / inertia, 300.0))
+    limits = Limits.of(robot, torque_limits=2.0, facets=8)
+    assert limits.facets == 8 and np.array_equal(limits.joint_limits.braking, weak.braking)
+    assert np.array_equal(limits.torque_limits, np.full(robot.d, 2.0))
+    assert Limits.of(robot, joint_limits=None).joint_limits is None
+    with raises(InputError, "joint_limits", "Limits.of"):
+        Limits(robot.torque_limits, joint_limits="robot")
+    with raises(InputError, "facet"):
+        Limits.of(robot, facet=8)
+
+
+def test_soft_bounds_have_rows_only_where_there_are_bounds() -> None:
+    robot = judges.load("go2")
+    for bounds, rows in (
+        ({}, set()),
+        ({"min_normal_force": {"FL_foot": 0.0, "FR_foot": 5.0}}, {"smallest FR_foot"}),
+        ({"max_normal_force": {"FL_foot": 0.0}}, {"largest FL_foot"}),
+        ({"min_normal_force": {"RL_foot": lambda t: 0.0}}, {"smallest RL_foot"}),
+    ):
+        both = judges.pair(robot, judges.stance(robot), normal_force_weight=10.0, **bounds)
+        qp = both[0].qp(robot.standing())
+        names = {name for name in qp.inequality_names if name.startswith("soft normal force")}
+        assert names == {f"soft normal force {row}" for row in rows}
+        assert judges.difference(*both, robot.standing()) < judges.agreement(robot)
+
+
+def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind() -> None:
+    """Rows of weight 1e8 that are violated only during the search leave their penalty behind."""
+    robot = judges.load("go2")
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        G, h = rng.normal(size=(6, robot.nv)), rng.normal(0.0, 20.0, 6)
+        rows = LinearInequality("heavy", "qdd", (G, h), weight=1e8)
+        light = LinearInequality("light", "qdd", (-G[:3], 5.0 - h[:3]), weight=1.0)
+        both = judges.pair(robot, judges.stance(robot), inequalities=[rows, light])
+        state = robot.random_state(int(rng.integers(1000)), 0.1)
+        assert judges.difference(*both, state) < 1e-6 * robot.torque_limits.max()
 
 
 def test_joint_limits_that_do_not_fit_are_refused() -> None:

@@ -112,6 +112,11 @@ def test_levels_are_answered_by_the_reference_backend() -> None:
     assert np.array_equal(command.solution.qp.b, controller.qp(state).b)
     flat = controller.replace(tasks=fb.standing_tasks(state))
     assert flat.backend == "compiled" and flat.problem.level_sizes == ()
+    assert [len(level) for level in controller.tasks] == [1, 1, 3]
+    longer = controller.replace(tasks=[*controller.tasks, [fb.TorqueTask(weight=1e-3)]])
+    assert longer.problem.level_sizes == (1, 1, 3, 1)
+    with raises(InputError, "level"):
+        controller.replace(tasks=[*controller.tasks, fb.TorqueTask()])
     lifted = controller.replace(contacts=contacts.only(*contacts.names[1:]))
     assert lifted.problem.level_sizes == (1, 1, 3)
     lifted(state.q, state.v)

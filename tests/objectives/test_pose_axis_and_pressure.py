@@ -144,7 +144,6 @@ def test_both_backends_agree_on_them() -> None:
             RelativePoseTask(*pair, lambda t, pose=pose: (pose, np.full(6, 0.1 * t), np.ones(6))),
             AxisTask("base", UP, [0.0, 0.1, 1.0]),
             CentreOfPressureTask(at.com * [1.0, 1.0, 0.0] + [0.01, 0.0, 0.0]),
-            fb.ForceTask(weight=1e-4),
         ]
         both = judges.pair(robot, contacts, tasks)
         for i, state in enumerate(judges.near_and_far(robot_name, 2)):

@@ -17,6 +17,7 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State, load
 from floatbase.viewer import Viewer
+from floatbase.viewer.export.recording import joint_limits_at
 from floatbase.viewer.scene.colours import ALARM, WARNING
 from floatbase.viewer.scene.threejs import colour_number
 
@@ -157,7 +158,23 @@ def test_a_rollout_has_the_planned_accelerations(
     torques = SimpleNamespace(tau=np.zeros(go2.d))
     run = fb.rollout(fb.Simulation(go2), lambda q, v, t: torques, 0.01)
     assert run.planned_qdd is not None and run.planned_qdd.shape == (len(run), go2.nv)
-    assert np.isnan(run.planned_qdd).all()
+    assert np.isnan(run.planned_qdd).all() and run.joint_limits is None
+
+
+def test_active_rings_follow_the_limits_of_the_controller(viewer: Viewer, go2: Robot) -> None:
+    standing, contacts = go2.standing(), fb.Contacts.points(go2)
+    tasks = [
+        fb.CoMTask(standing.com + [0.0, 0.0, 0.05], kp=400.0),
+        *fb.standing_tasks(standing)[1:],
+    ]
+    tight = JointLimits.of(go2, acceleration=np.full(go2.d, 1.0))
+    for limits in (tight, None):
+        controller = fb.WholeBodyController(go2, contacts, tasks, joint_limits=limits)
+        run = fb.rollout(fb.Simulation(go2), controller, 0.01)
+        assert run.joint_limits is limits
+        viewer.show(run.state(0), **joint_limits_at(run, 0))
+        drawn = set(rings(viewer.renderer.picture).values())
+        assert drawn == ({"active_limit"} if limits is not None else set())
 
 
 def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(

@@ -50,7 +50,6 @@ class ActiveSet(NamedTuple):
     W: Any  # (nb, nb), with W H Wᵀ = 1
     U: Any  # (nb, nb), W rowsᵀ = U, upper triangular in its first q columns
     weights: Any  # (nb,), largest value of its multiplier, inf if it is hard
-    soft_gradient: Any  # (nb,), gradient of the penalties of saturated rows
 
 
 @jit
@@ -129,7 +128,7 @@ def add_row(W, U, d, z, q):
 @jit
 def drop_row(active: ActiveSet, at, q):
     """Remove row `at` from the q active ones, and rotate W so that U stays upper triangular."""
-    indices, mu, bounds, rows, W, U, weights, _ = active
+    indices, mu, bounds, rows, W, U, weights = active
     for j in range(at, q - 1):
         indices[j], mu[j], bounds[j] = indices[j + 1], mu[j + 1], bounds[j + 1]
         weights[j] = weights[j + 1]
@@ -197,22 +196,29 @@ def step_directions(W, U, d, q, z, r):
 
 
 @jit
-def saturate(number, row, weight, limits: Inequalities, soft_gradient):
+def saturate(number, limits: Inequalities):
     """Make the penalty of a soft inequality, whose multiplier equals its weight, part of the cost.
 
     If its penalty already is part of the cost, its row has the opposite sign, and the penalty
-    leaves the cost. number, row: of that inequality, as in `ActiveSet`.
+    leaves the cost.
     """
-    for c in range(row.size):
-        soft_gradient[c] += weight * row[c]
     at = number - soft_rows_start(limits)
     limits.saturated[at] = 1.0 - limits.saturated[at]
 
 
 @jit
-def saturate_active(active: ActiveSet, at, limits: Inequalities):
-    """Do `saturate` for one of the active inequalities, which the caller drops."""
-    saturate(active.indices[at], active.rows[at], active.weights[at], limits, active.soft_gradient)
+def add_penalties(limits: Inequalities, space: Parametrisation, nv, row, grad):
+    """Add the gradient of the penalties of all saturated inequalities to grad. row: (nb,), memory.
+
+    A sum over the rows has no rounding errors of penalties that have left the cost.
+    """
+    start, k = soft_rows_start(limits), space.V.shape[0] - nv
+    for at in range(limits.saturated.size):
+        if limits.saturated[at] > 0.0:
+            row_in_beta(start + at, limits, space, nv, row)  # with the opposite sign
+            weight = weight_of_row(start + at, limits, nv, k)
+            for c in range(row.size):
+                grad[c] -= weight * row[c]
 
 
 @jit
@@ -256,7 +262,7 @@ def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: I
             for j in range(n):
                 beta[j] += step * z[j]
         if has_soft and multiplier >= weight:
-            saturate(number, row, weight, limits, active.soft_gradient)
+            saturate(number, limits)
             return q
         if full_step <= partial_step:
             add_row(W, U, d, z, q)
@@ -266,7 +272,7 @@ def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: I
                 active.rows[q, j] = row[j]
             return q + 1
         if saturates:
-            saturate_active(active, blocking, limits)
+            saturate(active.indices[blocking], limits)
         drop_row(active, blocking, q)
         q -= 1
     return INACCURATE
@@ -361,10 +367,9 @@ def dual_search(
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
     forces, tau = take_vector(workspace, k), take_vector(workspace, d)
     qdd = take_vector(workspace, nv)
-    weights, soft_gradient = take_vector(workspace, nb), take_vector(workspace, nb)
-    active = ActiveSet(indices, mu, bounds, rows, W, U, weights, soft_gradient)
+    weights = take_vector(workspace, nb)
+    active = ActiveSet(indices, mu, bounds, rows, W, U, weights)
     has_soft = limits.saturated.size > 0
-    clear(soft_gradient)
     clear(limits.saturated)
     hessian(cost, H, grad)
     if not cholesky(H, L):
@@ -378,8 +383,7 @@ def dual_search(
                 break
             gradient(cost, beta, grad)
             if has_soft:
-                for i in range(nb):
-                    grad[i] += soft_gradient[i]
+                add_penalties(limits, space, nv, row, grad)
             moved = newton_step(q, grad, L, step, z, r, active, beta)
             refined = (
                 refined + 1 if moved > STEP_TOLERANCE * (1.0 + largest(beta)) else NEWTON_STEPS
@@ -388,7 +392,7 @@ def dual_search(
             if wrong < 0 and has_soft:
                 wrong = saturated_row(active, q)
                 if wrong >= 0:
-                    saturate_active(active, wrong, limits)
+                    saturate(indices[wrong], limits)
             if wrong >= 0:
                 drop_row(active, wrong, q)
                 q, refined = q - 1, 0

@@ -229,9 +229,15 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
 def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau, qdd):
     """Return the number of a row of (27)(28) that β (nb,) violates, or -1.
 
-    forces (k,), tau (d,), qdd (nv,): memory. Torques cost more and are computed only if all forces
-    are feasible. Rows that few problems have come last.
+    forces (k,), tau (d,), qdd (nv,): memory. Joint accelerations come first: while they are not
+    feasible, forces and torques may violate rows that the optimum satisfies, and the search would
+    add these rows and drop them again. Torques cost more than forces and are computed only if all
+    forces are feasible. Rows that few problems have come last.
     """
+    if limits.has_joint_limits:
+        number = violated_joint_row(limits, space, beta, qdd)
+        if number >= 0:
+            return number
     forces_of(space, beta, forces)
     found = violated_force_row(limits, forces)
     if found >= 0:
@@ -242,8 +248,6 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
         excess = abs(tau[j]) - limits.torque_limits[j]
         if excess > worst:
             worst, found = excess, n_force_rows + (j if tau[j] > 0.0 else tau.size + j)
-    if found < 0 and limits.has_joint_limits:
-        found = violated_joint_row(limits, space, beta, qdd)
     if found < 0 and limits.has_optional:
         return violated_optional_row(limits, space, beta, forces, tau, qdd)
     return found

@@ -85,7 +85,7 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
     cost = (3 * n_tasks + n_user_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
-    search = (n + 1) ** 2 + 4 * n * n + 9 * n + k + 3 * d + nv
+    search = (n + 1) ** 2 + 4 * n * n + 8 * n + k + 3 * d + nv
     return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
 
 

@@ -281,8 +281,8 @@ def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
-def planned_qdd_at(rollout: Rollout, row: int) -> Array | None:
-    """Find the accelerations that the controller planned at a row of a rollout.
+def joint_limits_at(rollout: Rollout, row: int) -> dict[str, Any]:
+    """Return the options that draw the joint limits of the controller at a row of a rollout.
 
     Parameters
     ----------
@@ -293,12 +293,15 @@ def planned_qdd_at(rollout: Rollout, row: int) -> Array | None:
 
     Returns
     -------
-    ndarray, shape (nv,), or None
-        Accelerations as in `Command.qdd` [m/s² or rad/s²]; None without a plan.
+    dict
+        Options `joint_limits` and `qdd` of a picture. No option if the controller had no joint
+        limits or no plan; the picture then shows how near the limits of the URDF are.
     """
-    rows = as_rollout(rollout).planned_qdd
-    planned = None if rows is None else rows[as_integer("row", row, -len(rows), len(rows) - 1)]
-    return planned if planned is not None and np.isfinite(planned).all() else None
+    limits, rows = as_rollout(rollout).joint_limits, rollout.planned_qdd
+    if limits is None or rows is None:
+        return {}
+    planned = rows[as_integer("row", row, -len(rows), len(rows) - 1)]
+    return {"joint_limits": limits, "qdd": planned} if np.isfinite(planned).all() else {}
 
 
 def _item_histories(pictures: list[Picture]) -> dict[str, _ItemHistory]:

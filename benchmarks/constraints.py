@@ -1,0 +1,564 @@
+"""Compare controllers with QPs that are written from Pinocchio's quantities.
+
+    python benchmarks/constraints.py                      500 problems of each kind on five robots
+                                                          -> benchmarks/constraints.md
+    python benchmarks/constraints.py --problems 20 --kinds "joint limits" priorities
+                                                          fewer problems or kinds, printed only
+
+Each problem has a random state, random targets and, if its kind is not a task, random limits. Both
+backends solve it. An independent QP decides whether their torques and verdicts are right: M and h
+come from Pinocchio, the rows of tasks from finite differences of Pinocchio's kinematics, bounds of
+joint accelerations from a bisection, the support polygon from Qhull. Clarabel solves the QP, and
+linear equations of its active rows give the last digits. Strict priorities are a sequence of such
+QPs. Only the contact Jacobians are those of the package, which the tests compare with MuJoCo.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import clarabel
+import numpy as np
+import pinocchio as pin
+from scipy.sparse import csc_matrix
+from scipy.spatial import ConvexHull
+
+import floatbase as fb
+from floatbase.control import JointLimits, LinearInequality, capture_point_inequality
+from floatbase.errors import InfeasibleError
+from floatbase.objectives import (
+    AngularMomentumTask,
+    AxisTask,
+    CentreOfPressureTask,
+    RelativePoseTask,
+)
+
+ROBOTS = ("go2", "solo12", "hyq", "anymal_kinova", "talos")
+MU, STEP = 0.7, 2e-3  # friction; s, of finite differences
+TIGHT, TOLERANCE = 1e-11, 1e-9  # Clarabel's; of rows that levels of priorities share
+STRICT = 1e-7  # fraction of the slope: smaller multipliers may be rounding
+REQUIRED = 1e-6  # fraction of the strongest motor's limit
+Array = np.ndarray
+Row = tuple[Array, Array]  # A and b of A x - b, or G and h of G x <= h
+
+
+# tasks by finite differences ----------------------------------------------------------------------
+
+
+class Kinematics:
+    """Pinocchio's kinematics along q(t) = q ⊕ (v t + q̈ t² / 2)."""
+
+    def __init__(self, state: fb.State):
+        self.robot, self.model = state.robot, state.robot.model
+        self.data, self.q, self.v = self.model.createData(), np.array(state.q), np.array(state.v)
+
+    def at(self, t: float, qdd: Array) -> tuple[Array, Array]:
+        """Return q and the velocity at t."""
+        q = pin.integrate(self.model, self.q, t * self.v + 0.5 * t * t * qdd)
+        return q, self.v + t * qdd
+
+    def pose(self, frame: str, q: Array) -> pin.SE3:
+        """Return the pose of a frame."""
+        pin.framesForwardKinematics(self.model, self.data, q)
+        return self.data.oMf[self.robot.frame_id(frame)].copy()
+
+    def com(self, q: Array) -> Array:
+        """Return the centre of mass."""
+        return pin.centerOfMass(self.model, self.data, q).copy()
+
+    def angular_momentum(self, q: Array, v: Array) -> Array:
+        """Return the angular momentum about the centre of mass, world axes."""
+        return pin.computeCentroidalMomentum(self.model, self.data, q, v).angular.copy()
+
+    def derivatives(self, moved: Callable[[Array], Array], qdd: Array) -> tuple[Array, Array]:
+        """Return first and second derivative of a displacement along the path, extrapolated."""
+        found = []
+        for h in (STEP, 0.5 * STEP):
+            ahead, behind = (moved(self.at(t, qdd)[0]) for t in (h, -h))
+            found.append(((ahead - behind) / (2.0 * h), (ahead + behind) / h**2))
+        return tuple((4.0 * fine - coarse) / 3.0 for coarse, fine in zip(*found, strict=True))
+
+    def rate(self, value: Callable[[Array, Array], Array], qdd: Array) -> Array:
+        """Return the derivative of a function of q and v along the path, extrapolated."""
+        coarse, fine = (
+            (value(*self.at(h, qdd)) - value(*self.at(-h, qdd))) / (2.0 * h)
+            for h in (STEP, 0.5 * STEP)
+        )
+        return (4.0 * fine - coarse) / 3.0
+
+
+def angle_between(R: Array, target: Array) -> Array:
+    """Return the rotation vector from one orientation to another."""
+    return pin.log3(R @ target.T)
+
+
+def acceleration(at: Kinematics, task: Any, qdd: Array) -> Array:
+    """Return the residual of a task on q̈, by finite differences."""
+    if isinstance(task, AngularMomentumTask):
+        momentum = at.angular_momentum(at.q, at.v)
+        return at.rate(at.angular_momentum, qdd) + task.kd * (momentum - task.momentum)
+    if isinstance(task, AxisTask):
+        axis, d = np.array(task.axis), np.array(task.direction)
+        axis, d = axis / np.linalg.norm(axis), d / np.linalg.norm(d)
+        n = at.pose(task.frame, at.q).rotation @ axis
+        speed, change = at.derivatives(lambda q: at.pose(task.frame, q).rotation @ axis - n, qdd)
+        e = np.cross(d, n)
+        e *= np.arctan2(np.linalg.norm(e), d @ n) / np.linalg.norm(e)
+        feedback = task.kp * e + task.kd * np.cross(n, speed)
+        return np.cross(n, change) + feedback - n * (n @ feedback)
+    if isinstance(task, fb.PostureTask):
+        error = pin.difference(at.model, np.array(task.q), at.q)[6:]
+        return qdd[6:] + task.kp * error + task.kd * at.v[6:]
+    moved, error = displacement(at, task)
+    speed, change = at.derivatives(moved, qdd)
+    return change + task.kp * error + task.kd * speed
+
+
+def displacement(at: Kinematics, task: Any) -> tuple[Callable[[Array], Array], Array]:
+    """Return the displacement from the state as a function of q, and the error in the state."""
+    if isinstance(task, fb.CoMTask):
+        start = at.com(at.q)
+        return lambda q: at.com(q) - start, start - task.position
+    if isinstance(task, RelativePoseTask):
+
+        def pose(q: Array) -> pin.SE3:
+            return at.pose(task.reference, q).actInv(at.pose(task.frame, q))
+
+        first, goal = pose(at.q), np.array(task.pose)
+        error = np.r_[first.translation - goal[:3, 3], angle_between(first.rotation, goal[:3, :3])]
+
+        def moved(q: Array) -> Array:
+            now = pose(q)
+            return np.r_[
+                now.translation - first.translation, angle_between(now.rotation, first.rotation)
+            ]
+
+        return moved, error
+    first = at.pose(task.frame, at.q)
+    if isinstance(task, fb.OrientationTask):
+        error = angle_between(first.rotation, np.array(task.rotation))
+        return lambda q: angle_between(at.pose(task.frame, q).rotation, first.rotation), error
+    start = first.translation
+    return lambda q: at.pose(task.frame, q).translation - start, start - task.position
+
+
+def residual(state: fb.State, eom: Any, task: Any) -> Row:
+    """Return A and b of the residual A y + b of a task on its block y of (q̈, τ, λ)."""
+    if task.block == "tau":
+        return np.eye(state.robot.d), np.zeros(state.robot.d)
+    if isinstance(task, CentreOfPressureTask):
+        arms = eom.contacts.positions(state) - task.position
+        moment = np.hstack([pin.skew(arm)[:2] for arm in arms])
+        return moment, np.zeros(2)
+    if task.block == "forces":
+        return np.eye(eom.k), np.zeros(eom.k)
+    at, zero = Kinematics(state), np.zeros(state.robot.nv)
+    b = acceleration(at, task, zero)
+    columns = [acceleration(at, task, unit) - b for unit in np.eye(state.robot.nv)]
+    return np.column_stack(columns), b
+
+
+# the independent QP -------------------------------------------------------------------------------
+
+
+@dataclass
+class Independent:
+    """The QP of one problem in x = (q̈, τ, λ, violations)."""
+
+    state: fb.State
+    contacts: fb.Contacts
+    torque_limits: Array
+    inequalities: list[tuple[slice, Row, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        robot, k = self.state.robot, self.contacts.k
+        nv, d = robot.nv, robot.d
+        self.n = nv + d + k
+        self.blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d)}
+        self.blocks["forces"] = slice(nv + d, self.n)
+        self.eom = fb.equations_of_motion(self.state, self.contacts)
+        model, data = robot.model, robot.model.createData()
+        q, v = np.array(self.state.q), np.array(self.state.v)
+        M = np.triu(pin.crba(model, data, q))
+        M += np.triu(M, 1).T
+        h = pin.nonLinearEffects(model, data, q, v)
+        S = np.vstack([np.zeros((nv - d, d)), np.eye(d)])
+        A, b = self.eom.A, self.eom.b
+        self.A = np.block([[M, -S, -self.eom.J.T], [A, np.zeros((len(A), d + k))]])
+        self.b = np.r_[-h, b]
+        facets, at = np.zeros((4 * k // 3, k)), MU / np.sqrt(2.0)
+        for i in range(k // 3):
+            facets[4 * i : 4 * i + 4, 3 * i : 3 * i + 3] = [
+                [1, 0, -at], [0, 1, -at], [-1, 0, -at], [0, -1, -at],
+            ]  # fmt: skip
+        self.add("forces", facets, np.zeros(len(facets)))
+        self.add("tau", np.vstack([np.eye(d), -np.eye(d)]), np.tile(self.torque_limits, 2))
+
+    def add(self, block: str, G: Array, h: Array, weight: float = np.inf) -> None:
+        """Add inequalities on a block, hard or with the weight of their violation."""
+        self.inequalities.append((self.blocks[block], (G, h), weight))
+
+    def cost(self, tasks: Iterable[Any]) -> tuple[Array, Array, list[Row]]:
+        """Return H and g of a sum of tasks, and the rows of the tasks in x."""
+        H, g, rows = np.zeros((self.n, self.n)), np.zeros(self.n), []
+        for task in tasks:
+            A, b = residual(self.state, self.eom, task)
+            part = np.zeros((len(A), self.n))
+            part[:, self.blocks[task.block]] = A
+            H, g = H + task.weight * part.T @ part, g + task.weight * part.T @ b
+            rows.append((part, b))
+        return H, g, rows
+
+    def solve(self, levels: Sequence[Sequence[Any]]) -> Array | None:
+        """Return x of the last of several levels, or None if there is none."""
+        G = np.zeros((sum(len(h) for _, (_, h), _ in self.inequalities), self.n))
+        h, weights, row = np.zeros(len(G)), np.zeros(len(G)), 0
+        for block, (part, bound), weight in self.inequalities:
+            G[row : row + len(part), block], h[row : row + len(part)] = part, bound
+            weights[row : row + len(part)] = weight
+            row += len(part)
+        soft = np.flatnonzero(np.isfinite(weights))
+        E = np.zeros((len(G), len(soft)))
+        E[soft, np.arange(len(soft))] = -1.0
+        G = np.block([[G, E], [np.zeros((len(soft), self.n)), -np.eye(len(soft))]])
+        h = np.r_[h, np.zeros(len(soft))]
+        A, b = np.pad(self.A, ((0, 0), (0, len(soft)))), self.b
+        x = None
+        for i, level in enumerate(levels):
+            H, g, rows = self.cost(level)
+            H, g = np.pad(H, (0, len(soft))), np.r_[g, weights[soft] if i == 0 else 0.0 * soft]
+            found = minimum(H, g, A, b, G, h)
+            if found is None:
+                return None
+            x, strict = found
+            for part, _ in rows:  # later levels keep what this one reached
+                A = np.vstack([A, np.pad(part, ((0, 0), (0, len(soft))))])
+                b = np.r_[b, part @ x[: self.n]]
+            # a row with a positive multiplier is active at every optimum of the level
+            A, b = np.vstack([A, G[strict]]), np.r_[b, G[strict] @ x]
+            G, h = G[~strict], np.maximum(h, G @ x + TOLERANCE)[~strict]
+        return None if x is None else x[: self.n]
+
+
+def minimum(
+    H: Array, g: Array, A: Array, b: Array, G: Array, h: Array
+) -> tuple[Array, Array] | None:
+    """Solve a QP with Clarabel and recover the last digits from its active rows.
+
+    Returns x and which rows have a positive multiplier, or None if there is no solution.
+    """
+    U, s, Vt = np.linalg.svd(A, full_matrices=True)
+    rank = int(np.sum(s > 1e-9 * s[0]))
+    base, Z = Vt[:rank].T @ ((U[:, :rank].T @ b) / s[:rank]), Vt[rank:].T
+    P, slope, rows, bounds = Z.T @ H @ Z, Z.T @ (H @ base + g), G @ Z, h - G @ base
+    lengths = np.maximum(np.linalg.norm(rows, axis=1), 1e-12)
+    rows, bounds = rows / lengths[:, None], bounds / lengths
+    if not len(P):  # the equalities leave no freedom
+        return base, np.zeros(len(rows), dtype=bool)
+    scale = np.max(np.abs(P))
+    P, slope = P / scale, slope / scale
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.max_iter = False, 200
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TIGHT
+    cone = [clarabel.NonnegativeConeT(len(bounds))]
+    program = csc_matrix(np.triu(P)), slope, csc_matrix(rows), bounds, cone, settings
+    found = clarabel.DefaultSolver(*program).solve()
+    if "Infeasible" in str(found.status):
+        return None
+    active = np.array(found.z) > np.array(found.s)
+    for _ in range(50):  # at most one row leaves or joins at a time
+        K = np.block([[P, rows[active].T], [rows[active], np.zeros((active.sum(),) * 2)]])
+        exact = np.linalg.lstsq(K, np.r_[-slope, bounds[active]], rcond=1e-14)[0]
+        y, mu = exact[: len(P)], exact[len(P) :]
+        excess = np.where(active, 0.0, rows @ y - bounds)
+        if np.min(mu, initial=0.0) < -1e-10 * (1.0 + np.max(mu, initial=0.0)):
+            active[np.flatnonzero(active)[np.argmin(mu)]] = False
+        elif np.max(excess, initial=0.0) > 1e-9 * (1.0 + np.max(np.abs(y))):
+            active[np.argmax(excess)] = True
+        else:
+            z = np.zeros(len(rows))
+            z[active] = mu
+            return base + Z @ y, z > STRICT * np.max(np.abs(slope))
+    return base + Z @ np.array(found.x), np.array(found.z) > STRICT * np.max(np.abs(slope))
+
+
+# problems -----------------------------------------------------------------------------------------
+
+
+@dataclass
+class Problem:
+    """A random problem: what a controller is given, and the independent QP."""
+
+    state: fb.State
+    contacts: fb.Contacts
+    levels: list[list[Any]]
+    options: dict[str, Any]
+    independent: Independent
+
+    def controller(self, backend: str) -> fb.WholeBodyController:
+        """Return a controller of the problem."""
+        tasks = self.levels if len(self.levels) > 1 else self.levels[0]
+        return fb.WholeBodyController(
+            self.state.robot, self.contacts, tasks, backend=backend, **self.options
+        )
+
+
+def standing_tasks(robot: fb.Robot, rng: np.random.Generator) -> list[Any]:
+    """Return the tasks of a standing robot with random targets and regularization."""
+    standing = robot.standing()
+    return [
+        fb.CoMTask(standing.com + rng.normal(0.0, 0.1, 3)),
+        fb.OrientationTask("base", pin.exp3(rng.normal(0.0, 0.2, 3))),
+        fb.PostureTask(standing.q, weight=0.1),
+        fb.ForceTask(weight=1e-4),
+        fb.TorqueTask(weight=1e-4),
+    ]
+
+
+def task_of(kind: str, state: fb.State, rng: np.random.Generator) -> Any:
+    """Return a random task of a kind."""
+    robot = state.robot
+    one, other = rng.choice(robot.frames, 2, replace=False)
+    rotation = pin.exp3(rng.normal(0.0, 0.3, 3))
+    gains = {"kp": rng.uniform(1.0, 100.0), "kd": rng.uniform(1.0, 20.0)}
+    if kind == "orientation":
+        return fb.OrientationTask(one, rotation @ state.frame_pose(one).rotation, **gains)
+    if kind == "frame":
+        return fb.FrameTask(
+            one, state.frame_pose(one).translation + rng.normal(0.0, 0.1, 3), **gains
+        )
+    if kind == "posture":
+        q = pin.integrate(
+            robot.model, np.array(state.q), np.r_[np.zeros(6), rng.normal(0.0, 0.2, robot.d)]
+        )
+        return fb.PostureTask(q, **gains)
+    if kind == "relative pose":
+        pose = state.frame_pose(other).actInv(state.frame_pose(one))
+        goal = pin.SE3(rotation @ pose.rotation, pose.translation + rng.normal(0.0, 0.1, 3))
+        return RelativePoseTask(one, other, goal.homogeneous, **gains)
+    if kind == "axis":
+        axis = rng.normal(size=3)
+        direction = rotation @ state.frame_pose(one).rotation @ axis
+        return AxisTask(one, axis, direction, **gains)
+    if kind == "angular momentum":
+        return AngularMomentumTask(rng.normal(0.0, 1.0, 3), kd=gains["kd"])
+    if kind == "centre of pressure":
+        at = state.com * [1.0, 1.0, 0.0] + [*rng.normal(0.0, 0.02, 2), 0.0]
+        return CentreOfPressureTask(at)
+    return fb.CoMTask(state.com + rng.normal(0.0, 0.1, 3), **gains)
+
+
+TASKS = (
+    "centre of mass", "orientation", "frame", "posture", "relative pose", "axis",
+    "angular momentum", "centre of pressure",
+)  # fmt: skip
+
+
+def near_limits(robot: fb.Robot, rng: np.random.Generator) -> fb.State:
+    """Return a state in which some joints move towards limits that are near."""
+    limits, standing = JointLimits.of(robot), robot.standing()
+    q, v = np.array(standing.q), 0.05 * rng.choice([1.0, 10.0]) * rng.normal(size=robot.nv)
+    for j in rng.choice(np.flatnonzero(np.isfinite(limits.upper)), 3):
+        side, gap = rng.choice([-1.0, 1.0]), 0.02 * abs(rng.normal())
+        q[7 + j] = (limits.upper if side > 0.0 else limits.lower)[j] - side * gap
+        v[6 + j] = side * 2.0 * abs(rng.normal())
+    return fb.State(robot, q, v)
+
+
+def bisected(limits: JointLimits, q: float, v: float, j: int) -> tuple[float, float]:
+    """Return the bounds of a joint's acceleration, by bisection on what happens afterwards."""
+    dt, brake, bounds = limits.period, limits.braking[j], []
+    for side in (-1.0, 1.0):
+        x, speed = side * q, side * v
+        limit = limits.upper[j] if side > 0.0 else -limits.lower[j]
+
+        def stays(a: float, x: float = x, speed: float = speed, limit: float = limit) -> bool:
+            """Whether the joint stays below the limit if it brakes after one period."""
+            end, after = x + speed * dt + 0.5 * a * dt**2, speed + a * dt
+            turning = x - speed**2 / (2.0 * a) if a < 0.0 < speed and after < 0.0 else end
+            turning = turning if x < limit else end
+            return max(turning, end, end + max(after, 0.0) ** 2 / (2.0 * brake)) <= limit
+
+        beyond, within = 1e5, -2.0 * brake
+        for _ in range(80 if stays(within) else 0):
+            middle = 0.5 * (beyond + within)
+            beyond, within = (beyond, middle) if stays(middle) else (middle, within)
+        speed_bound = (limits.speeds[j] - speed) / dt
+        bounds.append(max(min(within, speed_bound), -2.0 * brake))
+    least, largest = -bounds[0], bounds[1]
+    middle = 0.5 * (least + largest)
+    return (middle, middle) if least > largest else (least, largest)
+
+
+def add_joint_limits(qp: Independent, limits: JointLimits) -> None:
+    """Add the bounds of all joints' accelerations to an independent QP."""
+    robot, state = qp.state.robot, qp.state
+    joints = np.flatnonzero(np.isfinite(limits.upper))
+    pairs = [bisected(limits, state.q[7 + j], state.v[6 + j], j) for j in joints]
+    least, largest = np.array(pairs).T
+    rows = np.eye(robot.nv)[6 + joints]
+    weight = np.inf if limits.weight is None else limits.weight
+    qp.add("qdd", np.vstack([rows, -rows]), np.r_[largest, -least], weight)
+
+
+def capture_point_rows(state: fb.State, contacts: fb.Contacts, horizon: float) -> Row:
+    """Return G and h of the capture point inside the support polygon after a horizon."""
+    model, data = state.robot.model, state.robot.model.createData()
+    q, v = np.array(state.q), np.array(state.v)
+    J = pin.jacobianCenterOfMass(model, data, q)[:2]
+    pin.centerOfMass(model, data, q, v, np.zeros(model.nv))
+    com, speed, drift = data.com[0], data.vcom[0][:2], data.acom[0][:2]
+    points = contacts.positions(state)
+    omega = np.sqrt(9.81 / (com[2] - points[:, 2].mean()))
+    gain = 0.5 * horizon**2 + horizon / omega
+    still = com[:2] + (horizon + 1.0 / omega) * speed
+    edges = ConvexHull(points[:, :2]).equations
+    normals, offsets = edges[:, :2], edges[:, 2]
+    return normals @ J, (-offsets - normals @ still) / gain - normals @ drift
+
+
+def problem_of(kind: str, robot: fb.Robot, seed: int) -> Problem:
+    """Return a random problem of a kind."""
+    rng = np.random.default_rng([seed, sum(map(ord, kind + robot.name))])
+    state = robot.random_state(seed, rng.choice([0.02, 0.1, 0.3]))
+    contacts = fb.Contacts.feet(robot, MU)
+    levels, options = [standing_tasks(robot, rng)], {}
+    options["joint_limits"] = limits = None
+    if kind == "joint limits":
+        state = near_limits(robot, rng)
+    if kind in ("joint limits", "priorities"):
+        options["joint_limits"] = limits = JointLimits.of(robot, weight=None)
+    if kind == "soft rows":
+        state = near_limits(robot, rng)
+        options["joint_limits"] = limits = JointLimits.of(robot, weight=10 ** rng.uniform(0, 3))
+    options["torque_limits"] = torques = rng.uniform(0.5, 1.0) * robot.torque_limits
+    qp = Independent(state, contacts, torques)
+    if limits is not None:
+        add_joint_limits(qp, limits)
+    if kind == "soft rows":
+        G, weight = rng.normal(size=(3, robot.nv)), 10 ** rng.uniform(-1, 3)
+        h = rng.normal(0.0, 10.0, 3)
+        options["inequalities"] = [LinearInequality("soft", "qdd", (G, h), weight=weight)]
+        qp.add("qdd", G, h, weight)
+    if kind == "capture point":
+        v = np.array(state.v)
+        v[:2] += rng.normal(0.0, 0.3, 2)
+        state = state.replace(v=v)
+        qp, horizon = Independent(state, contacts, torques), rng.uniform(0.01, 0.3)
+        options["inequalities"] = [capture_point_inequality(horizon=horizon)]
+        qp.add("qdd", *capture_point_rows(state, contacts, horizon))
+    if kind == "priorities":
+        com, base, *others = levels[0]
+        levels = [[base], [com], others]
+    if kind in TASKS:
+        levels[0].insert(0, task_of(kind, state, rng))
+    return Problem(state, contacts, levels, options, qp)
+
+
+KINDS = (*TASKS, "joint limits", "soft rows", "priorities", "capture point")
+
+
+@dataclass
+class Result:
+    """What the problems of one kind on one robot showed."""
+
+    kind: str
+    robot: str
+    problems: int = 0
+    active: int = 0  # with an active inequality
+    infeasible: int = 0
+    verdicts: int = 0  # that differ
+    residual: float = 0.0  # largest relative difference of a task from finite differences
+    differences: list[float] = field(default_factory=list)  # of torques, fraction of the limit
+
+    def row(self) -> str:
+        """Return the row of the table."""
+        worst = max(self.differences, default=0.0)
+        over = sum(x > REQUIRED for x in self.differences)
+        task = f"{self.residual:.0e}" if self.kind in TASKS else "–"
+        return (
+            f"| {self.kind} | {self.robot} | {self.problems} | {self.active} | {self.infeasible} "
+            f"| {self.verdicts} | {task} | {worst:.0e} | {over} |"
+        )
+
+
+def compare(kind: str, robot: fb.Robot, seeds: Iterable[int]) -> Result:
+    """Solve random problems with both backends and independently."""
+    result = Result(kind, robot.name)
+    backends = ("reference",) if kind == "priorities" else ("compiled", "reference")
+    largest = float(np.max(robot.torque_limits[np.isfinite(robot.torque_limits)]))
+    for seed in seeds:
+        problem = problem_of(kind, robot, seed)
+        x = problem.independent.solve(problem.levels)
+        result.problems += 1
+        result.infeasible += x is None
+        for i, backend in enumerate(backends):
+            try:
+                command = problem.controller(backend)(problem.state.q, problem.state.v)
+            except InfeasibleError:
+                result.verdicts += x is not None
+                continue
+            if x is None:
+                result.verdicts += 1
+                continue
+            result.active += i == 0 and bool(command.active)
+            tau = x[problem.independent.blocks["tau"]]
+            result.differences.append(float(np.max(np.abs(command.tau - tau))) / largest)
+        if kind in TASKS:
+            task = problem.levels[0][0]
+            ours, (A, b) = (
+                task.residual(problem.independent.eom),
+                residual(problem.state, problem.independent.eom, task),
+            )
+            for mine, theirs in ((ours.A, A), (ours.b, b)):
+                gap = np.max(np.abs(mine - theirs)) / (1.0 + np.max(np.abs(theirs)))
+                result.residual = max(result.residual, float(gap))
+    return result
+
+
+HEADER = (
+    "| kind | robot | problems | with active limits | infeasible | different verdicts | "
+    "task, largest difference | torques, largest difference | above 1e-6 |\n" + "|---" * 9 + "|"
+)
+
+
+def main() -> None:
+    """Parse the command line, compare, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--problems", type=int, default=500, help="problems of each kind")
+    parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
+    parser.add_argument("--seed", type=int, default=0, help="first seed")
+    arguments = parser.parse_args()
+    lines = [HEADER]
+    print(HEADER, flush=True)
+    each = -(-arguments.problems // len(ROBOTS))
+    for kind in arguments.kinds:
+        for name in ROBOTS:
+            seeds = range(arguments.seed, arguments.seed + each)
+            lines.append(compare(kind, fb.load(name), seeds).row())
+            print(lines[-1], flush=True)
+    if arguments.problems >= 500 and tuple(arguments.kinds) == KINDS:
+        packages = ", ".join(f"{name} {version(name)}" for name in ("pin", "clarabel", "numpy"))
+        page = [
+            "# Constraints and tasks against independent QPs", "",
+            f"`python benchmarks/constraints.py`, with {packages}.", "",
+            "Each problem has a random state and random targets. Both backends solve it (strict",
+            "priorities: the reference backend). The QP for comparison is written from Pinocchio's",
+            "quantities, with rows of tasks from finite differences, and solved by Clarabel.",
+            "Differences of torques are fractions of the strongest motor's limit.", "",
+            *lines, "",
+        ]  # fmt: skip
+        Path(__file__).with_suffix(".md").write_text("\n".join(page))
+
+
+if __name__ == "__main__":
+    main()
