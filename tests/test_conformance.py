@@ -43,7 +43,7 @@ from floatbase.playground import (
     Session,
     Settings,
 )
-from floatbase.simulation import LiveSimulation
+from floatbase.simulation import Latency, LiveSimulation, Observed
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
 
@@ -64,6 +64,7 @@ ACCEPTED = {
     "rounded(x=NaN)",
     "Problem(robot=of another robot)",
     "Problem(contacts=of another robot)",
+    "Robot.has_joints_of(other=of another robot)",
 }
 
 # for every kind of check
@@ -164,7 +165,10 @@ def right() -> dict[str, Any]:
         np.zeros(18),
         "qdd": np.zeros(18), "forces": forces, "run_plots.friction_used.forces": record().measured,
         "beta": np.zeros(space.dimension), "wrench": np.ones(6), "direction": np.ones(6),
-        "points": contacts.positions(state), "a": 10.0,
+        "points": contacts.positions(state), "xy": np.zeros(2), "Observer": lambda q, v, t: (q, v),
+        "Box.x": [0.0, 1.0], "Box.y": [0.0, 1.0], "Box.top": 0.1,
+        "surface": lambda xy: 0.0, "Observed": Observed(controller()), "Latency": Latency(),
+        "a": 10.0,
         "flat_feet.robot": talos,
         "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"),
         "force": np.array([0.1, 0.0, 1.0]),
@@ -225,7 +229,9 @@ LEFT_OUT = {
         "Cylinders.leakage_flow", "Cylinders.power", "Cylinders.pressure_rates",
         "Cylinders.pressure_decay",
         "Cylinders.opening_for",
-        "recording.as_rollout", "Ground.clearances", "with_thumbnail", "receive_during_cells",
+        "recording.as_rollout", "Ground.clearances", "Observed.observe",
+        *(f"{kind}.__call__" for kind in ("Observed", "SensorNoise", "Latency")),
+        "with_thumbnail", "receive_during_cells",
     ),
     "starts a page, with tests of its own": (
         "Playground", "playground", *(f"Playground.{method}" for method in (

@@ -32,6 +32,7 @@ WITHOUT_ARRAYS = (
     "drive",
     "Gait",
     "Problem",
+    "SensorNoise",
     "Residuals",
     "LinearInequality",
 )
@@ -41,7 +42,7 @@ NO_VALUES = {
     "a text": "ConstraintLabel",
     "memory of a thread or a window": "LiveSimulation SliderPanel Viewer",
     "an answer that rollout copies": "TorqueCommand",
-    "with a memory of what they do": "Stand StepPlan Walk",
+    "with a memory of what they do": "Latency Observed Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
     "shapes of a picture": "Item PictureOptions View",
     "made of functions of a lesson": "ConstantTorques MinimumCostController NumericJudge",

@@ -30,7 +30,7 @@ from floatbase.objectives import (
     torques_from_forces,
 )
 from floatbase.qp import active_set
-from floatbase.simulation import PushRecovery
+from floatbase.simulation import Box, PushRecovery, SensorNoise
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -81,6 +81,7 @@ def values() -> dict[str, Any]:
         "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
         "Rollout": record(),
         "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(),
+        "Box": Box([0.0, 1.0], [0.0, 1.0], 0.1), "SensorNoise": SensorNoise(robot),
         "Hydraulics": hydraulic.cylinders.hydraulics,
         "HydraulicState": hydraulic.state, "CylinderGeometry": pose,
         "PowerBalance": hydraulic.cylinders.power(

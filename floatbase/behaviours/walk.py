@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import inf
+from math import cos, inf, sin
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,14 +47,19 @@ from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import Adjustment, BodyPose
-from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.terrain import Terrain, level_place
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import Task
-from floatbase.robots import Robot, State
+from floatbase.robots import Foot, Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
+_LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
+_EDGE_MARGIN = 0.02  # m between a ball of a foot and an edge of a known ground
+_SOLE_MARGIN = 1.1  # size of a sole for which a known ground must be flat, relative to its own
+_EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
+_CIRCLE = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
@@ -127,8 +132,9 @@ class Walk:
         returns the path of the foot, such as a `Swing`, which is the default.
     ground : Terrain, optional
         The ground, if the walk knows it: an object with the methods height(xy) and normal(xy), such
-        as `fb.Ground`. Footholds then lie on it, swings clear its steps, and soles follow its
-        normal. Without it, the ground is the plane through the feet.
+        as `fb.Ground`. Footholds then lie on it and keep clear of its edges, swings clear its
+        steps, soles follow its normal, and the body of a robot with more than two feet leans with
+        the slope below the feet. Without it, the ground is the plane through the feet.
     tasks : sequence of Task, optional
         Further tasks, for example for a hand.
     height : float, optional
@@ -221,6 +227,11 @@ class Walk:
     def reach(self) -> float:
         """Largest distance of a foothold from the nominal one below the body [m]."""
         return self._options.reach
+
+    @property
+    def ground(self) -> Terrain | None:
+        """The ground, if the walk knows it."""
+        return self._options.ground
 
     @property
     def ramp(self) -> float:
@@ -487,7 +498,7 @@ class Walk:
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._active, self._planning_path = None, None
+        self._active, self._planning_path, self._lean = None, None, 0.0
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _prepare(self, gait: Gait) -> None:
@@ -519,7 +530,7 @@ class Walk:
         if active is not None:
             swinging, time = bool(active.plan.planned_swings), active.path.time
             self._desired = self._desired_motion(swinging, time)
-            self._active = active.changed(self._desired, self._pose)
+            self._active = active.changed(self._desired, self._leaning_pose)
 
     def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
         """Return the motion that the path approaches from t [s] on.
@@ -566,12 +577,31 @@ class Walk:
         finally:
             self._planning_path = None
         self._history.append(plan)
+        self._update_lean(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
         self._active = ActivePlan(
-            posture, plan, self._desired, self._pose, self._options.reach, controller.targets,
+            posture, plan, self._desired, self._leaning_pose, self._options.reach,
+            controller.targets,
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._change_after(t, plan)
+
+    @property
+    def _leaning_pose(self) -> BodyPose:
+        """The requested height and pitch, with the lean of the body on a known ground."""
+        return BodyPose(self._pose.height, self._pose.pitch + self._lean)
+
+    def _update_lean(self, plan: StepPlan) -> None:
+        """Turn the body towards the slope below the feet, if the ground is known.
+
+        On stairs, the legs of a long body that stays level become too short. A body on two feet
+        stays upright.
+        """
+        if self._options.ground is None or len(self._posture.nominal_feet) <= 2:
+            return
+        heading = np.array([cos(plan.path.yaw), sin(plan.path.yaw)])
+        uphill = float(np.arctan(plan.ground.slope @ heading))
+        self._lean += _LEAN_FRACTION * (-uphill - self._lean)
 
     def _change_after(self, t: float, plan: StepPlan) -> float:
         """Return until when a plan that is in use at t needs no change [s]."""
@@ -633,4 +663,15 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
     point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
     foothold: Array = point - centripetal / walk.omega**2
-    return foothold
+    if walk.ground is None:
+        return foothold
+    around = _outline(walk.robot.foot(foot), path.yaw)
+    return level_place(walk.ground, foothold, around, _EDGE_REACH)
+
+
+def _outline(foot: Foot, yaw: float) -> Array:
+    """Return points around the middle of a foot that must not be beyond an edge, (n, 2) [m]."""
+    if foot.corners is None:
+        return (2.0 * foot.radius + _EDGE_MARGIN) * _CIRCLE
+    c, s = cos(yaw), sin(yaw)
+    return np.asarray(_SOLE_MARGIN * foot.corners[:, :2] @ np.array([[c, s], [-s, c]]))

@@ -25,7 +25,7 @@ from floatbase._validation import (
     cross,
 )
 from floatbase.control import Command
-from floatbase.dynamics import Contacts, equations_of_motion
+from floatbase.dynamics import UP, Contacts, equations_of_motion
 from floatbase.errors import InputError, unknown_name
 from floatbase.playground.mismatch import ModelMismatch
 from floatbase.robots import Robot, State
@@ -99,6 +99,8 @@ class PerturbedSimulation(Simulation):
         self._base_wrench: Array = np.zeros(6)
         super().__init__(robot, ground, timestep)
         model = self.model
+        tops = np.tile(UP, (len(self.ground.boxes), 1))
+        self._ground_normals = np.concatenate([self.ground.normals, tops])  # one for each geom
         self._scratch = mujoco.MjData(model)  # for computations outside the step
         self._nominal = {
             name: np.array(getattr(model, name))
@@ -206,9 +208,9 @@ class PerturbedSimulation(Simulation):
         # update the contacts: the last step found them for the positions at its beginning
         mujoco.mj_fwdPosition(self.model, self.data)
         foot_geoms = set(self.foot_contacts.geoms.tolist())
-        for plane, ball in self.data.contact.geom.tolist():
+        for ground, ball in np.sort(self.data.contact.geom, axis=1).tolist():
             if ball in foot_geoms:
-                force = -self._perturbation.adhesion_force * self.ground.normals[plane]
+                force = -self._perturbation.adhesion_force * self._ground_normals[ground]
                 position, body = self.data.geom_xpos[ball], int(self.model.geom_bodyid[ball])
                 mujoco.mj_applyFT(
                     self.model, self.data, force, np.zeros(3), position, body, applied
@@ -235,7 +237,7 @@ class PerturbedSimulation(Simulation):
             rows, columns = np.nonzero(np.isin(foot_geoms, self.foot_contacts.geoms))
             points = np.argmax(foot_geoms[rows, columns, None] == self.foot_contacts.geoms, axis=1)
             forces[rows, points] -= (
-                self._perturbation.adhesion_force * self.ground.normals[planes[rows, columns]]
+                self._perturbation.adhesion_force * self._ground_normals[planes[rows, columns]]
             )
         return forces
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from threading import local
@@ -19,6 +19,7 @@ from floatbase._validation import (
     Array,
     Value,
     as_array,
+    as_instance,
     as_integer,
     as_positive,
     as_string,
@@ -34,6 +35,7 @@ from floatbase.robots._checks import (
     has_floating_base,
     joint_limits,
 )
+from floatbase.robots.inertia import add_point_mass, scale_masses
 
 if TYPE_CHECKING:
     from floatbase.robots.state import State
@@ -116,6 +118,8 @@ class Robot(Value):
         Purpose of the robot.
     sources : mapping of str to str
         Sources of the numbers that do not come from the URDF.
+    nominal : Robot or None
+        For a robot with a payload or scaled masses, the robot without them; otherwise None.
 
     Raises
     ------
@@ -138,6 +142,7 @@ class Robot(Value):
     posture: Array
     description: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
+    nominal: Robot | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "posture", as_posture(self.name, self.model, self.posture))
@@ -376,6 +381,8 @@ class Robot(Value):
         height: float | None = None,
         normal: npt.ArrayLike | None = None,
         offset: npt.ArrayLike | None = None,
+        surface: Callable[[Array], float] | None = None,
+        balanced: bool = False,
     ) -> State:
         """Return a state at rest with every foot on the ground.
 
@@ -391,6 +398,13 @@ class Robot(Value):
             several planes can form a valley.
         offset : float or array_like, shape (n,), optional
             Offsets of the planes normal · x = offset [m]; 0 by default.
+        surface : callable, optional
+            Height of the ground as a function of x and y, shape (2,), such as `Ground.height` [m].
+            Where it is above the planes, feet stand on it as on a level surface.
+        balanced : bool, optional
+            Whether the CoM keeps its horizontal distance from the middle of the feet, as on level
+            ground. Otherwise the base keeps its horizontal position, which moves the CoM on a
+            slope.
 
         Returns
         -------
@@ -406,8 +420,8 @@ class Robot(Value):
 
         return (
             self._standing
-            if height is normal is offset is None
-            else find_standing_state(self, height, normal, offset)
+            if height is normal is offset is None and surface is None and balanced is False
+            else find_standing_state(self, height, normal, offset, surface, balanced)
         )
 
     @cached_property
@@ -416,6 +430,96 @@ class Robot(Value):
         from floatbase.robots.standing import find_standing_state
 
         return find_standing_state(self)
+
+    def with_payload(
+        self, frame: str, mass: float, position: npt.ArrayLike = (0.0, 0.0, 0.0)
+    ) -> Robot:
+        """Return the robot with a point mass fixed to one of its links.
+
+        Give the robot with the payload to the simulation, to the controller or to both: a
+        controller made with the robot without it does not know about the payload.
+
+        Parameters
+        ----------
+        frame : str
+            Name of the frame that carries the payload; "base" is the base link.
+        mass : float
+            Mass of the payload [kg].
+        position : array_like, shape (3,), optional
+            Position of the payload in the frame [m]. By default, the frame's origin.
+
+        Returns
+        -------
+        Robot
+            A robot with the same joints, feet and limits.
+
+        Raises
+        ------
+        UnknownNameError
+            If the robot has no such frame.
+        InputError
+            If the mass is not positive, or if the frame is fixed to the ground.
+
+        Examples
+        --------
+        >>> import floatbase as fb
+        >>> robot = fb.load("go2")
+        >>> round(robot.with_payload("base", 3.0).mass - robot.mass, 6)
+        3.0
+        """
+        i, mass = self.frame_id(frame), as_positive("mass of the payload", mass, "kg")
+        point = as_array("position of the payload", position, (3,), "m")
+        if self.model.frames[i].parentJoint == 0:
+            raise InputError(
+                f"A payload at {frame!r} has no effect, because {self.name} is fixed to the ground "
+                f"there. Name a frame that moves."
+            )
+        return self._with_model(*add_point_mass(self.model, self.urdf, i, mass, point))
+
+    def with_scaled_mass(self, factor: float) -> Robot:
+        """Return the robot with all its masses and moments of inertia multiplied by a factor.
+
+        M and h of eq. (1) are then multiplied by the factor, because rotor inertias are scaled,
+        too. A controller made with such a robot overestimates or underestimates the actual mass.
+
+        Parameters
+        ----------
+        factor : float
+            The factor, positive [-].
+
+        Returns
+        -------
+        Robot
+            A robot with the same joints, feet and limits.
+
+        Raises
+        ------
+        InputError
+            If the factor is not positive.
+        """
+        return self._with_model(*scale_masses(self.model, self.urdf, as_positive("factor", factor)))
+
+    def _with_model(self, model: pin.Model, urdf: str) -> Robot:
+        """Return the robot with other masses."""
+        nominal = self if self.nominal is None else self.nominal
+        return replace(self, model=model, urdf=urdf, nominal=nominal)
+
+    def has_joints_of(self, other: Robot) -> bool:
+        """Return whether this robot and another one differ in their masses at most.
+
+        Parameters
+        ----------
+        other : Robot
+            The other robot.
+
+        Returns
+        -------
+        bool
+            Whether states and torques of one robot also fit the other one.
+        """
+        pair = self, as_instance("other", other, Robot, 'fb.load("go2")')
+        first, second = (robot if robot.nominal is None else robot.nominal for robot in pair)
+        return first == second
 
     def random_state(self, seed: int | np.random.Generator = 0, spread: float = 0.3) -> State:
         """Return a random state near the standing state; equal seeds give equal states.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_array, as_half_spaces
+from floatbase._validation import Array, as_array, as_bool, as_callable, as_half_spaces
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
 from floatbase.robots._checks import joint_limits
@@ -30,6 +31,8 @@ def find_standing_state(
     height: float | None = None,
     normal: npt.ArrayLike | None = None,
     offset: npt.ArrayLike | None = None,
+    surface: Callable[[Array], float] | None = None,
+    balanced: bool = False,
 ) -> State:
     """Find the standing state at rest nearest to `robot.posture`; see `Robot.standing`.
 
@@ -44,6 +47,10 @@ def find_standing_state(
         Normals of the ground planes in the world frame; they are normalized. By default up.
     offset : float or array_like, shape (n,), optional
         Offsets of the planes normal · x = offset [m]; 0 by default.
+    surface : callable, optional
+        Height of the ground as a function of x and y, shape (2,) [m].
+    balanced : bool, optional
+        Whether the CoM keeps its horizontal distance from the middle of the feet.
 
     Returns
     -------
@@ -59,18 +66,21 @@ def find_standing_state(
     normals, offsets = _UP if normal is None else normal, 0.0 if offset is None else offset
     planes = as_half_spaces("the ground", normals, offsets)
     height = None if height is None else float(as_array("height", height, (), "m"))
+    if surface is not None:
+        as_callable("surface", surface, "surface(xy)")
     if not robot.is_floating or not robot.feet:
         return posture
     q = posture.q.copy()
     q[2] = (
         height
         if height is not None
-        else q[2] - min(_clearance(posture, foot, planes)[0] for foot in robot.feet)
+        else q[2] - min(_clearance(posture, foot, planes, surface)[0] for foot in robot.feet)
     )
+    com_offset = _com_offset(robot.standing()) if as_bool("balanced", balanced) else None
     state, (joints, index, lower, upper) = State(robot, q), joint_limits(robot.model)
     v_index = np.array(robot.model.idx_vs)[joints]
     for _ in range(_MAX_STEPS):
-        error, J = _standing_residual(state, posture, height, planes)
+        error, J = _standing_residual(state, posture, height, planes, surface, com_offset)
         remaining = np.max(np.abs(error))
         if remaining < _TOLERANCE:
             return state
@@ -94,7 +104,7 @@ def find_standing_state(
         for joint, x in zip(joints[at_limit].tolist(), state.q[index[at_limit]], strict=True)
     ]
     reason = f", with these joints at their limits: {', '.join(limited)}" if limited else ""
-    advice = "Choose another height, or load the robot with another posture."
+    advice = "Choose another height or ground, or load the robot with another posture."
     raise InputError(
         f"{robot.name} cannot put all its feet on the ground{height_text}: an error of "
         f"{remaining:.2g} m remains{reason}. {advice}"
@@ -102,39 +112,69 @@ def find_standing_state(
 
 
 def _standing_residual(
-    state: State, posture: State, height: float | None, planes: _Planes
+    state: State,
+    posture: State,
+    height: float | None,
+    planes: _Planes,
+    surface: Callable[[Array], float] | None,
+    com_offset: Array | None,
 ) -> tuple[Array, Array]:
     """Return the residual that is zero when the robot stands, and its Jacobian.
 
-    Soles touch the ground and are parallel to it. The base has the orientation and the horizontal
-    position of the posture; its height follows from the feet or is given.
+    Soles touch the ground and are parallel to it. The base has the orientation of the posture, and
+    either the base has the horizontal position of the posture or the CoM has a given offset from
+    the feet, shape (2,) [m]. The height of the base follows from the feet or is given.
     """
-    errors, rows = [], []
+    errors, rows, middles = [], [], []
     for foot in state.robot.feet:
-        clearance, n = _clearance(state, foot, planes)
+        clearance, n = _clearance(state, foot, planes, surface)
         errors.append(clearance)
         R, J = state.frame_pose(foot.frame).rotation, state.frame_jacobian(foot.frame)
-        rows.append(n @ (J[:3] - pin.skew(R @ foot.middle) @ J[3:]))
+        J_middle = J[:3] - pin.skew(R @ foot.middle) @ J[3:]
+        middles.append(J_middle[:2])
+        rows.append(n @ J_middle)
         if foot.is_flat:
             errors += [*np.cross(n, R[:, 2])]
             rows += [*(-pin.skew(n) @ pin.skew(R[:, 2]) @ J[3:])]  # d(up)/dt = ω × up
     R, J_base = state.frame_pose("base").rotation, np.eye(6, state.robot.nv)
-    target = posture.q[:2] if height is None else [*posture.q[:2], height]
-    errors += [
-        *pin.log3(posture.frame_pose("base").rotation.T @ R),
-        *(state.q[: len(target)] - target),
-    ]
-    rows += [*J_base[3:], *(R @ J_base[:3])[: len(target)]]
+    errors += [*pin.log3(posture.frame_pose("base").rotation.T @ R)]
+    rows += [*J_base[3:]]
+    if com_offset is None:
+        errors += [*(state.q[:2] - posture.q[:2])]
+        rows += [*(R @ J_base[:3])[:2]]
+    else:
+        errors += [*(_com_offset(state) - com_offset)]
+        rows += [*(state.com_jacobian[:2] - np.mean(middles, axis=0))]
+    if height is not None:
+        errors.append(state.q[2] - height)
+        rows.append((R @ J_base[:3])[2])
     return np.array(errors), np.array(rows)
 
 
-def _clearance(state: State, foot: Foot, planes: _Planes) -> tuple[float, Array]:
-    """Return the clearance of a foot above the nearest plane [m], and the normal of that plane.
+def _com_offset(state: State) -> Array:
+    """Return the horizontal position of the CoM relative to the middle of the feet, (2,) [m]."""
+    feet = [state.point(foot.frame, foot.middle) for foot in state.robot.feet]
+    offset: Array = (state.com - np.mean(feet, axis=0))[:2]
+    return offset
 
-    The clearance is the distance of the foot's lowest point, negative below the plane. The normal
-    has shape (3,).
+
+def _clearance(
+    state: State, foot: Foot, planes: _Planes, surface: Callable[[Array], float] | None
+) -> tuple[float, Array]:
+    """Return the clearance of a foot above the ground [m], and the normal of the ground there.
+
+    The clearance is the distance of the foot's lowest point from the nearest plane, or its height
+    above the highest box below the foot, negative below it. The normal has shape (3,).
     """
     normals, offsets = planes
-    distances = normals @ state.point(foot.frame, foot.middle) - offsets
+    middle = state.point(foot.frame, foot.middle)
+    distances = normals @ middle - offsets
     nearest = int(np.argmin(distances))
+    if surface is not None:
+        corners = () if foot.corners is None else tuple(foot.corners)
+        under = [foot.middle, *corners]
+        tops = [surface(state.point(foot.frame, point)[:2]) for point in under]
+        above_surface = middle[2] - max(tops)
+        if above_surface < distances[nearest]:
+            return float(above_surface - foot.radius), np.array(_UP)
     return float(distances[nearest] - foot.radius), normals[nearest]

@@ -1,7 +1,8 @@
 """Simulation in MuJoCo, built from the same URDF and independent of the controller's code."""
 
-from floatbase.simulation.build import Ground
+from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
+from floatbase.simulation.observed import Latency, Observed, Observer, SensorNoise
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
@@ -13,12 +14,17 @@ from floatbase.simulation.sweep import sweep
 __all__ = [
     "ACTIVE_STATUSES",
     "Actuators",
+    "Box",
     "Controller",
     "Ground",
+    "Latency",
     "LiveSimulation",
+    "Observed",
+    "Observer",
     "Push",
     "PushRecovery",
     "Rollout",
+    "SensorNoise",
     "Simulation",
     "push_recovery",
     "read_sweep",

@@ -1,25 +1,23 @@
 """MuJoCo models built from a robot's URDF, with ground, feet and torque motors.
 
-Balls at the feet and convex hulls of the links can collide with the planes of the ground. There are
-no other collisions. Links that are welded together become one body with their combined inertia.
+Balls at the feet and convex hulls of the links can collide with the ground. There are no other
+collisions. Links that are welded together become one body with their combined inertia.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, Value, as_half_spaces, as_positive, checked, read_only
-from floatbase.dynamics import UP, Contacts
+from floatbase.dynamics import Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation._conversion import rotation_matrix
+from floatbase.simulation.ground import Ground
 from floatbase.simulation.hulls import link_hulls
 
 # MuJoCo's contact model: https://mujoco.readthedocs.io/en/stable/modeling.html#solver-parameters
@@ -43,70 +41,12 @@ _PENETRATION_RECOVERY_TIME = 0.2
 _CORNER_BALL_RADIUS = 0.005
 # m: MuJoCo has no balls of radius 0, which is the radius of a foot without a size
 _MIN_BALL_RADIUS = 1e-4
+# m: boxes of the ground have no bottom, but MuJoCo's have; nothing gets below it
+_BOX_DEPTH = 10.0
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero (mjMINVAL)
 # relative: for a thin plate the triangle inequality of principal inertias is an equality, up to
 # rounding
 _RELATIVE_ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Ground(Value):
-    """The ground: a plane, or several planes that are solid below, such as the sides of a valley.
-
-    Parameters
-    ----------
-    mu : float, optional
-        Coefficient of friction between the ground and the feet, positive [-].
-    normal : array_like, shape (3,) or (n, 3), optional
-        Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
-        it is normalized.
-    offset : float or array_like, shape (n,), optional
-        Offset of each plane, which holds the points with normal · x = offset [m]. One number
-        applies to all planes; a plane with offset 0 goes through the origin.
-
-    Examples
-    --------
-    >>> import floatbase as fb
-    >>> valley = fb.Ground(normal=[[0.0, -0.34, 0.94], [0.0, 0.34, 0.94]])
-    >>> valley.offsets
-    array([0., 0.])
-    """
-
-    mu: float = field(default=1.0, metadata=checked(as_positive))
-    normal: Array = field(default_factory=lambda: UP)
-    offset: float | Array = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        normals, offsets = as_half_spaces("the ground", self.normal, self.offset)
-        single_plane = np.ndim(self.normal) == 1
-        object.__setattr__(self, "normal", normals[0] if single_plane else normals)
-        object.__setattr__(self, "offset", float(offsets[0]) if single_plane else offsets)
-
-    @property
-    def normals(self) -> Array:
-        """Unit normals of all planes, shape (n, 3), world frame."""
-        return np.atleast_2d(self.normal)
-
-    @property
-    def offsets(self) -> Array:
-        """Offsets of all planes, shape (n,) [m]."""
-        return read_only(np.atleast_1d(self.offset))
-
-    def clearances(self, points: npt.ArrayLike) -> Array:
-        """Compute the distances of points from each plane.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., 3)
-            Points in the world frame [m].
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            Distance from each of the n planes, negative below it [m].
-        """
-        return np.asarray(points) @ self.normals.T - self.offsets
 
 
 def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
@@ -186,6 +126,15 @@ def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
         )
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
+    for x0, x1, y0, y1, top in ground.box_bounds:
+        half = 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            contype=1,
+            conaffinity=0,
+            pos=[x0 + half[0], y0 + half[1], top - half[2]],
+            size=half,
+        )
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
     for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
         _add_foot_balls(spec, foot, contact_of_foot.point_names)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array
-from floatbase.simulation.build import Ground
+from floatbase.simulation.ground import Ground, box_distance
 
 
 class FootContacts:
@@ -29,13 +29,16 @@ class FootContacts:
     geoms : ndarray, shape (points,)
         MuJoCo's ids of the feet's balls.
     max_contacts : int
-        Largest number of simultaneous contacts of the feet.
+        Usual limit on the number of simultaneous contacts of the feet. On planes alone there are
+        never more.
     """
 
     def __init__(self, model: mujoco.MjModel, ground: Ground, point_names: Sequence[str]):
-        self._ground, n_planes = ground, len(ground.normals)
+        self._ground, self._n_planes = ground, len(ground.normals)
+        n_planes = self._n_planes
         self.geoms = np.array([model.geom(name).id for name in point_names], dtype=int)
-        self.max_contacts = len(self.geoms) * n_planes  # in a valley, a ball can touch two planes
+        # in a valley, a ball can touch two planes, and in the corner of a step two boxes
+        self.max_contacts = len(self.geoms) * (n_planes + min(len(ground.boxes), 2))
         self._radii = model.geom_size[self.geoms, :1]
         self._is_foot = np.isin(np.arange(model.ngeom), self.geoms)
         # one frame for each plane, which is a geom; known from its first contact on
@@ -59,14 +62,15 @@ class FootContacts:
         Returns
         -------
         geoms : ndarray, shape (n, 2)
-            MuJoCo's ids of plane and ball.
+            MuJoCo's ids of plane or box, and ball.
         forces : ndarray, shape (3 n,)
-            Contact forces in the contact frames, normal component first [N].
+            Contact forces [N]. On planes they are in the contact frames, normal component first. On
+            boxes they are in the world frame, because contact frames change at an edge.
         """
         contact, forces, n_limits = data.contact, data.efc_force, data.nl
         if n_limits:  # the contacts follow the joints that are at their limits
             forces = forces[n_limits:]
-        geoms = contact.geom  # from the plane to a ball or a link
+        geoms = contact.geom  # from the plane to a ball or a link; a ball comes before a box
         if forces.size != 3 * len(geoms):
             # a ball that barely touches has no force; a cone other than ours has other sizes
             forces = np.zeros((len(geoms), 6))
@@ -76,13 +80,31 @@ class FootContacts:
         if self._planes_without_frame and len(geoms):
             # all balls on a plane share one contact frame, which never changes
             for i, (plane, geom) in enumerate(geoms.tolist()):
-                if self._is_foot[geom]:
+                if self._is_foot[geom] and plane < self._n_planes:
                     self._contact_frames[plane] = contact.frame[i].reshape(3, 3)
                     self._planes_without_frame.discard(plane)
+        if self._ground.boxes:
+            geoms, forces = self._with_boxes(geoms, forces, contact.frame)
         if link_collisions:
             feet = self._is_foot[geoms[:, 1]]
             geoms, forces = geoms[feet], forces.reshape(-1, 3)[feet].ravel()
         return geoms, forces
+
+    def _with_boxes(
+        self, geoms: npt.NDArray[np.int32], forces: Array, frames: Array
+    ) -> tuple[npt.NDArray[np.int32], Array]:
+        """Return contacts in the order ground, foot or link, with world-frame forces on boxes.
+
+        `frames`, shape (n, 9), are MuJoCo's contact frames: the normal, which points from the first
+        geom to the second one, and two tangents.
+        """
+        forces = forces.reshape(-1, 3).copy()
+        swapped = self._is_foot[geoms[:, 0]]  # the force on the second geom is on the box
+        on_box = swapped | (geoms[:, 0] >= self._n_planes)
+        axes = frames.reshape(-1, 3, 3)[on_box]
+        forces[on_box] = np.einsum("ij,ijk->ik", forces[on_box], axes)
+        forces[swapped] *= -1.0
+        return np.where(swapped[:, None], geoms[:, ::-1], geoms), forces.ravel()
 
     def forces(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
         """Return the forces on the contact points at N instants.
@@ -90,9 +112,9 @@ class FootContacts:
         Parameters
         ----------
         geoms : ndarray, shape (N, n, 2)
-            Ids of plane and ball, as from `read`; geom 0 stands for no contact.
+            Ids of plane or box, and ball, as from `read`; geom 0 stands for no contact.
         contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces in the contact frames, as from `read` [N].
+            Forces as from `read` [N].
 
         Returns
         -------
@@ -106,6 +128,8 @@ class FootContacts:
             # no ball touches a plane twice, so each entry is added to once
             rows, columns = np.nonzero(planes == plane)
             forces[rows, foot_geoms[rows, columns]] += per_contact[rows, columns] @ frame
+        rows, columns = np.nonzero(planes >= self._n_planes)
+        np.add.at(forces, (rows, foot_geoms[rows, columns]), per_contact[rows, columns])
         return forces[:, self.geoms]
 
     def positions(self, centres: Array) -> Array:
@@ -121,6 +145,14 @@ class FootContacts:
         ndarray, shape (..., points, 3)
             Nearest points in the world frame [m].
         """
-        nearest = np.argmin(self._ground.clearances(centres), axis=-1)
-        positions: Array = centres - self._radii * self._ground.normals[nearest]
+        distances = centres @ self._ground.normals.T - self._ground.offsets
+        directions = self._ground.normals[np.argmin(distances, axis=-1)]
+        if self._ground.boxes:
+            least = distances.min(axis=-1)
+            for bounds in self._ground.box_bounds:
+                distance, direction = box_distance(centres, bounds)
+                nearer = distance < least
+                least = np.where(nearer, distance, least)
+                directions = np.where(nearer[..., None], direction, directions)
+        positions: Array = centres - self._radii * directions
         return positions

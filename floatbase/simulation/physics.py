@@ -27,8 +27,9 @@ from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
-from floatbase.simulation.build import Ground, body_name, build_model
+from floatbase.simulation.build import body_name, build_model
 from floatbase.simulation.foot_contacts import FootContacts
+from floatbase.simulation.ground import Ground
 from floatbase.simulation.push import Push, as_pushes
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
@@ -38,6 +39,7 @@ FALLEN_COSINE = float(
 )  # of the base's tilt since the last reset: no leg can recover from more
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
+_ROUNDING = 1e-9  # m: a foot on the ground may be this far below it
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 _FIRST_FATAL_WARNING = int(
     mujoco.mjtWarning.mjWARN_BADQPOS
@@ -255,18 +257,22 @@ class Simulation:
         Parameters
         ----------
         state : State, optional
-            The state. By default the robot stands on the ground. On a single plane it is tilted
-            with the slope; on several planes, the base is oriented as in the standing posture.
+            The state; its robot may have other masses, as from `Robot.with_payload`. By default the
+            robot stands on the ground with all feet. On a slope, a robot with more than two feet is
+            tilted with the ground. A biped stays upright instead, and its soles are turned into the
+            slope; its CoM stays above its feet as on level ground. On several planes or on boxes,
+            the base is oriented as in the standing posture. Each foot must be clear of the edges of
+            boxes; on an edge it would overlap the box.
 
         Raises
         ------
         InputError
-            If the state belongs to a different robot.
+            If the state belongs to a different robot, or if not all feet can reach the ground.
         SimulationError
             If another thread is using the simulation.
         """
         state = self._standing_state() if state is None else as_instance("state", state, State)
-        if state.robot != self.robot:
+        if not self.robot.has_joints_of(state.robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."
@@ -391,9 +397,10 @@ class Simulation:
         Returns
         -------
         geoms : ndarray, shape (n, 2)
-            MuJoCo's ids of plane and ball of each contact.
+            MuJoCo's ids of plane or box, and ball, of each contact.
         contact_frame_forces : ndarray, shape (3 n,)
-            Forces in the contact frames, normal component first [N].
+            Forces [N]: on planes in the contact frames, normal component first, and on boxes in the
+            world frame.
         """
         return self.foot_contacts.read(self.model, self.data, self._link_collisions)
 
@@ -403,9 +410,9 @@ class Simulation:
         Parameters
         ----------
         geoms : ndarray, shape (N, n, 2)
-            MuJoCo's ids of plane and ball; geom 0 stands for no contact.
+            MuJoCo's ids of plane or box, and ball; geom 0 stands for no contact.
         contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces in the contact frames [N].
+            Forces as from `read_contacts` [N].
 
         Returns
         -------
@@ -474,9 +481,28 @@ class Simulation:
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
     def _standing_state(self) -> State:
-        """Return the robot standing on the ground, tilted with a slope so that all feet touch."""
-        if len(self._planes) > 1:
-            return self.robot.standing(normal=self.ground.normals, offset=self.ground.offsets)
+        """Return the robot standing on the ground with all feet touching."""
+        robot, ground = self.robot, self.ground
+        planes: dict[str, Any] = {"normal": ground.normals, "offset": ground.offsets}
+        is_biped, is_single_plane = len(robot.feet) <= 2, len(self._planes) == 1
+        if not is_single_plane:
+            state = robot.standing(**planes)
+        elif robot.is_floating and is_biped and ground.normals[0, 2] < 1.0:
+            state = robot.standing(normal=ground.normals[0], balanced=True)
+            if robot.feet:  # where the tilted robot would have its feet
+                shift = np.mean(_foot_middles(self._tilted_state()) - _foot_middles(state), axis=0)
+                state = state.replace(q=np.concatenate([state.q[:3] + shift, state.q[3:]]))
+        else:
+            state = self._tilted_state()
+        if robot.is_floating and robot.feet and ground.boxes:
+            middles = _foot_middles(state)
+            clearances = middles[:, 2] - ground.height(middles[:, :2])
+            if np.any(clearances < np.array([foot.radius for foot in robot.feet]) - _ROUNDING):
+                return robot.standing(**planes, surface=ground.height, balanced=is_biped)
+        return state
+
+    def _tilted_state(self) -> State:
+        """Return the level standing state, tilted with the only plane of the ground."""
         state = self.robot.standing()
         if not self.robot.is_floating:
             return state
@@ -487,13 +513,23 @@ class Simulation:
         return state.replace(q=np.concatenate([position, orientation.coeffs(), state.q[7:]]))
 
     def _base_height(self) -> float:
-        """Return the height of the base's origin above the nearest plane of the ground [m]."""
+        """Return the height of the base's origin above the nearest plane of the ground [m].
+
+        A box below the base counts, too.
+        """
         position = self._base_position.tolist()
         height: float = min([_dot(normal, position) - offset for normal, offset in self._planes])
+        if self._ground.boxes:
+            height = min(height, position[2] - self._ground.height(position[:2]))
         return height
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
+
+
+def _foot_middles(state: State) -> Array:
+    """Return the middle of each foot's sole or ball, shape (feet, 3), world frame [m]."""
+    return np.array([state.point(foot.frame, foot.middle) for foot in state.robot.feet])
 
 
 def _dot(a: list[float], b: list[float]) -> float:

@@ -316,6 +316,12 @@ class Recorder:
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
         i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
+        missing = len(geoms) - self._step_contact_geoms.shape[1]
+        if missing > 0:  # a foot touches many boxes
+            self._step_contact_geoms, self._step_contact_forces = (
+                np.pad(self._step_contact_geoms, ((0, 0), (0, missing), (0, 0))),
+                np.pad(self._step_contact_forces, ((0, 0), (0, 3 * missing))),
+            )
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = (
             geoms,

@@ -255,7 +255,7 @@ def _check_arguments(
     check_actuators(actuators)
     for name, part in (("controller is", controller), ("actuators are", actuators)):
         robot = getattr(part, "robot", sim.robot)
-        if robot != sim.robot:
+        if robot != sim.robot and not sim.robot.has_joints_of(robot):
             raise InputError(
                 f"The {name} for {robot!r}, but the simulation is for {sim.robot!r}. Load both "
                 f"robots with the same arguments."

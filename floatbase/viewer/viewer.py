@@ -31,7 +31,7 @@ from floatbase.viewer.output import Output
 from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
 from floatbase.viewer.scene.diff import ROOT, DiffRenderer
-from floatbase.viewer.scene.ground import MIN_VERTICAL, Plane, Planes
+from floatbase.viewer.scene.ground import MIN_VERTICAL, DrawnGround, Plane, Planes, Terrain
 from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter
 from floatbase.viewer.scene.shapes import Picture, prefixed
@@ -365,9 +365,10 @@ class Viewer(Controls, Output):
             follow = self._camera.follow_command(self.painter, ROBOT)
             self.window.put([follow, *protocol.end_animation()])
             self._is_playing = False
+        ground = self.painter.drawn_ground
         settings = (
             *self._caption(legend.kinds(picture), title, ghost_name),
-            protocol.set_ground(self.painter.drawn_ground.planes),
+            protocol.set_ground(ground.planes, ground.boxes if isinstance(ground, Terrain) else ()),
         )
         self.renderer.draw(picture, *settings)  # in one frame, because a second one would wait
 
@@ -597,7 +598,7 @@ def _check_texts(**texts: str | None) -> None:
         as_string(name, "" if value is None and name == "title" else value)
 
 
-def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
+def _ground(ground: Ground | npt.ArrayLike | None) -> DrawnGround | None:
     """Return the ground as it is drawn, or None for None."""
     if ground is None:
         return None
@@ -613,4 +614,5 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> Plane | Planes | None:
                 f"ground has the normal {[x, y, z]}; it must point upwards, as [0, 0, 1] does."
             )
         planes.append(Plane((x, y, z), offset))
-    return planes[0] if len(planes) == 1 else Planes(tuple(planes))
+    base = planes[0] if len(planes) == 1 else Planes(tuple(planes))
+    return Terrain(base, tuple(map(tuple, made.box_bounds.tolist()))) if made.boxes else base

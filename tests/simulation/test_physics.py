@@ -276,7 +276,7 @@ def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_o
         sim = fb.Simulation(robot, ground)
         sim.reset(start)
         # the controller plans with 0.4, which is right if the robot stays and wrong if it slides
-        contacts = fb.Contacts.points(robot, mu=0.4, normals=ground.normal)
+        contacts = fb.Contacts.points(robot, mu=0.4, normals=ground.normals[0])
         controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(start))
         record = fb.rollout(sim, controller, 0.3)
         slid[mu] = float(record.slip().max())
@@ -302,17 +302,17 @@ def test_a_robot_on_a_slope_is_carried_upright_by_tilted_feet_that_share_the_wor
     start, ground = on_slope(robot, angle), Ground(normal=slope_normal(angle))
     sim = fb.Simulation(robot, ground)
     sim.reset(start)
-    contacts = fb.Contacts.points(robot, normals=ground.normal)
+    contacts = fb.Contacts.points(robot, normals=ground.normals[0])
     assert np.allclose(contacts.positions(start), sim.contact_positions(), atol=1e-9)
-    assert np.allclose(sim.contact_positions() @ ground.normal, 0.0, atol=1e-9)
+    assert np.allclose(sim.contact_positions() @ ground.normals[0], 0.0, atol=1e-9)
     record = fb.rollout(sim, fb.WholeBodyController(robot, contacts, fb.standing_tasks(start)), 1.0)
     assert record.outcome == "completed"
     total = record.measured[-1].reshape(4, 3).sum(axis=0)
     assert np.allclose(total, [0.0, 0.0, robot.weight], atol=0.01 * robot.weight)
     forces = record.measured[-1].reshape(4, 3)
-    pressing = forces @ ground.normal
+    pressing = forces @ ground.normals[0]
     assert pressing.sum() == pytest.approx(robot.weight * np.cos(angle), rel=0.01)
-    assert np.allclose(record.planned[-1].reshape(4, 3) @ ground.normal, pressing, rtol=0.05)
+    assert np.allclose(record.planned[-1].reshape(4, 3) @ ground.normals[0], pressing, rtol=0.05)
     assert record.slip().max() < 1e-3
 
 

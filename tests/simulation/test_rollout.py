@@ -346,7 +346,7 @@ def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zer
 @pytest.mark.parametrize("normal", [(0.2, 0.0, 1.0), (-0.1, 0.15, 1.0)])
 def test_a_robot_starts_with_every_foot_on_a_slope(normal: tuple[float, float, float]) -> None:
     sim = fb.Simulation(judges.load("go2"), ground=fb.Ground(normal=np.array(normal)))
-    heights = sim.contact_positions() @ sim.ground.normal
+    heights = sim.contact_positions() @ sim.ground.normals[0]
     assert np.max(np.abs(heights)) < 1e-9
 
 

@@ -155,7 +155,7 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> Non
 def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name: str) -> None:
     robot, normal, offset = judges.load(name), np.array([0.1, 0.05, 1.0]), 0.3
     near, far = (fb.Simulation(robot, Ground(normal=normal, offset=at)) for at in (0.0, offset))
-    shift = offset * near.ground.normal
+    shift = offset * near.ground.normals[0]
     assert np.allclose(far.contact_positions(), near.contact_positions() + shift, atol=LENGTHS)
     for sim in (near, far):
         for _ in range(20):

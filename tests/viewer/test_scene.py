@@ -216,6 +216,32 @@ def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> 
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
+def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(
+    go2: Robot,
+) -> None:
+    ground = Ground.stairs(2, 0.1, start=0.0, width=1.0)
+    state = Simulation(go2, ground).state
+    viewer = Viewer(go2, ground=ground)
+    viewer.show(state, Contacts.points(go2), support=True)
+    shape = viewer.renderer.picture["terrain/faces"].shape.data
+    values = shape["geometries"][0]["data"]["attributes"]["position"]["array"].data
+    points = np.frombuffer(values, "<i2").reshape(-1, 3) * shape["object"]["matrix"][0]
+    distances = np.abs(ground.clearances(points))
+    assert np.all(distances[:, 1:].min(axis=1) < 1e-3), "every vertex lies on a box"
+    for bounds in ground.box_bounds:
+        inside = np.all((points[:, :2] >= bounds[0:4:2] - 1e-3), axis=1) & np.all(
+            points[:, :2] <= bounds[1:4:2] + 1e-3, axis=1
+        )
+        heights = points[inside, 2]
+        assert heights.min() == pytest.approx(0.0, abs=1e-3)
+        assert heights.max() >= bounds[4] - 1e-3
+    shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
+    assert shadow[2] == pytest.approx(ground.height(state.com[:2]), abs=1e-5)
+    viewer.set_ground(None)
+    assert not any(path.startswith("terrain") for path in viewer.show(state).renderer.picture)
+    viewer.close()
+
+
 def test_polyhedra_highlight_their_active_facets(
     go2: Robot, standing: State, contacts: Contacts
 ) -> None:

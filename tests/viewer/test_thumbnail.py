@@ -12,9 +12,11 @@ from PIL import Image
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import Robot, State, load
+from floatbase.simulation import Ground
 from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.export.thumbnail import with_thumbnail
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED
+from floatbase.viewer.scene.ground import displacement
 
 from .looks import hue_pixels
 
@@ -86,6 +88,20 @@ def test_the_image_goes_with_a_robot_that_is_followed(
     )  # a whole jump of the grid, down the slope
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
+    viewer.close()
+
+
+def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(
+    go2: Robot, standing: State
+) -> None:
+    ground = Ground.stairs(2, 0.1, start=0.25, run=0.5)
+    viewer = Viewer(go2, ground=ground, follow=True)
+    drawn, start = viewer.painter.drawn_ground, standing.com
+    path = np.arange(0.0, 2.5, 0.01)
+    rises = [displacement(drawn, start, start + [x, 0.0, 0.0])[2] for x in path]
+    assert rises[0] == 0.0
+    assert rises[-1] == pytest.approx(ground.height([2.4, 0.0]), abs=1e-9)
+    assert np.abs(np.diff(rises)).max() < 0.005
     viewer.close()
 
 

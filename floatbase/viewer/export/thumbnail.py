@@ -24,7 +24,14 @@ from floatbase.viewer.export.rasteriser import (
 )
 from floatbase.viewer.scene.colours import BACKGROUNDS, RGB, hex_code
 from floatbase.viewer.scene.diff import ROOT
-from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, displacement
+from floatbase.viewer.scene.ground import (
+    LEVEL,
+    DrawnGround,
+    Plane,
+    Planes,
+    Terrain,
+    displacement,
+)
 from floatbase.viewer.scene.label_image import FONT_SIZE, font
 from floatbase.viewer.scene.shapes import Item, Picture
 from floatbase.viewer.scene.store import Scene
@@ -151,16 +158,14 @@ def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
     return Camera(eye + gone, target + gone, set_to["fov"], size)
 
 
-def _ground(scene: Scene) -> Plane | Planes:
+def _ground(scene: Scene) -> DrawnGround:
     """Return the scene's ground."""
-    planes = _setting(scene, "set_ground", {"planes": []})["planes"]
-    return (
-        Planes(
-            tuple(Plane(tuple(_from_threejs(plane["normal"])), plane["offset"]) for plane in planes)
-        )
-        if planes
-        else LEVEL
+    command = _setting(scene, "set_ground", {"planes": [], "boxes": []})
+    planes = tuple(
+        Plane(tuple(_from_threejs(plane["normal"])), plane["offset"]) for plane in command["planes"]
     )
+    base = Planes(planes) if planes else LEVEL
+    return Terrain(base, tuple(map(tuple, command["boxes"]))) if command["boxes"] else base
 
 
 def _from_threejs(point: Sequence[float]) -> Array:

@@ -17,7 +17,7 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import COM, GREYS, RGB
-from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
+from floatbase.viewer.scene.ground import LEVEL, DrawnGround
 from floatbase.viewer.scene.shapes import Item, Picture, transform
 from floatbase.viewer.scene.threejs import Shape
 
@@ -42,14 +42,14 @@ class Style:
     ----------
     size : float
         Size of the robot [m].
-    ground : Plane or Planes
+    ground : Plane, Planes or Terrain
         Ground on which the marks lie.
     colour : tuple of float
         RGB of the zero-moment point, in contrast to the page's background.
     """
 
     size: float
-    ground: Plane | Planes = LEVEL
+    ground: DrawnGround = LEVEL
     colour: RGB = GREYS[1]
 
 

@@ -15,7 +15,7 @@ from floatbase.errors import InputError
 from floatbase.qp import ConstraintLabel, Solution
 from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import CALM, COM, PUSH, RGB, X_AXIS, Y_AXIS, Z_AXIS
-from floatbase.viewer.scene.ground import LEVEL, Plane, Planes
+from floatbase.viewer.scene.ground import LEVEL, DrawnGround
 from floatbase.viewer.scene.shapes import (
     Item,
     Picture,
@@ -143,7 +143,7 @@ def push(
 
 
 def support_region(
-    positions: npt.ArrayLike, height_above_ground: float, ground: Plane | Planes = LEVEL
+    positions: npt.ArrayLike, height_above_ground: float, ground: DrawnGround = LEVEL
 ) -> Picture:
     """Draw the support polygon: the convex hull of the contact points, seen from above.
 
@@ -155,7 +155,7 @@ def support_region(
         Contact points in the world frame [m].
     height_above_ground : float
         Distance of the polygon from the ground [m].
-    ground : Plane or Planes, optional
+    ground : Plane, Planes or Terrain, optional
         Ground on which the corners lie.
 
     Returns

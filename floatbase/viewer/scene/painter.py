@@ -22,7 +22,7 @@ from floatbase.viewer.scene import geometry, markers, shapes, threejs
 from floatbase.viewer.scene.colours import GHOST, RGB
 from floatbase.viewer.scene.cone_picture import ConeShape, cone_picture
 from floatbase.viewer.scene.contact_forces import Forces, as_point_forces
-from floatbase.viewer.scene.ground import LEVEL, Plane, Planes, plane_under
+from floatbase.viewer.scene.ground import LEVEL, DrawnGround, blocks, plane_under
 from floatbase.viewer.scene.limit_rings import limit_rings
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
 from floatbase.viewer.scene.options import PictureKeywords, PictureOptions
@@ -50,7 +50,7 @@ class Painter:
         Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
     facet_rotation : float
         Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
-    ground : Plane, Planes or None
+    ground : Plane, Planes, Terrain or None
         Ground; None for the plane on which the contacts stand.
     line_colour : tuple of float
         RGB of the lines on the ground.
@@ -65,7 +65,7 @@ class Painter:
     facets: int | None
     inner_approximation: bool
     facet_rotation: float
-    ground: Plane | Planes | None
+    ground: DrawnGround | None
     line_colour: RGB
     text_colour: RGB
     background_colour: RGB
@@ -115,9 +115,8 @@ class Painter:
         )
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
-        picture = {"ground": ground.lines(self.line_colour, state.com)} | self._robot(
-            state, "robot", self._shapes
-        )
+        picture = {"ground": ground.lines(self.line_colour, state.com)}
+        picture |= blocks(ground, self.line_colour) | self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             stands = [
                 contact.name not in chosen.swing_feet
@@ -189,10 +188,11 @@ class Painter:
         Picture
             The ground.
         """
-        return {"ground": self.drawn_ground.lines(self.line_colour)}
+        ground = self.drawn_ground
+        return {"ground": ground.lines(self.line_colour)} | blocks(ground, self.line_colour)
 
     @property
-    def drawn_ground(self) -> Plane | Planes:
+    def drawn_ground(self) -> DrawnGround:
         """Given ground, or level ground if none was given."""
         return self.ground or LEVEL
 
@@ -417,18 +417,18 @@ class Painter:
         """Radius of the contact patches [m]."""
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 
-    def _scale_bar(self, ground: Plane | Planes) -> Picture:
+    def _scale_bar(self, ground: DrawnGround) -> Picture:
         """Draw the scale bar; it is computed once for each ground."""
         if ground not in self._scale_bars:
             self._scale_bars[ground] = self._scale_bar_on(ground)
         return self._scale_bars[ground]
 
     @cached_property
-    def _scale_bars(self) -> dict[Plane | Planes, Picture]:
+    def _scale_bars(self) -> dict[DrawnGround, Picture]:
         """Scale bars by ground."""
         return {}
 
-    def _scale_bar_on(self, ground: Plane | Planes) -> Picture:
+    def _scale_bar_on(self, ground: DrawnGround) -> Picture:
         """Draw a bar on the ground that shows the length of about a quarter of the weight.
 
         The bar is to the left of the feet. For a tall robot it starts behind the robot, because the
@@ -442,7 +442,7 @@ class Painter:
         at[2] = ground.height(at + [0.5 * length, 0.0, 0.0]) + 0.01 * self.size
         return prefixed("scale", shapes.scale_bar(at, force, length, self.size, self.text_colour))
 
-    def _ground(self, contacts: Contacts | None, positions: Array) -> Plane | Planes:
+    def _ground(self, contacts: Contacts | None, positions: Array) -> DrawnGround:
         """Return the ground to draw."""
         if self.ground is not None or contacts is None:
             return self.drawn_ground

@@ -8,7 +8,7 @@ to the newest command. The dict does not grow when something is drawn again.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -216,13 +216,17 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
     )
 
 
-def set_ground(planes: Iterable[tuple[npt.ArrayLike, float]]) -> Update:
+def set_ground(
+    planes: Iterable[tuple[npt.ArrayLike, float]], boxes: Iterable[Sequence[float]] = ()
+) -> Update:
     """Define the ground above which a following camera keeps its height.
 
     Parameters
     ----------
     planes : iterable of tuple
         Unit normal, shape (3,), in the world frame, pointing upwards, and offset [m] of each plane.
+    boxes : iterable of sequence, optional
+        x0, x1, y0, y1 and top of each box, in the world frame [m].
 
     Returns
     -------
@@ -230,7 +234,8 @@ def set_ground(planes: Iterable[tuple[npt.ArrayLike, float]]) -> Update:
         The command.
     """
     in_threejs = [{"normal": _to_threejs(normal), "offset": offset} for normal, offset in planes]
-    return encode({"type": "set_ground", "path": "", "planes": in_threejs})
+    bounds = [[float(bound) for bound in box] for box in boxes]
+    return encode({"type": "set_ground", "path": "", "planes": in_threejs, "boxes": bounds})
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:

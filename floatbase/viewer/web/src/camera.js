@@ -10,16 +10,33 @@ const WIDE = 1.2; // width / height of a picture that fits a robot; a narrower p
 const MIN_ZOOM = 0.2; // in the smallest window
 const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
 const LOW_JUMP = 0.2; // m: the camera stays down if the robot rises by less, however low it stands
+const GRID = 0.5; // m, between the points where the ground of a camera is measured
 const REST = 1e-3; // m: closer than this, it has arrived
 const COMPANIONS = [
   ["meshcat", "scale"], ["Lights", "PointLightNegativeX"], ["Lights", "PointLightPositiveX"],
 ]; // nodes that move with it
 
-// m: height of the ground under or over a point {x, z}, y up. planes: normal and offset, n·p = d.
-export function groundHeight(planes, {x, z}) {
+// m: height of the ground under or over a point {x, z}, y up. planes: normal and offset, n·p = d;
+// boxes: x0, x1, y0, y1 and top in our coordinates, in which y is -z.
+export function groundHeight({planes, boxes}, {x, z}) {
+  const tops = boxes.filter(([x0, x1, y0, y1]) => x0 <= x && x <= x1 && y0 <= -z && -z <= y1);
   return Math.max(
     ...planes.map(({normal, offset}) => (offset - normal[0] * x - normal[2] * z) / normal[1]),
+    ...tops.map((box) => box[4]),
   );
+}
+
+// m: height of the ground, interpolated between the points of a grid where there are boxes, so that
+// the camera does not jump at a step.
+export function smoothHeight(ground, {x, z}) {
+  if (!ground.boxes.length) return groundHeight(ground, {x, z});
+  const [i, j] = [x, z].map((at) => Math.floor(at / GRID));
+  let height = 0;
+  for (const [a, b] of [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]]) {
+    const weight = (1 - Math.abs(x / GRID - a)) * (1 - Math.abs(z / GRID - b));
+    height += weight * groundHeight(ground, {x: a * GRID, z: b * GRID});
+  }
+  return height;
 }
 
 // m: how far the camera rises with an object that was at `before` above the ground and is at `now`.
@@ -49,7 +66,7 @@ export function createCamera(viewer, panel) {
   const {Vector3} = three();
   // how far the camera has moved with what it follows; initial position of the scale and the lights
   const gone = new Vector3(), begin = new Vector3(), from = new Vector3();
-  let path = [], planes = [{normal: [0, 1, 0], offset: 0}], clock = 0;
+  let path = [], ground = {planes: [{normal: [0, 1, 0], offset: 0}], boxes: []}, clock = 0;
   let isSmooth = false, isFirst = true;
   // pixels by which the middle of the picture is left of the window's, and above it: beside the
   // panel, and over the player, which would hide the feet
@@ -69,8 +86,8 @@ export function createCamera(viewer, panel) {
     const found = findNode(viewer, path);
     if (!found) return false;
     const at = found.object.getWorldPosition(new Vector3());
-    const [ground, first] = [at, from].map((place) => groundHeight(planes, place));
-    const rise = ground - first + liftOf(from.y - first, at.y - ground);
+    const [below, first] = [at, from].map((place) => smoothHeight(ground, place));
+    const rise = below - first + liftOf(from.y - first, at.y - below);
     const way = at.clone().sub(from).setY(rise).sub(gone);
     const step = way.clone().multiplyScalar(way.length() < REST ? 1 : fraction);
     gone.add(step);
@@ -116,7 +133,7 @@ export function createCamera(viewer, panel) {
       gone.set(0, 0, 0);
       isFirst = true;
     },
-    setGround(command) { planes = command.planes; },
+    setGround({planes, boxes}) { ground = {planes, boxes}; },
     setFollow(command) {
       path = pathNames(command.node);
       from.fromArray(command.from);

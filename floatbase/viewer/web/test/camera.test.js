@@ -1,11 +1,25 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {followFraction, groundHeight, labelScale, liftOf, zoomFor} from "../src/camera.js";
+import {
+  followFraction, groundHeight, labelScale, liftOf, smoothHeight, zoomFor,
+} from "../src/camera.js";
 
 test("the ground is the highest of its planes", () => {
   const planes = [{normal: [0, 1, 0], offset: 0}, {normal: [-0.6, 0.8, 0], offset: 0}];
-  assert.equal(groundHeight(planes, {x: -1, z: 3}), 0);
-  assert.ok(Math.abs(groundHeight(planes, {x: 2, z: 0}) - 1.5) < 1e-12);
+  const ground = {planes, boxes: []};
+  assert.equal(groundHeight(ground, {x: -1, z: 3}), 0);
+  assert.ok(Math.abs(groundHeight(ground, {x: 2, z: 0}) - 1.5) < 1e-12);
+  assert.equal(smoothHeight(ground, {x: 2, z: 0}), groundHeight(ground, {x: 2, z: 0}));
+});
+
+test("a box is ground within its bounds, and the camera rises to it along a ramp", () => {
+  const planes = [{normal: [0, 1, 0], offset: 0}];
+  const ground = {planes, boxes: [[0.6, 9, -1, 0.4, 0.2], [0.8, 9, -1, 0.4, 0.1]]};
+  assert.equal(groundHeight(ground, {x: 0.7, z: 0.5}), 0.2);
+  assert.equal(groundHeight(ground, {x: 0.7, z: -0.5}), 0);
+  assert.equal(groundHeight(ground, {x: 0.5, z: 0}), 0);
+  const heights = [0.4, 0.5, 0.75, 1, 3].map((x) => smoothHeight(ground, {x, z: 0}));
+  [0, 0, 0.1, 0.2, 0.2].forEach((h, i) => assert.ok(Math.abs(heights[i] - h) < 1e-12));
 });
 
 test("the camera rises with a robot that flies away, but not with a step or a jump", () => {

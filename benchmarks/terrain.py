@@ -1,0 +1,175 @@
+"""Measure how robots walk over terrain on MuJoCo, with and without knowing the ground.
+
+    python benchmarks/terrain.py             -> benchmarks/terrain.md
+    python benchmarks/terrain.py --runs 2    fewer runs, for a quick look
+    python benchmarks/terrain.py --only talos "slope 10"
+
+Each case is repeated with other seeds. The seed chooses how far away the terrain begins, the
+heights of tiles, and the speed within 10 %, so that feet meet edges at other times. A run has
+succeeded if the robot does not fall and its base has passed the terrain. Friction is 0.6 in the
+controller and 1 on the ground, and the control period is 2 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+
+RUNS = 10
+PERIOD = 0.002  # s
+BEHIND = 0.3  # m that the base walks past the terrain
+MAX_TIME = 40.0  # s
+SLOPE_LENGTH = 1.0  # m that a robot walks on a slope
+
+
+class Case(NamedTuple):
+    """A terrain; `make(start, seed)` returns the ground and the x coordinate where it ends [m]."""
+
+    name: str
+    make: Callable[[float, int], tuple[fb.Ground, float]]
+    seen: bool
+
+
+class Walker(NamedTuple):
+    """A robot, its gait, its speed [m/s], and the clearance of its swings [m]."""
+
+    name: str
+    gait: Callable[[fb.Robot], Gait]
+    speed: float
+    clearance: float
+
+
+def slope(degrees: float, axis: int = 0) -> Callable[[float, int], tuple[fb.Ground, float]]:
+    angle = np.deg2rad(degrees)
+    normal = np.array([0.0, 0.0, np.cos(angle)])
+    normal[axis] = -np.sin(angle)  # positive: uphill
+    return lambda start, seed: (fb.Ground(normal=normal), SLOPE_LENGTH - BEHIND)
+
+
+def stairs(steps: int, rise: float, run: float = 0.3) -> Callable[..., tuple[fb.Ground, float]]:
+    return lambda start, seed: (
+        fb.Ground.stairs(steps, rise, run, start, width=4.0),
+        start + run * (steps - 1),
+    )
+
+
+def tiles(height: float) -> Callable[[float, int], tuple[fb.Ground, float]]:
+    return lambda start, seed: (
+        fb.Ground.tiles(height, start=start, size=(1.6, 1.6), seed=seed),
+        start + 1.6,
+    )
+
+
+def gap(length: float) -> Callable[[float, int], tuple[fb.Ground, float]]:
+    return lambda start, seed: (fb.Ground.gap(length, 0.3, start, width=4.0), start + length)
+
+
+QUADRUPEDS = [
+    Walker("go2", Gait.trot, 0.25, 0.08),
+    Walker("anymal_c", Gait.trot, 0.3, 0.1),
+    Walker("hyq", Gait.trot, 0.3, 0.1),
+]
+TALOS = Walker("talos", Gait.walk, 0.2, 0.08)
+POINT_FEET = [
+    *(Case(f"step {100 * h:+.0f} cm", stairs(1, h), seen) for h in (0.05, -0.05)
+        for seen in (False, True)),
+    Case("tiles 0 to 5 cm", tiles(0.05), False), Case("tiles 0 to 5 cm", tiles(0.05), True),
+    Case("gap 10 cm", gap(0.1), True),
+    Case("4 stairs +10 cm", stairs(4, 0.1), True), Case("4 stairs -10 cm", stairs(4, -0.1), True),
+]  # fmt: skip
+FLAT_FEET = [
+    *(Case(f"slope {a:+.0f}°", slope(a), True) for a in (10.0, -10.0)),
+    Case("side slope 10°", slope(10.0, 1), True),
+    *(Case(f"step {100 * h:+.0f} cm", stairs(1, h), False) for h in (0.03, -0.03)),
+    Case("4 stairs +8 cm", stairs(4, 0.08), True), Case("4 stairs -8 cm", stairs(4, -0.08), True),
+]  # fmt: skip
+
+
+def load(name: str) -> fb.Robot:
+    feet = {"anymal_c": ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]}
+    return fb.load(name, feet=feet[name], foot_radius=0.02) if name in feet else fb.load(name)
+
+
+def attempt(robot: fb.Robot, walker: Walker, case: Case, seed: int) -> tuple[bool, float, float]:
+    """Return whether a robot passed, its largest tilt [°], and where it ended [m]."""
+    rng = np.random.default_rng(seed)
+    length = float(np.ptp(fb.Contacts.feet(robot).positions(robot.standing())[:, 0]))
+    start = 0.5 * length + rng.uniform(0.15, 0.45)
+    speed = walker.speed * rng.uniform(0.9, 1.1)
+    ground, end = case.make(start, seed)
+    walk = Walk(
+        robot,
+        fb.Contacts.feet(robot, mu=0.6),
+        walker.gait(robot),
+        (speed, 0.0),
+        clearance=walker.clearance,
+        ground=ground if case.seen else None,
+    )
+    sim = fb.Simulation(robot, ground)
+    begin, goal, upright = sim.q[0], end + 0.5 * length + BEHIND, 1.0
+    while sim.time < MAX_TIME and sim.q[0] < begin + goal:
+        run = fb.rollout(sim, walk, 0.5, control_period=PERIOD)
+        upright = min(upright, float(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2).max()))
+        if run.outcome != "completed":
+            return False, float(np.rad2deg(np.arccos(upright))), float(sim.q[0])
+    return sim.q[0] >= begin + goal, float(np.rad2deg(np.arccos(upright))), float(sim.q[0])
+
+
+def row(walker: Walker, case: Case, runs: int) -> str:
+    robot, found, clock = load(walker.name), [], time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the speed that a robot can reach is in the result
+        found = [attempt(robot, walker, case, seed) for seed in range(runs)]
+    passed = sum(done for done, _, _ in found)
+    tilts = [angle for done, angle, _ in found if done]
+    tilt = f"{np.median(tilts):.1f}°, {max(tilts):.1f}°" if tilts else ""
+    failed = [f"{x:.2f}" for done, _, x in found if not done]
+    line = (
+        f"| {walker.name} | {case.name} | {'seen' if case.seen else 'blind'} | {passed} of {runs} "
+        f"| {tilt} | {', '.join(failed)} |"
+    )
+    print(line, f"{time.process_time() - clock:.0f} s", flush=True)
+    return line
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=RUNS, help="runs of each case")
+    parser.add_argument("--only", nargs="*", default=[], help="words that a row must contain")
+    options = parser.parse_args()
+    rows = [
+        row(walker, case, options.runs)
+        for walkers, cases in ((QUADRUPEDS, POINT_FEET), ([TALOS], FLAT_FEET))
+        for walker in walkers
+        for case in cases
+        if all(
+            word in f"{walker.name} {case.name} {'seen' if case.seen else 'blind'}"
+            for word in options.only
+        )
+    ]
+    if not options.only:
+        table = [
+            "| robot | terrain | ground | passed | tilt, median and largest | falls at x [m] |",
+            "|---|---|---|---|---|---|",
+            *rows,
+        ]
+        text = "# Walking over terrain\n\n" + __doc__.split("\n\n", 2)[2] + "\n"
+        path = Path(__file__).with_suffix(".md")
+        path.write_text(text + "\n".join(table) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

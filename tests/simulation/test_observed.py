@@ -1,0 +1,137 @@
+"""Controllers with a noisy, late or user-defined observation of the state."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from types import SimpleNamespace
+
+import judges
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+from floatbase.behaviours import Gait, Walk
+from floatbase.errors import InputError
+from floatbase.simulation import Latency, Observed, SensorNoise
+
+
+class Recording:
+    """A controller without torques that keeps what it observes."""
+
+    def __init__(self, d: int):
+        self.d, self.seen = d, []
+
+    def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> SimpleNamespace:
+        self.seen.append((q, v, t))
+        return SimpleNamespace(tau=np.zeros(self.d))
+
+
+def test_a_controller_gets_what_the_observers_return_one_after_the_other() -> None:
+    robot = judges.load("go2")
+    controller, calls = Recording(robot.d), []
+
+    def first(q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        calls.append(("first", q, t))
+        return q, v + 1.0
+
+    def second(q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        calls.append(("second", q, t))
+        return q, 2.0 * v
+
+    run = fb.rollout(fb.Simulation(robot), Observed(controller, first, second), 0.01)
+    assert [name for name, _, _ in calls] == ["first", "second"] * 10
+    for (q, v, t), true_q, true_v, time in zip(
+        controller.seen, run.q, run.v, run.time, strict=True
+    ):
+        assert np.array_equal(q, true_q) and t == time
+        assert np.allclose(v, 2.0 * (true_v + 1.0))
+
+
+@pytest.mark.parametrize("name", ["go2", "anymal_kinova", "ur5"])
+def test_sensor_noise_has_the_given_standard_deviations(name: str) -> None:
+    robot, seed = judges.load(name), int(np.random.default_rng(0).integers(2**32))
+    state = judges.states(name, 1)[0]
+    noise, n = SensorNoise(robot, seed).scaled(2.0), 2000
+    errors = []
+    for i in range(n):
+        q, v = noise(state.q, state.v, i * 1e-3)
+        errors.append([*pin.difference(robot.model, state.q, q), *(v - state.v)])
+    base = 3 if robot.is_floating else 0
+    of_q = [2e-3] * base + [4e-3] * base + [2.2e-4] * robot.d
+    of_v = [0.04] * base + [4e-3] * base + [0.1] * robot.d
+    found, expected = np.std(errors, axis=0), np.array([*of_q, *of_v])
+    assert np.allclose(found, expected, rtol=6.0 / np.sqrt(2 * n))
+    assert np.all(np.abs(np.mean(errors, axis=0)) < 6.0 * expected / np.sqrt(n))
+
+
+def test_noise_depends_on_seed_and_time_alone() -> None:
+    robot = judges.load("go2")
+    state, noise, again = robot.standing(), SensorNoise(robot, 5), SensorNoise(robot, 5)
+    late = [noise(state.q, state.v, t)[1] for t in (0.3, 0.1, 0.2)]
+    early = [again(state.q, state.v, t)[1] for t in (0.1, 0.2, 0.3)]
+    assert np.array_equal(late, [early[2], early[0], early[1]])
+    assert not np.any(early[0] == early[1])
+    assert not np.any(SensorNoise(robot, 6)(state.q, state.v, 0.1)[1] == early[0])
+    none = SensorNoise(robot, 5).scaled(0.0)(state.q, state.v, 0.1)
+    assert np.array_equal(none[0], state.q) and np.array_equal(none[1], state.v)
+
+
+def test_measurements_arrive_after_their_latency_and_a_reset_begins_anew() -> None:
+    robot = judges.load("go2")
+    controller, sim = Recording(robot.d), fb.Simulation(robot)
+    observed = Observed(controller, Latency(q=0.003, v=0.0045))
+    run = fb.rollout(sim, observed, 0.02)
+    rows = np.arange(20)
+    assert np.array_equal([q for q, _, _ in controller.seen], run.q[np.maximum(rows - 3, 0)])
+    assert np.array_equal([v for _, v, _ in controller.seen], run.v[np.maximum(rows - 5, 0)])
+    before = list(controller.seen)
+    controller.seen.clear()
+    sim.reset()
+    fb.rollout(sim, observed, 0.02)
+    for old, new in zip(before, controller.seen, strict=True):
+        assert np.array_equal(old[0], new[0]) and np.array_equal(old[1], new[1])
+
+
+def test_a_walk_with_noise_and_latency_walks_and_repeats_itself() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot, mu=0.6)
+    walk = Walk(robot, contacts, Gait.trot(robot, start=0.2), velocity=[0.2, 0.0])
+    observed = Observed(walk, Latency(q=0.002, v=0.002), SensorNoise(robot, seed=2))
+    runs = []
+    for _ in range(2):
+        runs.append(fb.rollout(fb.Simulation(robot), observed, 0.8, control_period=0.002))
+    assert runs[0].outcome == "completed"
+    assert len({stance.names for stance in runs[0].stances}) > 1  # feet left the ground
+    assert np.array_equal(runs[0].q, runs[1].q)
+
+
+def test_the_wrapper_has_the_attributes_of_the_controller_but_not_its_methods() -> None:
+    robot, controller = judges.load("go2"), judges.controller_of("go2")
+    observed = Observed(controller, SensorNoise(robot))
+    assert observed.contacts is controller.contacts and observed.robot is robot
+    assert not hasattr(Observed(judges.limp), "contacts")
+    for copied in (copy.deepcopy(observed), pickle.loads(pickle.dumps(observed))):
+        assert copied.robot == robot
+    with pytest.raises(AttributeError, match="qp"):
+        observed.qp(robot.standing())
+    with pytest.raises(AttributeError):
+        observed.velocity = [1.0, 0.0]
+
+
+def test_observers_that_cannot_be_are_refused() -> None:
+    robot = judges.load("go2")
+    for make, number in (
+        (lambda: Observed(3.0), "3.0"),
+        (lambda: Observed(judges.limp, lambda q, v: (q, v)), "observer 0"),
+        (lambda: SensorNoise("go2"), "go2"),
+        (lambda: SensorNoise(robot, joint_velocity=-1.0), "-1"),
+        (lambda: SensorNoise(robot, seed=-1), "-1"),
+        (lambda: Latency(q=-0.1), "-0.1"),
+        (lambda: Latency(v=20.0), "20"),
+        (lambda: Observed(judges.limp, lambda q, v, t: q)(np.zeros(19), np.zeros(18)), "(q, v)"),
+    ):
+        with pytest.raises(InputError) as raised:
+            make()
+        assert number in str(raised.value)
