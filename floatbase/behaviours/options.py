@@ -27,6 +27,7 @@ from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.objectives import Task
+from floatbase.robots import State
 
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
 _MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
@@ -94,8 +95,9 @@ class WalkOptions:
     clearance, reach, ramp : float
         Height of the swings [m], largest distance of a foothold from the nominal one [m], and time
         in which a foot is loaded or unloaded [s].
-    foothold, adjustment, swing : callable
-        Rules for footholds, their adjustment (or None), and the paths of swings.
+    foothold, adjustment, modify_plan, swing : callable
+        Rules for footholds, their adjustment (or None), a change of each plan (or None), and the
+        paths of swings.
     ground : Terrain or None
         The ground, if it is known.
     tasks : tuple of Task
@@ -113,6 +115,7 @@ class WalkOptions:
     ramp: float
     foothold: Callable[..., npt.ArrayLike]
     adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None
+    modify_plan: Callable[[Any, State], Any] | None
     swing: Callable[..., SwingPath]
     ground: Terrain | None
     tasks: tuple[Task, ...]
@@ -128,6 +131,7 @@ class WalkOptions:
         ramp: float,
         foothold: Callable[..., npt.ArrayLike],
         adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None,
+        modify_plan: Callable[[Any, State], Any] | None,
         swing: Callable[..., SwingPath] | None,
         ground: Terrain | None,
         tasks: Sequence[Task],
@@ -146,6 +150,8 @@ class WalkOptions:
         if adjustment is not None:
             example = "adjustment(plan, path, com, com_velocity, t)"
             as_callable("adjustment", adjustment, example)
+        if modify_plan is not None:
+            as_callable("modify_plan", modify_plan, "modify_plan(plan, state)")
         if ground is not None and not isinstance(ground, Terrain):
             raise InputError(
                 f"ground must have the methods height(xy) and normal(xy), as fb.Ground has, but "
@@ -160,6 +166,7 @@ class WalkOptions:
             as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
             as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
             adjustment,
+            modify_plan,
             Swing if swing is None else as_callable("swing", swing, example),
             ground,
             tuple(tasks),

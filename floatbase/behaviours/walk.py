@@ -30,7 +30,7 @@ from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.gait_clock import GaitClock
-from floatbase.behaviours.lipm import LIPM
+from floatbase.behaviours.lipm import CoMPlan
 from floatbase.behaviours.options import Gains, WalkOptions, check_gait_feet, check_options
 from floatbase.behaviours.path import DesiredMotion, Path
 from floatbase.behaviours.plan import (
@@ -59,9 +59,16 @@ _RESTART_GAP = 0.2  # s without a call, after which another controller may have 
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 # attributes of a walk that its copies do not share
-_MADE_ANEW = (
-    "_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_data", "_com",
-)  # fmt: skip
+_MADE_ANEW = [
+    "_posture",
+    "_controllers",
+    "_active",
+    "_clock",
+    "_desired",
+    "_history",
+    "_data",
+    "_com",
+]
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -76,8 +83,8 @@ class Walk:
     rest. If no contact forces can hold the feet, their contacts become soft.
 
     Between two changes of stance, a walk is a few arrays, and one compiled function writes all
-    targets of a control step. With a user-defined adjustment, or swings of another class than
-    `Swing`, slower functions do that.
+    targets of a control step. With a user-defined adjustment, swings of another class than
+    `Swing`, or a plan of another class than `LIPM`, slower functions do that.
 
     If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
@@ -122,6 +129,10 @@ class Walk:
         a mapping from feet in the air to the places where they land, shape (2,) or (3,), in the
         world frame [m]. The default shifts footholds by the error of the capture point,
         `step_adjustment`.
+    modify_plan : callable, optional
+        Called as modify_plan(plan, state) with each new `StepPlan` and the measured state. It
+        returns the plan to use, such as `dataclasses.replace(plan, plan=...)` with another
+        trajectory of the centre of mass (`CoMPlan`), and perhaps an earlier `replan_time`.
     swing : callable, optional
         Called as swing(start, end, lift_off, touchdown, clearance) when a foot lifts off. It
         returns the path of the foot, such as a `Swing`, which is the default.
@@ -180,6 +191,7 @@ class Walk:
         ramp: float = 0.1,
         foothold: Foothold | None = None,
         adjustment: Adjustment | None = None,
+        modify_plan: Callable[[StepPlan, State], StepPlan] | None = None,
         swing: Callable[..., SwingPath] | None = None,
         ground: Terrain | None = None,
         tasks: Sequence[Task] = (),
@@ -193,7 +205,6 @@ class Walk:
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
         self._active: ActivePlan | None = None
-        self._planning_path: Path | None = None
         self._speeds = 1.0, 1.0  # fractions in the first period, and later
         self._pose = BodyPose()
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
@@ -201,7 +212,7 @@ class Walk:
         check_options(type(self).__name__, options)
         self._options = WalkOptions.checked(
             self._all_contacts, clearance, reach, ramp, foothold or raibert_foothold, adjustment,
-            swing, ground, tasks, acceleration, gains, options,
+            modify_plan, swing, ground, tasks, acceleration, gains, options,
         )  # fmt: skip
         self._clear()
         self._prepare(gait)
@@ -338,7 +349,7 @@ class Walk:
         return self._active.swings if self._active else {}
 
     @property
-    def plan(self) -> LIPM | None:
+    def plan(self) -> CoMPlan | None:
         """Plan of the centre of mass's horizontal motion; None before the first control step."""
         return self._active.plan.plan if self._active else None
 
@@ -487,7 +498,8 @@ class Walk:
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._active, self._planning_path = None, None
+        self._active = None
+        self._planning_path: Path | None = None
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _prepare(self, gait: Gait) -> None:
@@ -565,6 +577,9 @@ class Walk:
             )  # fmt: skip
         finally:
             self._planning_path = None
+        if self._options.modify_plan is not None:
+            changed = self._options.modify_plan(plan, state)
+            plan = as_instance("the result of modify_plan", changed, StepPlan)
         self._history.append(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
         self._active = ActivePlan(
