@@ -76,10 +76,8 @@ class ActivePlan:
         self._numbers = None if not (compiled and usual) else _compiled_module()
         if self._numbers:
             self._write = self._numbers.write_targets
-            self._body, self._pieces = (
-                self._pack_body(self._numbers),
-                np.array(cast(LIPM, plan.plan).pieces),
-            )
+            self._body = self._pack_body(self._numbers)
+            self._pieces = np.array(cast(LIPM, plan.plan).pieces)
             self._rows = self._pack_swings(self._numbers)
 
     @property

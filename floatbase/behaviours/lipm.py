@@ -30,6 +30,10 @@ _MAX_GAP = 1e-6  # s: segments of a ZMP that are further apart are not consecuti
 class CoMPlan(Protocol):
     """Plan of the centre of mass's horizontal motion, such as `LIPM`."""
 
+    @property
+    def omega(self) -> float:
+        """Natural frequency of the pendulum [1/s]."""
+
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration at t [s], each (2,), in the world frame."""
 

@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     checked,
+    numeric_copy,
     short_repr,
 )
 from floatbase.behaviours.gait import Gait
@@ -205,3 +206,11 @@ def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
                 f"The gait lifts {foot}, which is not among the contacts: {names}. "
                 f"Contacts.feet(robot) returns all feet of a robot."
             )
+
+
+def as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
+    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
+    vector = numeric_copy(values)
+    if vector is None or vector.shape != (size,):
+        return as_array(name, values, (size,))
+    return vector

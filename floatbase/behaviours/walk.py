@@ -23,7 +23,6 @@ from floatbase._validation import (
     as_array,
     as_instance,
     as_number,
-    numeric_copy,
     refuse_new_attributes,
 )
 from floatbase.behaviours.active_plan import ActivePlan
@@ -31,7 +30,13 @@ from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.gait_clock import GaitClock
 from floatbase.behaviours.lipm import CoMPlan
-from floatbase.behaviours.options import Gains, WalkOptions, check_gait_feet, check_options
+from floatbase.behaviours.options import (
+    Gains,
+    WalkOptions,
+    as_vector,
+    check_gait_feet,
+    check_options,
+)
 from floatbase.behaviours.path import DesiredMotion, Path
 from floatbase.behaviours.plan import (
     StepPlan,
@@ -59,16 +64,7 @@ _RESTART_GAP = 0.2  # s without a call, after which another controller may have 
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 # attributes of a walk that its copies do not share
-_MADE_ANEW = [
-    "_posture",
-    "_controllers",
-    "_active",
-    "_clock",
-    "_desired",
-    "_history",
-    "_data",
-    "_com",
-]
+_MADE_ANEW = {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -148,7 +144,8 @@ class Walk:
         Pitch of the base relative to the standing posture, nose down if positive [rad]. It can be
         set while walking.
     acceleration : (float, float), optional
-        Largest acceleration of the desired velocity [m/s²] and of the yaw rate [rad/s²].
+        Largest acceleration of the path's velocity [m/s²] and yaw rate [rad/s²]. Robots fall if
+        the velocity jumps.
     gains : Gains, optional
         Gains of the tasks; by default `Gains.for_contacts(contacts)`.
     **options : object
@@ -197,7 +194,6 @@ class Walk:
         tasks: Sequence[Task] = (),
         height: float = 0.0,
         pitch: float = 0.0,
-        # 1 m/s² and 1 rad/s²: a jump of the desired velocity makes robots fall
         acceleration: tuple[float, float] = (1.0, 1.0),
         gains: Gains | None = None,
         **options: Any,
@@ -436,7 +432,7 @@ class Walk:
             Joint torques, with the planned accelerations and contact forces.
         """
         robot, t, active = self._robot, as_number("t", t, "s"), self._active
-        q, v = _as_vector("q", q, robot.nq), _as_vector("v", v, robot.nv)
+        q, v = as_vector("q", q, robot.nq), as_vector("v", v, robot.nv)
         if active is None or not self._continues(t):
             self.restart()
             self._forget_plan()
@@ -446,10 +442,11 @@ class Walk:
             self._change(State(robot, q, v), t)
         active = self._active
         assert active is not None
-        pin.centerOfMass(robot.model, self._data, q, v, False)
+        data, com, com_velocity = self._centroid
+        pin.centerOfMass(robot.model, data, q, v, False)
         controller = self._controllers[active.plan.stance]
         targets = controller.targets_at(t)
-        active.write(t, *self._com, targets)
+        active.write(t, com, com_velocity, targets)
         self._time = t
         return controller(q, v, t, targets)
 
@@ -490,8 +487,8 @@ class Walk:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
         self._controllers = StanceControllers(self._posture, self._options)
-        self._data = self._robot.model.createData()
-        self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
+        data = self._robot.model.createData()
+        self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
         self._start_time = self._next_change = -inf
         self._forget_plan()
         self.restart()
@@ -606,14 +603,6 @@ class Walk:
             f"{type(self).__name__}({self.robot.name}, {len(self.gait.feet)} feet, "
             f"{forwards:g} and {left:g} m/s)"
         )
-
-
-def _as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
-    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
-    vector = numeric_copy(values)
-    if vector is None or vector.shape != (size,):
-        return as_array(name, values, (size,))
-    return vector
 
 
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:

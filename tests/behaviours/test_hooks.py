@@ -12,6 +12,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.behaviours import LIPM, Gait, StepPlan, Swing, Walk, raibert_foothold
+from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -104,7 +105,7 @@ def test_a_plan_may_be_replaced_and_made_more_often() -> None:
         """A plan of the centre of mass that the compiled function does not know."""
 
         def __init__(self, lipm: LIPM):
-            self.dcm, self.zmp, self._lipm = lipm.dcm, lipm.zmp, lipm
+            self.dcm, self.zmp, self.omega, self._lipm = lipm.dcm, lipm.zmp, lipm.omega, lipm
 
         def __call__(self, t: float) -> Any:
             return self._lipm(t)
