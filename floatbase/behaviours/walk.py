@@ -220,29 +220,9 @@ class Walk:
         return self._robot
 
     @property
-    def clearance(self) -> float:
-        """Height of the swings [m]."""
-        return self._options.clearance
-
-    @property
-    def reach(self) -> float:
-        """Largest distance of a foothold from the nominal one below the body [m]."""
-        return self._options.reach
-
-    @property
-    def ramp(self) -> float:
-        """Time in which a foot is unloaded or loaded [s]."""
-        return self._options.ramp
-
-    @property
-    def foothold(self) -> Foothold:
-        """Function that returns the foothold of a foot."""
-        return self._options.foothold
-
-    @property
-    def gains(self) -> Gains:
-        """Gains of the tasks."""
-        return self._options.gains
+    def options(self) -> WalkOptions:
+        """Options that do not change, such as `options.reach`."""
+        return self._options
 
     @property
     def omega(self) -> float:
@@ -264,7 +244,7 @@ class Walk:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
-        if self._is_complete:
+        if hasattr(self, "_controllers"):  # the constructor has checked its arguments
             self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
@@ -399,21 +379,6 @@ class Walk:
         foot = self._all_contacts[foot].name  # an `UnknownNameError` lists the names
         return self.path_at(t).point(self._posture.nominal_feet[foot][:2])
 
-    def velocity_at(self, t: float) -> Array:
-        """Predict the body's velocity, if the desired velocity does not change.
-
-        Parameters
-        ----------
-        t : float
-            The time [s].
-
-        Returns
-        -------
-        ndarray, shape (2,)
-            Velocity in the world frame [m/s].
-        """
-        return self.path_at(t).point_velocity(np.zeros(2))
-
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """Compute the command of one control step.
 
@@ -478,11 +443,6 @@ class Walk:
             self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
         )
 
-    @property
-    def _is_complete(self) -> bool:
-        """Whether the constructor has checked its arguments."""
-        return "_controllers" in vars(self)
-
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
@@ -508,7 +468,7 @@ class Walk:
 
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
-        if not self._is_complete:
+        if not hasattr(self, "_controllers"):  # the constructor is still checking its arguments
             return
         self._speeds = speed_fractions(
             self._gait,
@@ -557,7 +517,7 @@ class Walk:
             self._refresh()
             stance, swings = self._clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
-                self._next_change = self._change_after(t, active.plan)
+                self._next_change = self._clock.next_change(t, active.plan.replan_time)
                 return
             footing, shift = next_footing(active.plan, swings, state, stance, t)
             path = active.path.moved(self._desired, t)
@@ -583,11 +543,7 @@ class Walk:
             posture, plan, self._desired, self._pose, self._options.reach, controller.targets,
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
-        self._next_change = self._change_after(t, plan)
-
-    def _change_after(self, t: float, plan: StepPlan) -> float:
-        """Return until when a plan that is in use at t needs no change [s]."""
-        return min(self._clock.stance_end(t), plan.replan_time) - TIME_TOLERANCE
+        self._next_change = self._clock.next_change(t, plan.replan_time)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
@@ -630,7 +586,8 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     -----
     The rule is from [Raibert1986]_.
     """
-    gait, path, velocity = walk.gait, walk.path_at(touchdown), walk.velocity_at(touchdown)
+    gait, path = walk.gait, walk.path_at(touchdown)
+    velocity = path.point_velocity(np.zeros(2))
     nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
     arm = nominal - path.position
     turning = yaw_rate * np.array([-arm[1], arm[0]])
