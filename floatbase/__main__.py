@@ -78,10 +78,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
         return 0
     if options.command == "compile":
+        from floatbase.behaviours import Gait, Walk  # not needed by the other commands
+
         go2 = fb.load("go2")
         controller = fb.WholeBodyController(
             go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
         )
+        Walk(go2, fb.Contacts.points(go2), Gait.trot(go2))  # compiles its targets
         print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
         return 0
     try:

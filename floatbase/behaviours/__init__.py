@@ -7,7 +7,7 @@ from floatbase.behaviours.footholds import (
     support_margin,
 )
 from floatbase.behaviours.gait import Gait
-from floatbase.behaviours.lipm import LIPM
+from floatbase.behaviours.lipm import LIPM, CoMPlan
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.plan import StepPlan
@@ -18,6 +18,7 @@ from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
     "LIPM",
+    "CoMPlan",
     "Gains",
     "Gait",
     "Stand",

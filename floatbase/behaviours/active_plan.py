@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -76,7 +76,8 @@ class ActivePlan:
         self._numbers = None if not (compiled and usual) else _compiled_module()
         if self._numbers:
             self._write = self._numbers.write_targets
-            self._body, self._pieces = self._pack_body(self._numbers), np.array(plan.plan.pieces)
+            self._body = self._pack_body(self._numbers)
+            self._pieces = np.array(cast(LIPM, plan.plan).pieces)
             self._rows = self._pack_swings(self._numbers)
 
     @property

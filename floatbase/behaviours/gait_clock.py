@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 
 
 class GaitClock:
@@ -72,6 +72,9 @@ class GaitClock:
         begin = max(t, self.gait.start)
         return any(self.gait.next_swing(foot, begin) for foot in self.gait.feet)
 
-    def stance_end(self, t: float) -> float:
-        """Return until when the stance at t does not change, at most 5 s later [s]."""
-        return self.gait.phases(t, 1)[0][1]
+    def next_change(self, t: float, replan_time: float) -> float:
+        """Return when the stance changes after t, or it is time to plan anew [s].
+
+        The result is at most 5 s later than t.
+        """
+        return min(self.gait.phases(t, 1)[0][1], replan_time) - TIME_TOLERANCE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -25,6 +25,23 @@ ZMPSegment: TypeAlias = tuple[float, float, Array, Array]
 # ω times the length of a plan: e^{300} is still a finite number, and half a minute of any robot
 _MAX_EXPONENT = 300.0
 _MAX_GAP = 1e-6  # s: segments of a ZMP that are further apart are not consecutive
+
+
+class CoMPlan(Protocol):
+    """Plan of the centre of mass's horizontal motion, such as `LIPM`."""
+
+    @property
+    def omega(self) -> float:
+        """Natural frequency of the pendulum [1/s]."""
+
+    def __call__(self, t: float) -> tuple[Array, Array, Array]:
+        """Return position, velocity and acceleration at t [s], each (2,), in the world frame."""
+
+    def dcm(self, t: float) -> Array:
+        """Return the divergent component of motion at t [s], shape (2,), world frame [m]."""
+
+    def zmp(self, t: float) -> Array:
+        """Return the zero-moment point at t [s], shape (2,), world frame [m]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from floatbase._validation import (
     as_instance,
     as_positive,
     checked,
+    numeric_copy,
     short_repr,
 )
 from floatbase.behaviours.gait import Gait
@@ -27,6 +28,7 @@ from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
 from floatbase.objectives import Task
+from floatbase.robots import State
 
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
 _MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
@@ -94,8 +96,9 @@ class WalkOptions:
     clearance, reach, ramp : float
         Height of the swings [m], largest distance of a foothold from the nominal one [m], and time
         in which a foot is loaded or unloaded [s].
-    foothold, adjustment, swing : callable
-        Rules for footholds, their adjustment (or None), and the paths of swings.
+    foothold, adjustment, modify_plan, swing : callable
+        Rules for footholds, their adjustment (or None), a change of each plan (or None), and the
+        paths of swings.
     ground : Terrain or None
         The ground, if it is known.
     tasks : tuple of Task
@@ -113,6 +116,7 @@ class WalkOptions:
     ramp: float
     foothold: Callable[..., npt.ArrayLike]
     adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None
+    modify_plan: Callable[[Any, State], Any] | None
     swing: Callable[..., SwingPath]
     ground: Terrain | None
     tasks: tuple[Task, ...]
@@ -128,6 +132,7 @@ class WalkOptions:
         ramp: float,
         foothold: Callable[..., npt.ArrayLike],
         adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None,
+        modify_plan: Callable[[Any, State], Any] | None,
         swing: Callable[..., SwingPath] | None,
         ground: Terrain | None,
         tasks: Sequence[Task],
@@ -146,6 +151,8 @@ class WalkOptions:
         if adjustment is not None:
             example = "adjustment(plan, path, com, com_velocity, t)"
             as_callable("adjustment", adjustment, example)
+        if modify_plan is not None:
+            as_callable("modify_plan", modify_plan, "modify_plan(plan, state)")
         if ground is not None and not isinstance(ground, Terrain):
             raise InputError(
                 f"ground must have the methods height(xy) and normal(xy), as fb.Ground has, but "
@@ -160,6 +167,7 @@ class WalkOptions:
             as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
             as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
             adjustment,
+            modify_plan,
             Swing if swing is None else as_callable("swing", swing, example),
             ground,
             tuple(tasks),
@@ -198,3 +206,11 @@ def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
                 f"The gait lifts {foot}, which is not among the contacts: {names}. "
                 f"Contacts.feet(robot) returns all feet of a robot."
             )
+
+
+def as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
+    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
+    vector = numeric_copy(values)
+    if vector is None or vector.shape != (size,):
+        return as_array(name, values, (size,))
+    return vector

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from floatbase._validation import Array, as_array, frozen
 from floatbase.behaviours.footholds import capture_point, support_margin
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
-from floatbase.behaviours.lipm import LIPM, ZMPSegment
+from floatbase.behaviours.lipm import LIPM, CoMPlan, ZMPSegment
 from floatbase.behaviours.options import WalkOptions
 from floatbase.behaviours.path import Path, yaw_of
 from floatbase.behaviours.posture import WalkingPosture
@@ -105,8 +105,8 @@ class StepPlan:
         The feet on the ground.
     footholds : dict of str to ndarray, shape (3,)
         Planned foothold of each foot that is in the air or lifts off next, in the world frame [m].
-    plan : LIPM
-        Plan of the centre of mass.
+    plan : CoMPlan
+        Plan of the centre of mass, such as a `LIPM`.
     planned_swings : dict of str to PlannedSwing
         The feet in the air.
     path : Path
@@ -125,7 +125,7 @@ class StepPlan:
     stance: tuple[str, ...]
     footing: Footing
     footholds: Mapping[str, Array]
-    plan: LIPM
+    plan: CoMPlan
     planned_swings: Mapping[str, PlannedSwing]
     path: Path
     ground: Plane

@@ -23,15 +23,20 @@ from floatbase._validation import (
     as_array,
     as_instance,
     as_number,
-    numeric_copy,
     refuse_new_attributes,
 )
 from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.gait_clock import GaitClock
-from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import Gains, WalkOptions, check_gait_feet, check_options
+from floatbase.behaviours.lipm import CoMPlan
+from floatbase.behaviours.options import (
+    Gains,
+    WalkOptions,
+    as_vector,
+    check_gait_feet,
+    check_options,
+)
 from floatbase.behaviours.path import DesiredMotion, Path
 from floatbase.behaviours.plan import (
     StepPlan,
@@ -64,9 +69,7 @@ _RESTART_GAP = 0.2  # s without a call, after which another controller may have 
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 # attributes of a walk that its copies do not share
-_MADE_ANEW = (
-    "_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_data", "_com",
-)  # fmt: skip
+_MADE_ANEW = {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -81,8 +84,8 @@ class Walk:
     rest. If no contact forces can hold the feet, their contacts become soft.
 
     Between two changes of stance, a walk is a few arrays, and one compiled function writes all
-    targets of a control step. With a user-defined adjustment, or swings of another class than
-    `Swing`, slower functions do that.
+    targets of a control step. With a user-defined adjustment, swings of another class than
+    `Swing`, or a plan of another class than `LIPM`, slower functions do that.
 
     If the time jumps back, or forward by more than 0.2 s, the controller starts again from
     the measured state. A controller that wraps it needs an attribute `contacts` with the present
@@ -127,6 +130,10 @@ class Walk:
         a mapping from feet in the air to the places where they land, shape (2,) or (3,), in the
         world frame [m]. The default shifts footholds by the error of the capture point,
         `step_adjustment`.
+    modify_plan : callable, optional
+        Called as modify_plan(plan, state) with each new `StepPlan` and the measured state. It
+        returns the plan to use, such as `dataclasses.replace(plan, plan=...)` with another
+        trajectory of the centre of mass (`CoMPlan`), and perhaps an earlier `replan_time`.
     swing : callable, optional
         Called as swing(start, end, lift_off, touchdown, clearance) when a foot lifts off. It
         returns the path of the foot, such as a `Swing`, which is the default.
@@ -143,7 +150,8 @@ class Walk:
         Pitch of the base relative to the standing posture, nose down if positive [rad]. It can be
         set while walking.
     acceleration : (float, float), optional
-        Largest acceleration of the desired velocity [m/s²] and of the yaw rate [rad/s²].
+        Largest acceleration of the path's velocity [m/s²] and yaw rate [rad/s²]. Robots fall if
+        the velocity jumps.
     gains : Gains, optional
         Gains of the tasks; by default `Gains.for_contacts(contacts)`.
     **options : object
@@ -186,12 +194,12 @@ class Walk:
         ramp: float = 0.1,
         foothold: Foothold | None = None,
         adjustment: Adjustment | None = None,
+        modify_plan: Callable[[StepPlan, State], StepPlan] | None = None,
         swing: Callable[..., SwingPath] | None = None,
         ground: Terrain | None = None,
         tasks: Sequence[Task] = (),
         height: float = 0.0,
         pitch: float = 0.0,
-        # 1 m/s² and 1 rad/s²: a jump of the desired velocity makes robots fall
         acceleration: tuple[float, float] = (1.0, 1.0),
         gains: Gains | None = None,
         **options: Any,
@@ -199,7 +207,6 @@ class Walk:
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
         self._active: ActivePlan | None = None
-        self._planning_path: Path | None = None
         self._speeds = 1.0, 1.0  # fractions in the first period, and later
         self._pose = BodyPose()
         self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
@@ -207,7 +214,7 @@ class Walk:
         check_options(type(self).__name__, options)
         self._options = WalkOptions.checked(
             self._all_contacts, clearance, reach, ramp, foothold or raibert_foothold, adjustment,
-            swing, ground, tasks, acceleration, gains, options,
+            modify_plan, swing, ground, tasks, acceleration, gains, options,
         )  # fmt: skip
         self._clear()
         self._prepare(gait)
@@ -219,34 +226,9 @@ class Walk:
         return self._robot
 
     @property
-    def clearance(self) -> float:
-        """Height of the swings [m]."""
-        return self._options.clearance
-
-    @property
-    def reach(self) -> float:
-        """Largest distance of a foothold from the nominal one below the body [m]."""
-        return self._options.reach
-
-    @property
-    def ground(self) -> Terrain | None:
-        """The ground, if the walk knows it."""
-        return self._options.ground
-
-    @property
-    def ramp(self) -> float:
-        """Time in which a foot is unloaded or loaded [s]."""
-        return self._options.ramp
-
-    @property
-    def foothold(self) -> Foothold:
-        """Function that returns the foothold of a foot."""
-        return self._options.foothold
-
-    @property
-    def gains(self) -> Gains:
-        """Gains of the tasks."""
-        return self._options.gains
+    def options(self) -> WalkOptions:
+        """Options that do not change, such as `options.reach`."""
+        return self._options
 
     @property
     def omega(self) -> float:
@@ -268,7 +250,7 @@ class Walk:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
         if len(gait.feet) == len(self._all_contacts):
             check_always_supported(gait)
-        if self._is_complete:
+        if hasattr(self, "_controllers"):  # the constructor has checked its arguments
             self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
@@ -349,7 +331,7 @@ class Walk:
         return self._active.swings if self._active else {}
 
     @property
-    def plan(self) -> LIPM | None:
+    def plan(self) -> CoMPlan | None:
         """Plan of the centre of mass's horizontal motion; None before the first control step."""
         return self._active.plan.plan if self._active else None
 
@@ -403,21 +385,6 @@ class Walk:
         foot = self._all_contacts[foot].name  # an `UnknownNameError` lists the names
         return self.path_at(t).point(self._posture.nominal_feet[foot][:2])
 
-    def velocity_at(self, t: float) -> Array:
-        """Predict the body's velocity, if the desired velocity does not change.
-
-        Parameters
-        ----------
-        t : float
-            The time [s].
-
-        Returns
-        -------
-        ndarray, shape (2,)
-            Velocity in the world frame [m/s].
-        """
-        return self.path_at(t).point_velocity(np.zeros(2))
-
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
         """Compute the command of one control step.
 
@@ -436,7 +403,7 @@ class Walk:
             Joint torques, with the planned accelerations and contact forces.
         """
         robot, t, active = self._robot, as_number("t", t, "s"), self._active
-        q, v = _as_vector("q", q, robot.nq), _as_vector("v", v, robot.nv)
+        q, v = as_vector("q", q, robot.nq), as_vector("v", v, robot.nv)
         if active is None or not self._continues(t):
             self.restart()
             self._forget_plan()
@@ -446,10 +413,11 @@ class Walk:
             self._change(State(robot, q, v), t)
         active = self._active
         assert active is not None
-        pin.centerOfMass(robot.model, self._data, q, v, False)
+        data, com, com_velocity = self._centroid
+        pin.centerOfMass(robot.model, data, q, v, False)
         controller = self._controllers[active.plan.stance]
         targets = controller.targets_at(t)
-        active.write(t, *self._com, targets)
+        active.write(t, com, com_velocity, targets)
         self._time = t
         return controller(q, v, t, targets)
 
@@ -481,24 +449,20 @@ class Walk:
             self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
         )
 
-    @property
-    def _is_complete(self) -> bool:
-        """Whether the constructor has checked its arguments."""
-        return "_controllers" in vars(self)
-
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
         self._controllers = StanceControllers(self._posture, self._options)
-        self._data = self._robot.model.createData()
-        self._com = self._data.com[0], self._data.vcom[0]  # views, overwritten in each step
+        data = self._robot.model.createData()
+        self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
         self._start_time = self._next_change = -inf
         self._forget_plan()
         self.restart()
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._active, self._planning_path, self._lean = None, None, 0.0
+        self._active, self._lean = None, 0.0
+        self._planning_path: Path | None = None
         self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
 
     def _prepare(self, gait: Gait) -> None:
@@ -510,7 +474,7 @@ class Walk:
 
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
-        if not self._is_complete:
+        if not hasattr(self, "_controllers"):  # the constructor is still checking its arguments
             return
         self._speeds = speed_fractions(
             self._gait,
@@ -559,7 +523,7 @@ class Walk:
             self._refresh()
             stance, swings = self._clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
-                self._next_change = self._change_after(t, active.plan)
+                self._next_change = self._clock.next_change(t, active.plan.replan_time)
                 return
             footing, shift = next_footing(active.plan, swings, state, stance, t)
             path = active.path.moved(self._desired, t)
@@ -576,6 +540,9 @@ class Walk:
             )  # fmt: skip
         finally:
             self._planning_path = None
+        if self._options.modify_plan is not None:
+            changed = self._options.modify_plan(plan, state)
+            plan = as_instance("the result of modify_plan", changed, StepPlan)
         self._history.append(plan)
         self._update_lean(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
@@ -584,7 +551,7 @@ class Walk:
             controller.targets,
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
-        self._next_change = self._change_after(t, plan)
+        self._next_change = self._clock.next_change(t, plan.replan_time)
 
     @property
     def _leaning_pose(self) -> BodyPose:
@@ -603,10 +570,6 @@ class Walk:
         uphill = float(np.arctan(plan.ground.slope @ heading))
         self._lean += _LEAN_FRACTION * (-uphill - self._lean)
 
-    def _change_after(self, t: float, plan: StepPlan) -> float:
-        """Return until when a plan that is in use at t needs no change [s]."""
-        return min(self._clock.stance_end(t), plan.replan_time) - TIME_TOLERANCE
-
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
         return {key: value for key, value in vars(self).items() if key not in _MADE_ANEW}
@@ -621,14 +584,6 @@ class Walk:
             f"{type(self).__name__}({self.robot.name}, {len(self.gait.feet)} feet, "
             f"{forwards:g} and {left:g} m/s)"
         )
-
-
-def _as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
-    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
-    vector = numeric_copy(values)
-    if vector is None or vector.shape != (size,):
-        return as_array(name, values, (size,))
-    return vector
 
 
 def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
@@ -656,17 +611,18 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     -----
     The rule is from [Raibert1986]_.
     """
-    gait, path, velocity = walk.gait, walk.path_at(touchdown), walk.velocity_at(touchdown)
+    gait, path = walk.gait, walk.path_at(touchdown)
+    velocity = path.point_velocity(np.zeros(2))
     nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
     arm = nominal - path.position
     turning = yaw_rate * np.array([-arm[1], arm[0]])
     centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
     point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
     foothold: Array = point - centripetal / walk.omega**2
-    if walk.ground is None:
+    if walk.options.ground is None:
         return foothold
     around = _outline(walk.robot.foot(foot), path.yaw)
-    return level_place(walk.ground, foothold, around, _EDGE_REACH)
+    return level_place(walk.options.ground, foothold, around, _EDGE_REACH)
 
 
 def _outline(foot: Foot, yaw: float) -> Array:

@@ -11,7 +11,8 @@ import numpy.typing as npt
 import pytest
 
 import floatbase as fb
-from floatbase.behaviours import Gait, StepPlan, Swing, Walk, raibert_foothold
+from floatbase.behaviours import LIPM, Gait, StepPlan, Swing, Walk, raibert_foothold
+from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -65,6 +66,12 @@ def test_a_foothold_may_have_a_height(height: float | None) -> None:
         assert np.isclose(place[2], level if height is None else height, atol=1e-3), foot
 
 
+def test_a_foothold_of_a_wrong_shape_is_refused() -> None:
+    record = run(trot(foothold=lambda foot, touchdown, walk: np.zeros(4)), 0.3)
+    assert record.outcome == "controller failed" and isinstance(record.error, InputError)
+    assert "(4,)" in str(record.error)
+
+
 def test_a_user_defined_adjustment_decides_where_feet_land() -> None:
     asked = set()
 
@@ -91,6 +98,31 @@ def test_a_user_defined_adjustment_decides_where_feet_land() -> None:
         for foot in a.planned_swings
     ]
     assert max(moved[:2]) < 0.01 < min(moved[2:])  # m
+
+
+def test_a_plan_may_be_replaced_and_made_more_often() -> None:
+    class Wrapped:
+        """A plan of the centre of mass that the compiled function does not know."""
+
+        def __init__(self, lipm: LIPM):
+            self.dcm, self.zmp, self.omega, self._lipm = lipm.dcm, lipm.zmp, lipm.omega, lipm
+
+        def __call__(self, t: float) -> Any:
+            return self._lipm(t)
+
+    def wrap(plan: StepPlan, state: fb.State) -> StepPlan:
+        return replace(plan, plan=Wrapped(plan.plan))
+
+    def often(plan: StepPlan, state: fb.State) -> StepPlan:
+        return replace(plan, replan_time=plan.time + 0.02)
+
+    default, wrapped, more = (trot(modify_plan=change) for change in (None, wrap, often))
+    records = [run(walk, 0.8) for walk in (default, wrapped, more)]
+    assert all(record.outcome == "completed" for record in records)
+    assert np.abs(records[0].q - records[1].q).max() < 1e-9
+    assert len(more.history) > 30 > 5 > len(default.history)
+    failed = run(trot(modify_plan=lambda plan, state: 3), 0.1)
+    assert failed.outcome == "controller failed" and isinstance(failed.error, InputError)
 
 
 def test_swings_may_have_another_shape_or_class() -> None:

@@ -337,7 +337,7 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
     assert record.outcome == "completed"  # it falls if footholds are limited around the plan
     assert (
-        reach < leg + walk.reach + 0.05
+        reach < leg + walk.options.reach + 0.05
     )  # relative to the body, which the push has moved away from the plan
 
 

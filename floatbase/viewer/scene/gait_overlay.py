@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from floatbase._geometry import rotation_z
 from floatbase._validation import Array, as_instance, as_number, short_repr
-from floatbase.behaviours import LIPM, StepPlan, Swing, SwingPath, Walk, capture_point
+from floatbase.behaviours import CoMPlan, StepPlan, Swing, SwingPath, Walk, capture_point
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Foot, Robot, State
 from floatbase.viewer.scene import geometry, threejs
@@ -153,7 +153,7 @@ def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
     return [as_instance("a step", step, StepPlan, "one of walk.history") for step in steps]
 
 
-def _capture_point_and_zmp(plan: LIPM, t: float, state: State, style: Style) -> Picture:
+def _capture_point_and_zmp(plan: CoMPlan, t: float, state: State, style: Style) -> Picture:
     """Draw the capture point and the planned zero-moment point at time t [s]."""
     dcm, zmp = (
         capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega),
