@@ -109,7 +109,7 @@ def judge_feedback(answer: Any) -> Verdict:
         return (com + turn).pullback(eta) + 1e-4 * costs["effort"]
 
     controller = MinimumCostController(robot, contacts, cost)
-    push = fb.Push([0.0, PUSH, 0.0], start=PUSH_START, duration=0.1)
+    push = fb.Push(np.array([0.0, PUSH, 0.0]), start=PUSH_START, duration=0.1)
     try:
         first = array_or_verdict(program(standing_go2_eom().state), (3,))
         if isinstance(first, Verdict):

@@ -27,7 +27,9 @@ EXERCISES = (
         "    force = np.array([0, 0, robot.weight])  # change both\n"
         "    moment = np.zeros(3)\n"
         "    return force, moment",
-        solution="def desired_wrench(now, goal):\n"
+        solution="from floatbase.lessons.lesson05 import rotation_error\n"
+        "from floatbase.objectives import centroidal_inertia\n\n\n"
+        "def desired_wrench(now, goal):\n"
         "    weight = np.array([0, 0, robot.weight])\n"
         "    a = -100 * (now.com - goal.com) - 20 * now.com_velocity\n"
         '    omega = now.frame_velocity("base")[3:]\n'
@@ -90,7 +92,8 @@ EXERCISES = (
         stub="def design(force):  # N, world, with the weight\n"
         "    goal = wrench_objective(state, contacts, force, np.zeros(3))\n"
         "    return goal + 1e-3 * force_bias(contacts, 0.1, robot.weight / 4)  # change it",
-        solution="def design(force):  # N, world, with the weight\n"
+        solution="from floatbase.objectives import tangential_bias\n\n\n"
+        "def design(force):  # N, world, with the weight\n"
         "    goal = wrench_objective(state, contacts, force, np.zeros(3))\n"
         "    direction = force / np.linalg.norm(force)  # of all forces together\n"
         "    inclined = fb.Contacts.points(robot, normals=direction)\n"

@@ -265,7 +265,8 @@ def judge_design(answer: Any) -> Verdict:
     program = function_or_verdict(answer)
     if isinstance(program, Verdict):
         return program
-    eom, found = standing_go2_eom(), {}
+    eom = standing_go2_eom()
+    found: dict[str, Array] = {}
     for name in DESIRED_FORCES:
         try:
             cost = program(_goal(name))
@@ -274,8 +275,9 @@ def judge_design(answer: Any) -> Verdict:
                 False, f"Your function stops with {type(error).__name__}: {error}", "stops"
             )
         forces = minimiser_or_verdict(cost, eom.k, "λ")
-        wrong = forces if isinstance(forces, Verdict) else _wrong_forces(eom, forces, _goal(name))
-        if wrong:
+        if isinstance(forces, Verdict):
+            return replace(forces, text=f"With {name}: {forces.text}")
+        if wrong := _wrong_forces(eom, forces, _goal(name)):
             return replace(wrong, text=f"With {name}: {wrong.text}")
         found[name] = forces
     return _in_simulation(eom, found["60 N forwards"])

@@ -310,7 +310,6 @@ EXERCISES = (
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import wrench_objective\n\n"
-        "hill_state, hill_contacts = stance_on_hill()\n"
         "carry = wrench_objective(hill_state, hill_contacts, [0, 0, robot.weight], np.zeros(3))\n"
         "small = fb.Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-6)\n"
         "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in hill_contacts.normals]\n"
