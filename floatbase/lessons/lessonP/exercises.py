@@ -25,6 +25,7 @@ MAX_KP = 1e5  # 1/s²: the largest kp that is simulated
 MISTAKE_TOLERANCE = 0.01  # fraction of a mistake's value
 TIME_ON_TWO_FEET = 1.0  # s: required time on two feet
 HEIGHT = 1e-4  # m: smaller changes of height count as zero
+FULL_MILLIMETRE = 5.5e-4  # m: a shift that is rounded to full millimetres is right
 
 
 def _load() -> float:
@@ -159,7 +160,7 @@ _SHIFT = NumericJudge(
         "halfway": "That is half-way. The centre of mass is not above the line yet.",
         "direction": "That is only a direction: a unit vector along the diagonal.",
     },
-    tolerance=0.06,  # 0.6 mm: a shift in full millimetres is right
+    tolerance=0.02,
 )
 
 
@@ -172,9 +173,8 @@ def _judge_shift(given: Array) -> Verdict:
             "Seen from above, the centre of mass keeps its height, so the third number is 0.",
             "height",
         )
-    verdict = _SHIFT(given)
-    if not verdict.right:
-        return verdict
+    if np.abs(given - _nearest()).max() > FULL_MILLIMETRE:
+        return _SHIFT(given)
     times = [time_on_two_feet(shift) for shift in (np.zeros(3), given)]
     if times[1] < TIME_ON_TWO_FEET:
         return Verdict(
@@ -210,7 +210,8 @@ def _stiffnesses() -> list[Example]:
 
 
 def _shifts() -> list[Example]:
-    return [*_SHIFT.examples(), (_nearest() + [0.0, 0.0, 0.1], "height")]
+    rounded_shift = np.round(_nearest(), 3)
+    return [*_SHIFT.examples(), (rounded_shift, ""), (_nearest() + [0.0, 0.0, 0.1], "height")]
 
 
 EXERCISES = (
