@@ -19,13 +19,12 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.control import WholeBodyController
 from floatbase.control.limits import force_rows
-from floatbase.control.problem import Problem
 from floatbase.control.tick import tick
 from floatbase.control.tick.compiled import CompiledTick
 from floatbase.control.tick.problem_arrays import pack_problem
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
-from floatbase.objectives import CoMTask, FrameTask, Task
+from floatbase.objectives import CoMTask, FrameTask
 from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
 from floatbase.simulation.after_fall import joint_damping
@@ -210,17 +209,18 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
     made = controller(robot, lifted=lifted, facets=facets)
     compiled = made.compiled
     assert compiled is not None  # all of its objects are built in
-    sizes, ints, floats, *_ = pack_problem(made.problem)
+    sizes, ints, floats = pack_problem(made.problem, compiled.layout)
     inputs = compiled.default_inputs
     n_floats, n_ints = tick.workspace_sizes(sizes, 0)
-    places = _target_places(made.problem, compiled)
+    places = _target_places(compiled)
 
     def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
         limits = replace(
             made.limits, torque_limits=torque_fraction * np.array(made.limits.torque_limits)
         )
         contacts = _stance(robot, mu, lifted)
-        return pack_problem(replace(made.problem, contacts=contacts, limits=limits))[2]
+        problem = replace(made.problem, contacts=contacts, limits=limits)
+        return pack_problem(problem, compiled.layout)[2]
 
     return {
         "lifted": lifted,
@@ -302,22 +302,15 @@ def _check(found: Array, expected: Array) -> None:
     assert np.allclose(found, expected, rtol=_TOLERANCE, atol=_TOLERANCE)
 
 
-def _target_places(problem: Problem, compiled: CompiledTick) -> dict[str, Any]:
+def _target_places(compiled: CompiledTick) -> dict[str, Any]:
     """Return where the targets of the centre of mass and of a lifted foot are among the inputs."""
-    inputs = compiled.default_inputs.packed
 
-    def places(kind: type[CoMTask] | type[FrameTask]) -> tuple[Task, list[int]]:
-        tasks = list(problem.tasks)
-        (index,) = [i for i, task in enumerate(tasks) if isinstance(task, kind)]
-        task: Any = tasks[index]
-        tasks[index] = replace(task, position=np.array(task.position) + 1.0)
-        targets = pack_problem(replace(problem, tasks=tasks))[3]
-        at = np.flatnonzero(targets != inputs[: targets.size])
-        assert len(at) == 3
-        return task, [int(i) for i in at]
+    def places(kind: type[CoMTask] | type[FrameTask]) -> list[int]:
+        (at,) = [each.entries for each in compiled.layout.tasks if isinstance(each.task, kind)]
+        return list(range(at.start, at.start + 3))  # the position comes first
 
-    found: dict[str, Any] = {"com": places(CoMTask)[1]}
-    if any(isinstance(task, FrameTask) for task in problem.tasks):
-        _, (_, _, found["lift"]) = places(FrameTask)
-        found["liftedHeight"] = float(inputs[found["lift"]])
+    found: dict[str, Any] = {"com": places(CoMTask)}
+    if any(isinstance(each.task, FrameTask) for each in compiled.layout.tasks):
+        found["lift"] = places(FrameTask)[2]
+        found["liftedHeight"] = float(compiled.default_inputs.packed[found["lift"]])
     return found
