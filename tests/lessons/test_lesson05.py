@@ -15,13 +15,13 @@ from floatbase.lessons.lesson05 import (
     ConstantForceController,
     com_in_base,
     friction_ratios,
+    inclined_design,
     moving_and_goal_state,
     plot_constrained_minimum,
     show_forces,
     show_moved_com,
     stretched_arm_state,
 )
-from floatbase.lessons.lesson05.verdicts import inclined_design
 from floatbase.objectives import (
     com_wrench_map,
     normal_bias,

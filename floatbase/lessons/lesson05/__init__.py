@@ -19,6 +19,7 @@ from floatbase.lessons.lesson05.pictures import (
     show_forces,
     show_moved_com,
 )
+from floatbase.lessons.lesson05.verdicts import inclined_design
 
 __all__ = [
     "EXERCISES",
@@ -26,6 +27,7 @@ __all__ = [
     "arm_robot_eom",
     "com_in_base",
     "friction_ratios",
+    "inclined_design",
     "make_controller",
     "moving_and_goal_state",
     "plot_constrained_minimum",
