@@ -134,11 +134,11 @@ def rounds_from_guess(guess: Sequence[str]) -> int:
 
 
 LONGEST_STEP_STUB = '''def longest_step(x, p, G, h, W):
-    """How far from x along p, at most 1, all rows hold, and the row that blocks."""
-    return 1.0, None  # replace: from slack and speed of each row'''
+    """How far from x along p, at most 1, all constraints hold, and which one blocks."""
+    return 1.0, None  # replace: from slack and speed of each constraint'''
 
 LONGEST_STEP = '''def longest_step(x, p, G, h, W):
-    """How far from x along p, at most 1, all rows hold, and the row that blocks."""
+    """How far from x along p, at most 1, all constraints hold, and which one blocks."""
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):
@@ -147,11 +147,11 @@ LONGEST_STEP = '''def longest_step(x, p, G, h, W):
     return length, blocking'''
 
 ROW_TO_DROP_STUB = '''def row_to_drop(W, prices):
-    """The row of W that pulls hardest, or None."""
-    return None  # replace; W and prices have one entry for each row that is on'''
+    """The constraint of W that pulls hardest, or None."""
+    return None  # replace; W and prices have one entry for each row in W'''
 
 ROW_TO_DROP = '''def row_to_drop(W, prices):
-    """The row of W that pulls hardest, or None."""
+    """The constraint of W that pulls hardest, or None."""
     if len(W) == 0 or min(prices) > -1e-9:
         return None
     return W[int(np.argmin(prices))]'''
