@@ -345,7 +345,12 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
             break
         press = share * robot.weight  # at every foot
         controller = fb.WholeBodyController(
-            robot, judges.stance(robot), tasks, min_normal_force=press, backend="reference"
+            robot,
+            judges.stance(robot),
+            tasks,
+            min_normal_force=press,
+            backend="reference",
+            joint_limits=None,
         )
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
