@@ -51,7 +51,7 @@ def same(a: Any, b: Any) -> bool:
 def test_every_kind_of_answer_of_the_course_comes_back_to_the_last_bit() -> None:
     placeholders = {name: exercise.placeholder() for name, exercise in all_exercises().items()}
     answers = {name: answer for name, answer in placeholders.items() if not callable(answer)}
-    assert len(answers) > 40
+    assert len(answers) > 30
     back = {name: through_a_file(answer) for name, answer in answers.items()}
     assert [name for name, answer in answers.items() if not same(answer, back[name])] == []
 
