@@ -71,6 +71,7 @@ class ActivePlan:
         usual = (
             adjustment is None
             and type(plan.plan) is LIPM
+            and plan.plan.omega == posture.omega
             and all(type(path) is Swing for path in self._swings.values())
         )
         self._numbers = None if not (compiled and usual) else _compiled_module()
@@ -151,7 +152,8 @@ class ActivePlan:
         if self._adjustment is None:
             ends = adjusted_ends(posture, self._reach, plan, path, com, com_velocity, t)
         else:
-            ends = self._user_ends(path, com, com_velocity, t)
+            # copies, since users may keep them
+            ends = self._user_ends(path, com.copy(), com_velocity.copy(), t)
         self._swings = {
             foot: swing.with_end(ends[foot]) if foot in ends else swing
             for foot, swing in self._swings.items()

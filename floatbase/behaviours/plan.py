@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import inf
+from math import inf, pi, remainder
 from typing import TypeAlias
 
 import numpy as np
@@ -263,7 +263,7 @@ def make_plan(
         if previous and foot in (swings or {}) and foot not in stance:
             planned[foot] = replace(previous.planned_swings[foot], path=(swings or {})[foot])
         elif times:
-            yaws = _foot_yaw(posture, state, foot), yaw_at(times[1])
+            yaws = _nearest_yaws(_foot_yaw(posture, state, foot), yaw_at(times[1]))
             planned[foot] = _planned_swing(
                 posture, options, state.point(foot), foot, footholds[foot], times, yaws
             )
@@ -380,6 +380,14 @@ def _planned_swing(
 def _foot_yaw(posture: WalkingPosture, state: State, foot: str) -> float:
     """Return the yaw of a foot relative to the standing posture [rad]."""
     return yaw_of(state.frame_pose(foot).rotation @ posture.rotation(foot).T)
+
+
+def _nearest_yaws(first: float, last: float) -> tuple[float, float]:
+    """Return two yaw angles with `first` within half a turn of `last` [rad].
+
+    The measured yaw of a foot is at most π, but the yaw of the path counts whole turns.
+    """
+    return last - remainder(last - first, 2.0 * pi), last
 
 
 def _stance_centres(

@@ -74,7 +74,11 @@ class StanceControllers:
             arguments: dict[str, Any] = {
                 "max_normal_force": self._normal_force_bounds(stance),
                 "on_infeasible": "soften",  # torques and friction may be unable to hold the feet
-                "joint_limits": JointLimits.of(robot, weight=_JOINT_LIMIT_WEIGHT),
+                "joint_limits": JointLimits.of(
+                    robot,
+                    torque_limits=self._options.controller.get("torque_limits"),
+                    weight=_JOINT_LIMIT_WEIGHT,
+                ),
                 **self._options.controller,
             }
             contacts = self._posture.contacts.only(*stance)

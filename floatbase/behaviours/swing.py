@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -109,6 +109,8 @@ class Swing(Value):
         Swing
             The new path.
         """
+        if type(self) is not Swing:  # a derived class may compute more from the end
+            return replace(self, end=end)
         other = object.__new__(Swing)
         vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
         return other

@@ -14,6 +14,9 @@ from floatbase.errors import InputError
 from floatbase.objectives import Task
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
 
+# fraction of the largest slope that it balances: smaller multipliers may be rounding errors
+_SIGNIFICANT_MULTIPLIER = 1e-6
+
 
 def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
     """Return tasks as one list, and the number of tasks in each level.
@@ -100,8 +103,9 @@ def solve_levels(
     """Solve the QP of each priority level, subject to the optima of the levels before.
 
     The optimum of a level has the same residuals wherever it is attained, because the cost is
-    strictly convex in them. The next level therefore keeps the residuals, not the variables. Soft
-    inequalities are violated no more than in the first level.
+    strictly convex in them. The next level therefore keeps the residuals, not the variables. An
+    inequality with a positive multiplier is active at all these optima, so the next level keeps it
+    as an equality. Soft inequalities are violated no more than in the first level.
 
     Parameters
     ----------
@@ -131,16 +135,27 @@ def solve_levels(
     solutions: list[Solution] = []
     A, b, names = qps[0].A, qps[0].b, qps[0].equality_names
     h, penalties = qps[0].h, qps[0].penalties
+    kept: dict[str, float] = {}
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
         level = replace(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
         solution = solve(level, solver)
         if solutions:
             earlier = solutions[-1].violations
-            solution = replace(solution, earlier_violations=earlier)
+            solution = replace(solution, earlier_violations=earlier, earlier_multipliers=dict(kept))
         solutions.append(solution)
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
         h, penalties = np.maximum(h, qp.G @ solution.x + FEASIBILITY_TOLERANCE * qp.row_norms), None
         rows, right, labels = with_fixed_residuals(qp, solution, tasks, terms)
-        A, b, names = np.vstack([A, rows]), np.append(b, right), (*names, *labels)
+        # relaxed like the others, these rows would let the torques change by far more than that
+        scaled = solution.inequality_multipliers * qp.row_norms
+        slopes = np.concatenate([qp.g, qp.H @ solution.x, scaled])
+        active = np.flatnonzero(scaled > _SIGNIFICANT_MULTIPLIER * np.max(np.abs(slopes)))
+        active_names = [qp.inequality_names[i] for i in active]
+        kept.update(
+            zip(active_names, solution.inequality_multipliers[active].tolist(), strict=True)
+        )
+        A = np.vstack([A, rows, qp.G[active]])
+        b = np.concatenate([b, right, qp.G[active] @ solution.x])
+        names = (*names, *labels, *active_names)
     return solutions

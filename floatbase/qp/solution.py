@@ -62,6 +62,9 @@ class Solution(Value):
     earlier_violations : mapping of str to float, optional
         Violations of soft inequalities in a QP of higher priority, whose h this problem has relaxed
         accordingly [units of h].
+    earlier_multipliers : mapping of str to float, optional
+        Multipliers of inequalities that are active in a QP of higher priority, and are equality
+        constraints of this problem.
     """
 
     qp: QP
@@ -70,6 +73,7 @@ class Solution(Value):
     solver: str
     iterations: int = 0
     earlier_violations: Mapping[str, float] = field(default_factory=dict)
+    earlier_multipliers: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("x", "inequality_multipliers"):
@@ -113,17 +117,18 @@ class Solution(Value):
         qp, scaled = self.qp, self.inequality_multipliers * self.qp.row_norms
         slopes = np.concatenate([qp.g, qp.H @ self.x, scaled])
         is_active = scaled > _ACTIVE_TOLERANCE * np.max(np.abs(slopes), initial=0.0)
-        return tuple(qp.inequality_names[i] for i in np.flatnonzero(is_active))
+        found = (qp.inequality_names[i] for i in np.flatnonzero(is_active))
+        return tuple(dict.fromkeys([*self.earlier_multipliers, *found]))
 
     @property
     def multipliers(self) -> dict[str, float]:
         """Multiplier of each active inequality constraint, by name.
 
         To first order, raising the constraint's entry of h by one unit lowers the objective by this
-        much.
+        much. With priorities, this is the objective of the first level in which it is active.
         """
         mu = dict(zip(self.qp.inequality_names, self.inequality_multipliers, strict=True))
-        return {name: float(mu[name]) for name in self.active}
+        return {name: float({**mu, **self.earlier_multipliers}[name]) for name in self.active}
 
     @property
     def violations(self) -> dict[str, float]:

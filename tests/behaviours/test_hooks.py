@@ -12,6 +12,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.behaviours import LIPM, Gait, StepPlan, Swing, Walk, raibert_foothold
+from floatbase.control import JointLimits
 from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
@@ -200,3 +201,52 @@ def test_soles_follow_a_ground_that_is_known() -> None:
         assert record.outcome == "completed"
         slides[ground is None] = record.slip(include_rolling=False).max()
     assert slides[False] < 2e-3 < 5e-3 < slides[True]  # m
+
+
+def test_a_pendulum_of_another_frequency_is_followed_as_planned() -> None:
+    def slower(plan: StepPlan, state: fb.State) -> StepPlan:
+        return replace(plan, plan=replace(plan.plan, omega=0.8 * plan.plan.omega))
+
+    walk = trot(modify_plan=slower)
+    state = walk.robot.standing()
+    walk(state.q, state.v, 0.0)
+    targets, plan = walk(state.q, state.v, 0.1).targets["centre of mass"], walk.history[-1].plan
+    assert np.allclose(targets.reshape(3, 3)[:, :2], plan(0.1), rtol=0.0, atol=1e-12)
+
+
+def test_an_adjustment_may_keep_its_arguments() -> None:
+    kept = []
+
+    def keep(
+        plan: StepPlan, path: Any, com: np.ndarray, com_velocity: np.ndarray, t: float
+    ) -> dict[str, np.ndarray]:
+        kept.append((com, com_velocity))
+        return {}
+
+    walk = trot(adjustment=keep)
+    state = walk.robot.standing()
+    walk(state.q, state.v, 0.0)
+    walk(state.q + [0.01, *np.zeros(len(state.q) - 1)], state.v + 0.1, 0.01)
+    assert np.allclose(kept[0][0], state.com) and np.allclose(kept[0][1], 0.0)
+
+
+def test_a_class_derived_from_swing_keeps_its_shape_with_another_end() -> None:
+    class Higher(Swing):
+        def __call__(self, t: float) -> Any:
+            position, velocity, acceleration = super().__call__(t)
+            return position + [0.0, 0.0, 1.0], velocity, acceleration
+
+    path = Higher([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 0.0, 0.3).with_end([0.2, 0.0, 0.0])
+    assert path(0.3)[0].tolist() == [0.2, 0.0, 1.0]
+
+
+def test_joints_brake_as_the_torque_limits_of_a_walk_allow() -> None:
+    robot = judges.load("go2")
+    torque_limits = 0.2 * robot.torque_limits
+    walk = trot(torque_limits=torque_limits)
+    state = robot.standing()
+    command = walk(state.q, state.v, 0.0)
+    assert command.joint_limits is not None
+    expected = JointLimits.of(robot, torque_limits=torque_limits).braking
+    assert np.array_equal(command.joint_limits.braking, expected)
+    assert not np.array_equal(expected, JointLimits.of(robot).braking)

@@ -129,3 +129,21 @@ def test_a_rollout_records_the_targets_of_each_step() -> None:
             else:
                 assert np.isnan(rows[i]).all()
     assert {"position of FL_foot", "posture"} <= set(run.targets)
+
+
+def test_a_sole_turns_the_short_way_where_yaw_angles_jump_by_a_whole_turn() -> None:
+    """The measured yaw jumps from π to -π, and the yaw of the path does not."""
+    robot = judges.load("talos")
+    gait = Gait.walk(robot, start=0.0)
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, yaw_rate=0.3)
+    state, turns = robot.standing(), []
+    for t in np.arange(0.0, 3.0, 0.05):
+        yaw = np.pi - 0.01 if t < 1.5 else -np.pi + 0.01
+        q = state.q.copy()
+        c, s = np.cos(yaw), np.sin(yaw)
+        q[:2] = [c * q[0] - s * q[1], s * q[0] + c * q[1]]
+        q[3:7] = [0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)]
+        walk(q, state.v, float(t))
+    for plan in walk.history:
+        turns += [last - first for first, last in (s.yaws for s in plan.planned_swings.values())]
+    assert len(turns) > 3 and max(np.abs(turns)) < 2.0  # 0.3 rad/s in 3 s

@@ -9,7 +9,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import JointLimits
+from floatbase.control import JointLimits, priorities
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
 
@@ -142,3 +142,23 @@ def test_levels_with_soft_contacts_and_soft_limits() -> None:
     eom = fb.equations_of_motion(state, contacts)
     qdd = soft(state.q, state.v).qdd
     assert np.allclose(eom.A @ qdd, eom.b, atol=0.1)
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12"])
+def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hundred times larger tolerance of rounding used to move torques by 1e-5 N·m."""
+    robot = judges.load(name)
+    limits = JointLimits.of(robot, weight=None)
+    controller = fb.WholeBodyController(
+        robot, judges.stance(robot), levels_of(robot, robot.standing()), joint_limits=limits
+    )
+    for state in judges.states(name, 2, 0.05):
+        levels = controller.problem.solve_levels(state)
+        with monkeypatch.context() as patch:
+            patch.setattr(priorities, "FEASIBILITY_TOLERANCE", 1e-7)
+            coarse = controller.problem.solve_levels(state)[-1]
+        assert np.allclose(coarse["tau"], levels[-1]["tau"], rtol=0.0, atol=1e-9)
+        assert levels[1].active and set(levels[1].active) <= set(levels[-1].active)
+        assert levels[1].multipliers.items() <= levels[-1].multipliers.items()
