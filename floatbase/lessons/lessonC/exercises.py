@@ -314,8 +314,8 @@ EXERCISES = (
     ),
     Exercise(
         name="C.4",
-        statement="The names of the constraints that are active in go2's QP, 50 ms into a push "
-        "of 120 N forwards and to the left.",
+        statement="The names of constraints whose KKT system gives the optimum of go2's QP, 50 ms "
+        "into a push of 120 N forwards and to the left.",
         stub='guess = ["RR_foot normal force"]  # more names, or others',
         solution="guess = [\n"
         '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
