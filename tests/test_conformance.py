@@ -177,7 +177,8 @@ def right() -> dict[str, Any]:
         "parts": fb.Affine(np.eye(12), ZERO),
         "kinds": qp.inequality_names[0].kind,
         "qp_plots.feasible_polygon.qp": table_top(),
-        "qp_plots.plot.qp": table_top(), "block": "tau",
+        "qp_plots.plot.qp": table_top(),
+        "qp_plots.plot_optimum.qp": table_top(), "block": "tau",
         "nominal_foothold": np.zeros(2),
         "neutral_point.velocity": np.zeros(2), "dcm_error":
         np.zeros(2),

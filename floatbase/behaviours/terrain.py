@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from floatbase._validation import Array, read_only
+from floatbase._validation import Array
 
 _RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
-
-_LARGEST_EDGE = 0.01  # m: a foot may stand on lower edges
-_SEARCH_STEP = 0.02  # m between the places that are tried
 
 
 @runtime_checkable
@@ -25,51 +21,6 @@ class Terrain(Protocol):
 
     def normal(self, xy: Array) -> Array:
         """Return the upward unit normal at a horizontal position, shape (3,), world frame."""
-
-
-def level_place(terrain: Terrain, point: Array, around: Array, reach: float) -> Array:
-    """Return the place nearest to a point where a foot does not touch an edge of the terrain.
-
-    Parameters
-    ----------
-    terrain : Terrain
-        The terrain.
-    point : ndarray, shape (2,)
-        Desired place in the world frame [m].
-    around : ndarray, shape (n, 2)
-        Points relative to the place, such as the corners of a sole, at which the terrain must be in
-        the tangent plane of the place [m].
-    reach : float
-        Largest distance of the place from the point [m].
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        The nearest such place on a grid, or the point if there is none [m].
-    """
-    for displacement in _search_grid(reach):
-        if _is_flat(terrain, point + displacement, around):
-            return np.asarray(point + displacement)
-    return point
-
-
-def _is_flat(terrain: Terrain, place: Array, around: Array) -> bool:
-    """Return whether a terrain is in its tangent plane at points around a place, (n, 2) [m]."""
-    plane = Plane.tangent(terrain, place)
-    return all(
-        abs(terrain.height(point) - plane.height(point)) < _LARGEST_EDGE for point in place + around
-    )
-
-
-@lru_cache(maxsize=16)
-def _search_grid(reach: float) -> Array:
-    """Return displacements of at most a distance, shape (n, 2), the shortest ones first [m]."""
-    n = int(reach / _SEARCH_STEP)
-    steps = _SEARCH_STEP * np.arange(-n, n + 1)
-    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    lengths = np.linalg.norm(grid, axis=1)
-    order = np.argsort(lengths, kind="stable")
-    return read_only(grid[order[lengths[order] <= reach]])
 
 
 @dataclass(frozen=True, eq=False)

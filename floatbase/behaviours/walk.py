@@ -25,6 +25,7 @@ from floatbase._validation import (
     as_number,
     refuse_new_attributes,
 )
+from floatbase.behaviours._level_place import foot_outline, level_place
 from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
@@ -52,19 +53,16 @@ from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import Adjustment, BodyPose
-from floatbase.behaviours.terrain import Terrain, level_place
+from floatbase.behaviours.terrain import Terrain
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import Task
-from floatbase.robots import Foot, Robot, State
+from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
-_EDGE_MARGIN = 0.02  # m between a ball of a foot and an edge of a known ground
-_SOLE_MARGIN = 1.1  # size of a sole for which a known ground must be flat, relative to its own
 _EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
-_CIRCLE = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
@@ -621,13 +619,5 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     foothold: Array = point - centripetal / walk.omega**2
     if walk.options.ground is None:
         return foothold
-    around = _outline(walk.robot.foot(foot), path.yaw)
+    around = foot_outline(walk.robot.foot(foot), path.yaw)
     return level_place(walk.options.ground, foothold, around, _EDGE_REACH)
-
-
-def _outline(foot: Foot, yaw: float) -> Array:
-    """Return points around the middle of a foot that must not be beyond an edge, (n, 2) [m]."""
-    if foot.corners is None:
-        return (2.0 * foot.radius + _EDGE_MARGIN) * _CIRCLE
-    c, s = cos(yaw), sin(yaw)
-    return np.asarray(_SOLE_MARGIN * foot.corners[:, :2] @ np.array([[c, s], [-s, c]]))

@@ -8,7 +8,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk
-from floatbase.behaviours.terrain import level_place
+from floatbase.behaviours._level_place import level_place
 from floatbase.simulation import Ground
 
 CIRCLE = 0.05 * np.array([[np.cos(a), np.sin(a)] for a in np.arange(12) * np.pi / 6])

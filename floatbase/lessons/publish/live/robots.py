@@ -18,18 +18,19 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.control import WholeBodyController
-from floatbase.control.limits import force_rows
-from floatbase.control.tick import tick
-from floatbase.control.tick.compiled import CompiledTick
-from floatbase.control.tick.problem_arrays import pack_problem
+from floatbase.control._page import force_rows, pack_problem
+from floatbase.control.tick import CompiledTick, tick
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask
 from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
-from floatbase.simulation.after_fall import joint_damping
-from floatbase.simulation.build import build_spec
-from floatbase.simulation.physics import FALLEN_COSINE, FALLEN_HEIGHT_FRACTION
+from floatbase.simulation._page import (
+    FALLEN_COSINE,
+    FALLEN_HEIGHT_FRACTION,
+    build_spec,
+    joint_damping,
+)
 
 ROBOTS = ("go2", "solo12", "talos")
 MU = 0.7  # friction coefficient, assumed and actual, before anything is changed
