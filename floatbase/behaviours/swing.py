@@ -110,7 +110,7 @@ class Swing(Value):
             The new path.
         """
         if type(self) is not Swing:  # a derived class may compute more from the end
-            return replace(self, end=end)
+            return replace(self, end=as_array("end", end, (3,), "m"))
         other = object.__new__(Swing)
         vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
         return other

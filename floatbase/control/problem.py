@@ -21,8 +21,8 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.affine import Affine
+from floatbase.control._priorities import solve_levels, split_levels
 from floatbase.control.limits import BLOCKS, SIZES, Limits, force_bounds, force_rows, torque_rows
-from floatbase.control.priorities import solve_levels, split_levels
 from floatbase.dynamics import (
     CONSTRAINT_NOISE,
     Block,

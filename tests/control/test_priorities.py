@@ -9,7 +9,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import JointLimits, priorities
+from floatbase.control import JointLimits, _priorities
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
 
@@ -157,7 +157,7 @@ def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(
     for state in judges.states(name, 2, 0.05):
         levels = controller.problem.solve_levels(state)
         with monkeypatch.context() as patch:
-            patch.setattr(priorities, "FEASIBILITY_TOLERANCE", 1e-7)
+            patch.setattr(_priorities, "FEASIBILITY_TOLERANCE", 1e-7)
             coarse = controller.problem.solve_levels(state)[-1]
         assert np.allclose(coarse["tau"], levels[-1]["tau"], rtol=0.0, atol=1e-9)
         assert levels[1].active and set(levels[1].active) <= set(levels[-1].active)
