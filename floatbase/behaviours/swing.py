@@ -109,10 +109,11 @@ class Swing(Value):
         Swing
             The new path.
         """
+        position = as_array("end", end, (3,), "m")
         if type(self) is not Swing:  # a derived class may compute more from the end
-            return replace(self, end=as_array("end", end, (3,), "m"))
+            return replace(self, end=position)
         other = object.__new__(Swing)
-        vars(other).update(vars(self), end=as_array("end", end, (3,), "m"))
+        vars(other).update(vars(self), end=position)
         return other
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:

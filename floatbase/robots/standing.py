@@ -19,6 +19,8 @@ from floatbase.robots.state import State
 _TOLERANCE = 1e-11  # m and rad: about a hundred rounding errors for a robot of 1 m
 _MAX_STEPS = 50  # the catalogue's robots take five
 _UP = (0.0, 0.0, 1.0)  # normal of the ground
+_LEAST_RISE = 1e-9  # m: a surface that is higher above the planes by less is the plane, rounded
+_MIN_VERTICAL = 1e-6  # smallest vertical component of the normal of a plane that has a height
 _LARGEST_STEP = 0.2  # m and rad: the Jacobian of Gauss-Newton is accurate over this distance
 
 _Planes: TypeAlias = tuple[
@@ -172,9 +174,19 @@ def _clearance(
     nearest = int(np.argmin(distances))
     if surface is not None:
         corners = () if foot.corners is None else tuple(foot.corners)
-        under = [foot.middle, *corners]
-        tops = [surface(state.point(foot.frame, point)[:2]) for point in under]
-        above_surface = middle[2] - max(tops)
+        under = [state.point(foot.frame, point)[:2] for point in (foot.middle, *corners)]
+        tops = [
+            top for xy in under if (top := surface(xy)) > _plane_height(xy, planes) + _LEAST_RISE
+        ]
+        above_surface = middle[2] - max(tops, default=-np.inf)
         if above_surface < distances[nearest]:
             return float(above_surface - foot.radius), np.array(_UP)
     return float(distances[nearest] - foot.radius), normals[nearest]
+
+
+def _plane_height(xy: Array, planes: _Planes) -> float:
+    """Return the height of the highest plane at a horizontal position, shape (2,) [m]."""
+    normals, offsets = planes
+    upward = normals[:, 2] > _MIN_VERTICAL
+    heights = (offsets - normals[:, :2] @ xy)[upward] / normals[upward, 2]
+    return float(np.max(heights, initial=-np.inf))

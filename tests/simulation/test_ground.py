@@ -213,3 +213,17 @@ def test_grounds_that_cannot_be_are_refused(make: object, number: str) -> None:
     with pytest.raises(InputError) as raised:
         make()  # type: ignore[operator]
     assert number in str(raised.value)
+
+
+def test_a_sole_beside_a_box_is_parallel_to_the_slope() -> None:
+    robot = judges.load("talos")
+    ground = Ground(normal=[0.0, -0.1, 1.0], boxes=[Box([-1.0, 1.0], [0.02, 1.0], 0.06)])
+    state = fb.Simulation(robot, ground=ground).state
+    for foot in robot.feet:
+        corners = np.array([state.point(foot.frame, corner) for corner in foot.corners])
+        assert np.allclose(corners[:, 2], ground.height(corners[:, :2]), rtol=0.0, atol=1e-8)
+        middle, up = (
+            state.point(foot.frame, foot.middle),
+            state.frame_pose(foot.frame).rotation[:, 2],
+        )
+        assert np.allclose(up, ground.normal(middle[:2]), rtol=0.0, atol=1e-8)
