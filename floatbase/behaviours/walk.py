@@ -128,8 +128,8 @@ class Walk:
         Called in each control step as adjustment(plan, path, com, com_velocity, t) with the
         `StepPlan`, the body's present path, centre of mass and its velocity, shape (3,). It returns
         a mapping from feet in the air to the places where they land, shape (2,) or (3,), in the
-        world frame [m]; the other feet keep their footholds. The default shifts footholds by the error of the capture point,
-        `step_adjustment`.
+        world frame [m]; the other feet keep their footholds. The default shifts footholds by the
+        error of the capture point, `step_adjustment`.
     modify_plan : callable, optional
         Called as modify_plan(plan, state) with each new `StepPlan` and the measured state. It
         returns the plan to use, such as `dataclasses.replace(plan, plan=...)` with another
