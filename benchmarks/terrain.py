@@ -8,6 +8,9 @@ Each case is repeated with other seeds. The seed chooses how far away the terrai
 heights of tiles, and the speed within 10 %, so that feet meet edges at other times. A run has
 succeeded if the robot does not fall and its base has passed the terrain. Friction is 0.6 in the
 controller and 1 on the ground, and the control period is 2 ms.
+
+The tilt is the largest angle between the base and the vertical in runs that passed. A body that
+knows the ground leans with its slope on purpose: 18° on these stairs.
 """
 
 from __future__ import annotations
