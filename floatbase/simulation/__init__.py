@@ -2,7 +2,6 @@
 
 from floatbase.simulation.build import Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
-from floatbase.simulation.model_data import model_data
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.push_recovery import PushRecovery, push_recovery
@@ -21,7 +20,6 @@ __all__ = [
     "PushRecovery",
     "Rollout",
     "Simulation",
-    "model_data",
     "push_recovery",
     "read_sweep",
     "rollout",

@@ -12,16 +12,25 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.control import Problem, WholeBodyController
-from floatbase.control.tick import CompiledTick, tick
+from floatbase.control import WholeBodyController
+from floatbase.control.limits import force_rows
+from floatbase.control.problem import Problem
+from floatbase.control.tick import tick
+from floatbase.control.tick.compiled import CompiledTick
+from floatbase.control.tick.problem_arrays import pack_problem
 from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask, Task
 from floatbase.robots import Robot, State
-from floatbase.simulation import Simulation, model_data
+from floatbase.simulation import Simulation
+from floatbase.simulation.after_fall import joint_damping
+from floatbase.simulation.build import build_spec
+from floatbase.simulation.physics import FALLEN_COSINE, FALLEN_HEIGHT_FRACTION
 
 ROBOTS = ("go2", "solo12", "talos")
 MU = 0.7  # friction coefficient, assumed and actual, before anything is changed
@@ -31,6 +40,9 @@ LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
 # the fraction of the way from the middle of all feet to that of three feet that the centre of mass
 # moves before the fourth foot is lifted
 _SHIFT_FRACTION = 0.8
+# fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
+# hulls of the links have them, on which a fallen robot lies
+_ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
 _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
@@ -52,11 +64,20 @@ def robot_data(robot: Robot) -> dict[str, Any]:
     InputError
         If the robot has a fixed base or joints without limits.
     """
+    if not robot.is_floating or robot.nq != robot.nv + 1:
+        raise InputError(
+            f"{robot.name} has a fixed base, or joints without limits. The page needs a floating "
+            f"base and joints with limits."
+        )
     standing, sim = robot.standing(), Simulation(robot, MU, TIMESTEP)
     sim.reset(standing)
+    xml = build_spec(robot, sim.ground, TIMESTEP).to_xml()
+    model, conversion = sim.model, sim._conversion
+    joints = [model.joint(name) for name in robot.joint_names]
     return {
-        **model_data(sim),
         "name": robot.name,
+        "xml": xml,
+        "overrides": _lost_digits(model, xml),
         "nq": robot.nq,
         "nv": robot.nv,
         "d": robot.d,
@@ -65,9 +86,24 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "gravity": robot.gravity,
         "mu": MU,
         "facets": FACETS,
-        "homeCom": standing.com.tolist(),
+        "fallenHeight": FALLEN_HEIGHT_FRACTION,
+        "fallenCosine": FALLEN_COSINE,
+        "home": {"qpos": sim.data.qpos.tolist(), "com": standing.com.tolist()},
+        # in the package's order: entries of qpos and qvel, bodies that joints move, joints
+        "qposOfQ": conversion._qpos_of_q.tolist(),
+        "qvelOfV": conversion._qvel_of_v.tolist(),
+        "bodies": [0, 1, *(int(joint.bodyid[0]) for joint in joints)],
+        "joints": [int(joint.id) for joint in joints],
+        "motors": sim._actuator_ids.tolist(),
         "jointNames": list(robot.joint_names),
         "torqueLimits": robot.torque_limits.tolist(),
+        "damping": joint_damping(sim, TIMESTEP).tolist(),
+        "hulls": sim._hull_geoms.tolist(),
+        "hullBodies": sim._hull_bodies.tolist(),
+        "points": [
+            {"name": name, "geom": int(geom), "radius": float(model.geom_size[geom, 0])}
+            for name, geom in zip(sim.point_names, sim.foot_contacts.geoms, strict=True)
+        ],
         "problems": {
             name: _problem_data(robot, standing, lifted, facets)
             for name, lifted, facets in _variants(robot)
@@ -158,12 +194,23 @@ def _three_feet_com(standing: State, lifted: str) -> Array:
     return standing.com + _SHIFT_FRACTION * shift * [1.0, 1.0, 0.0]
 
 
+def _lost_digits(model: mujoco.MjModel, xml: str) -> dict[str, list[float]]:
+    """Return the fields of a model that its XML file does not hold to the last digit."""
+    read, lost = mujoco.MjModel.from_xml_string(xml), {}
+    for name in dir(model):
+        exact: Any = getattr(model, name) if name.startswith(_ROUNDED_FIELDS) else None
+        is_real = isinstance(exact, np.ndarray) and exact.dtype.kind == "f"
+        if is_real and not np.array_equal(exact, getattr(read, name)):
+            lost[name] = exact.ravel().tolist()
+    return lost
+
+
 def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int) -> dict[str, Any]:
     """Return the problem arrays of one stance, and the places of what controls change."""
     made = controller(robot, lifted=lifted, facets=facets)
     compiled = made.compiled
     assert compiled is not None  # all of its objects are built in
-    sizes, ints, floats = _tables(compiled)
+    sizes, ints, floats, *_ = pack_problem(made.problem)
     inputs = compiled.default_inputs
     n_floats, n_ints = tick.workspace_sizes(sizes, 0)
     places = _target_places(made.problem, compiled)
@@ -173,7 +220,7 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
             made.limits, torque_limits=torque_fraction * np.array(made.limits.torque_limits)
         )
         contacts = _stance(robot, mu, lifted)
-        return _tables(CompiledTick(replace(made.problem, contacts=contacts, limits=limits)))[2]
+        return pack_problem(replace(made.problem, contacts=contacts, limits=limits))[2]
 
     return {
         "lifted": lifted,
@@ -186,7 +233,7 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
         "resultSize": compiled.empty_result(inputs).size,
         "k": made.contacts.k,
         "points": list(made.contacts.point_names),
-        "rows": _row_names(made, standing),
+        "rows": _row_names(made),
         "parameters": {
             "mu": _friction_places(packed_with, MU),
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
@@ -198,20 +245,16 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
     }
 
 
-def _tables(compiled: CompiledTick) -> Any:
-    """Return sizes, integers and real numbers of the problem arrays."""
-    n_views = len(compiled.dynamics.views)
-    return compiled.arguments[n_views : n_views + 3]
-
-
-def _row_names(made: WholeBodyController, standing: State) -> list[tuple[str, str, int]]:
+def _row_names(made: WholeBodyController) -> list[tuple[str, str, int]]:
     """Return kind, owner and number of the rows that the tick numbers, as `Inequalities` has them.
 
     Rows beyond the last one here do not occur in these problems.
     """
-    n = made.contacts.n_points * (made.limits.facets + 1)
-    labels: Any = made.qp(standing).inequality_names[:n]
-    rows = [(label.kind, label.owner, label.number or 0) for label in labels]
+    labels = force_rows(made.contacts, made.limits)[1]
+    rows = [
+        (label.kind, label.owner, int(str(label).split()[-1]) if label.kind == "friction" else 0)
+        for label in labels
+    ]
     rows += [("largest normal force", name, 0) for name in made.contacts.point_names]
     joints = made.robot.joint_names
     rows += [(f"{side} torque limit", name, 0) for side in ("upper", "lower") for name in joints]
@@ -268,8 +311,7 @@ def _target_places(problem: Problem, compiled: CompiledTick) -> dict[str, Any]:
         (index,) = [i for i, task in enumerate(tasks) if isinstance(task, kind)]
         task: Any = tasks[index]
         tasks[index] = replace(task, position=np.array(task.position) + 1.0)
-        other = CompiledTick(replace(problem, tasks=tasks))
-        targets = other.default_inputs.packed[: other.n_targets]
+        targets = pack_problem(replace(problem, tasks=tasks))[3]
         at = np.flatnonzero(targets != inputs[: targets.size])
         assert len(at) == 3
         return task, [int(i) for i in at]

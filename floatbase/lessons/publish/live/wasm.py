@@ -116,7 +116,8 @@ def _write_object(path: Path) -> None:
     import numpy as np
 
     import floatbase as fb
-    from floatbase.control.tick import CompiledTick, jit, tick
+    from floatbase.control.tick import jit, tick
+    from floatbase.control.tick.compiled import CompiledTick
 
     robot = fb.load("go2")  # the types of the arguments are the same for every robot
     tasks = fb.standing_tasks(robot.standing())

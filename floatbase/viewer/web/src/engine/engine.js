@@ -46,7 +46,7 @@ export function createEngine(mj, module, robot) {
   }
   function placeTargets() {
     const {parameters} = tick.problem;
-    for (let i = 0; i < 3; i++) views.inputs[parameters.com[i]] = robot.homeCom[i] + target[i];
+    for (let i = 0; i < 3; i++) views.inputs[parameters.com[i]] = robot.home.com[i] + target[i];
     if (stance.lifted) {
       views.inputs[parameters.lift] = parameters.liftedHeight - stance.lower;
     }
@@ -62,7 +62,7 @@ export function createEngine(mj, module, robot) {
     actual.setHulls(false);
     mj.mj_resetData(actual.model, actual.data);
     refresh();
-    qpos.set(robot.qpos);
+    qpos.set(robot.home.qpos);
     mj.mj_forward(actual.model, actual.data);
     pushes = [];
     [outcome, active, steps, offAt] = ["", 0, 0, -1];
@@ -83,7 +83,7 @@ export function createEngine(mj, module, robot) {
     let hasMoved = false;
     for (let i = 0; i < 3; i++) {
       // the foot must be on the ground before the centre of mass leaves the other three
-      if (!stance.lifted || isOver) shift[i] = place ? place[i] - robot.homeCom[i] : 0;
+      if (!stance.lifted || isOver) shift[i] = place ? place[i] - robot.home.com[i] : 0;
       const next = towards(target[i], wanted[i] + shift[i], TARGET_SPEED * STEP);
       hasMoved ||= next !== target[i];
       target[i] = next;
