@@ -65,7 +65,8 @@ test("a force is inside its cone, outside, or nothing", () => {
 
 const robot = {points: ["FL_foot", "FR_foot"], weight: 100};
 const frameWith = (more) => ({
-  outcome: "", seen: [], settings: {actualMu: 0.7}, measured: new Float64Array([0, 0, 50, 0, 0, 50]),
+  outcome: "", seen: [], settings: {actualMu: 0.7},
+  measured: new Float64Array([0, 0, 50, 0, 0, 50]),
   planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
 });
 
