@@ -17,7 +17,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.control import WholeBodyController
+from floatbase.control import JointLimits, WholeBodyController
 from floatbase.control._page import force_rows, pack_problem
 from floatbase.control.tick import CompiledTick, tick
 from floatbase.dynamics import Contacts
@@ -169,6 +169,7 @@ def controller(
         tasks,
         facets=facets,
         torque_limits=torque_fraction * robot.torque_limits,
+        joint_limits=JointLimits.of(robot),  # the page does not change how hard joints may brake
     )
 
 
