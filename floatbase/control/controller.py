@@ -500,7 +500,8 @@ class WholeBodyController:
         if n_active == tick.infeasible:
             return None
         result.setflags(write=False)
-        inputs.packed.setflags(write=False)
+        targets_of_tick = inputs.packed[: tick.layout.size]
+        targets_of_tick.setflags(write=False)  # not `packed` itself: numba compiles for each kind
         solution = partial(self._solution_of, q_array, v_array, t, result, n_active, inputs)
         return Command(
             result[tick.tau],
@@ -510,7 +511,7 @@ class WholeBodyController:
             "compiled",
             solution,
             self._softened,
-            inputs.packed[: tick.layout.size],
+            targets_of_tick,
             tick.layout.names,
             self._problem.limits.joint_limits,
         )
