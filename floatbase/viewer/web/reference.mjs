@@ -72,7 +72,18 @@ function namesOf(rows, {tick}, {nv, d}) {
 
 // q and v in MuJoCo's model, and from there back.
 function compareInputs(engine, robot, given, found) {
-  const {data} = engine.assumed, {qposOfQ, qvelOfV} = robot, {q, v} = given;
+  setState(engine.assumed.data, robot, given);
+  engine.updateDynamics();
+  const {views} = engine.tick;
+  for (const [key, values] of Object.entries(given)) {
+    const isUsed = (value, i) => key !== "Ag" || i % 6 < 3; // the tick reads three rows of Ag
+    const [ours, theirs] = [views[key].filter(isUsed), values.filter(isUsed)];
+    const difference = largest(theirs, ours) / Math.max(1, size(theirs));
+    found[key] = Math.max(found[key], difference);
+  }
+}
+
+function setState(data, {qposOfQ, qvelOfV}, {q, v}) {
   const [x, y, z, w] = q.subarray(3, 7);
   const R = [
     1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
@@ -83,14 +94,6 @@ function compareInputs(engine, robot, given, found) {
   v.forEach((value, i) => { data.qvel[qvelOfV[i]] = value; });
   for (let i = 0; i < 3; i++) {
     data.qvel[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
-  }
-  engine.updateDynamics();
-  const {views} = engine.tick;
-  for (const [key, values] of Object.entries(given)) {
-    const isUsed = (value, i) => key !== "Ag" || i % 6 < 3; // the tick reads three rows of Ag
-    const [ours, theirs] = [views[key].filter(isUsed), values.filter(isUsed)];
-    const difference = largest(theirs, ours) / Math.max(1, size(theirs));
-    found[key] = Math.max(found[key], difference);
   }
 }
 
@@ -120,6 +123,62 @@ function compareRuns() {
   });
 }
 
+// Walks: the inputs of the control step for the same states, and runs of the page by itself.
+function compareWalks() {
+  const bytes = readFileSync(`${folder}/walks.bin`);
+  const numbers = new Float64Array(bytes.buffer.slice(bytes.byteOffset,
+    bytes.byteOffset + bytes.length));
+  let at = 0;
+  return read("walks.json").map((walk) => {
+    const {nq, nv} = robots[walk.robot], rows = walk.lengths.map((length) => {
+      at += length;
+      const row = numbers.subarray(at - length, at);
+      const [q, v, com, inputs] = [[0, nq], [nq, nq + nv], [nq + nv, nq + nv + 3],
+        [nq + nv + 3]].map(([from, to]) => row.subarray(from, to));
+      return {q, v, com, inputs};
+    });
+    return {robot: walk.robot, python: walk.outcome, ...followStates(walk, rows),
+      ...walkAlone(walk, rows)};
+  });
+}
+function start(walk) {
+  const engine = engines[walk.robot], robot = robots[walk.robot];
+  engine.set({...defaults(robot), mu: walk.mu, actualMu: walk.mu});
+  engine.reset();
+  return engine;
+}
+function change(engine, {schedule}, step) {
+  const now = schedule.find(({time}) => Math.round(time * 1000) === step);
+  if (now) engine.set(now.settings);
+}
+function followStates(walk, rows) {
+  const engine = start(walk), robot = robots[walk.robot];
+  let inputs = 0, where = null;
+  rows.forEach((row, step) => {
+    change(engine, walk, step);
+    setState(engine.actual.data, robot, row);
+    engine.step();
+    if (engine.outcome) throw new Error(`${walk.robot}: ${engine.outcome} at step ${step}`);
+    const difference = largest(row.inputs, engine.tick.views.inputs);
+    if (difference > inputs) [inputs, where] = [difference, step];
+  });
+  return {inputs, where};
+}
+function walkAlone(walk, rows) {
+  const engine = start(walk);
+  engine.push(walk);
+  let distance = 0, moved = 0;
+  const first = rows[0].com;
+  for (let step = 0; step < rows.length; step++) {
+    change(engine, walk, step);
+    const com = engine.com();
+    distance = Math.max(distance, Math.hypot(...com.map((x, i) => x - rows[step].com[i])));
+    moved = Math.hypot(com[0] - first[0], com[1] - first[1]);
+    if (engine.step()) break;
+  }
+  return {outcome: engine.outcome || "completed", distance, moved};
+}
+
 async function compareRecovery() {
   const given = read("recovery.json"), robot = robots[given.robot], pushes = [];
   for await (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
@@ -129,4 +188,6 @@ async function compareRecovery() {
 }
 
 const recovery = await compareRecovery();
-console.log(JSON.stringify({states: compareStates(), runs: compareRuns(), recovery}, null, 1));
+console.log(JSON.stringify({
+  states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery,
+}, null, 1));
