@@ -69,7 +69,9 @@ def write(folder: Path) -> None:
     (folder / "states.json").write_text(json.dumps(index))
     (folder / "runs.json").write_text(json.dumps([_run(*given) for given in RUNS]))
     walks = [_walk(*given) for given in WALKS]
-    (folder / "walks.bin").write_bytes(np.concatenate([each.pop("numbers") for each in walks]).tobytes())
+    (folder / "walks.bin").write_bytes(
+        np.concatenate([each.pop("numbers") for each in walks]).tobytes()
+    )
     (folder / "walks.json").write_text(json.dumps(walks))
     (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
 

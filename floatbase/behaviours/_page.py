@@ -40,9 +40,7 @@ def plan_data(walk: Walk) -> dict[str, Any]:
     return {
         "constants": _CONSTANTS,
         # where the numbers of a plan are in the arrays of `compiled_targets`
-        "layout": {
-            name: value for name, value in vars(compiled_targets).items() if name.isupper()
-        },
+        "layout": {name: value for name, value in vars(compiled_targets).items() if name.isupper()},
         "feet": {foot: nominal.tolist() for foot, nominal in posture.nominal_feet.items()},
         "comHeight": float(posture.state.com[2]),
         "groundHeight": posture.ground_height,

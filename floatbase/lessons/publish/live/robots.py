@@ -224,9 +224,7 @@ def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str
     return problem | {"lifted": lifted, "comTarget": target}
 
 
-def _problem_data(
-    made: WholeBodyController, stance: Callable[[float], Contacts]
-) -> dict[str, Any]:
+def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]) -> dict[str, Any]:
     """Return the problem arrays of a controller, and the places of what controls change.
 
     stance: called with a friction coefficient; returns the contacts.

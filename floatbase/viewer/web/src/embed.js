@@ -5,7 +5,7 @@
 // recording, is shown until the robot is live, and stays where it cannot be.
 
 const HERE = document.currentScript.src;
-const KEPT = ["name", "mu", "push", "panel"];
+const KEPT = ["name", "mu", "push", "gait", "panel"];
 
 class FloatbaseRobot extends HTMLElement {
   connectedCallback() {

@@ -2,11 +2,12 @@
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
 // config: as for the viewer, with `robots`, the names to choose from. The address may have
-// ?name=…&mu=…&push=…&panel=0.
+// ?name=…&mu=…&push=…&gait=…&panel=0.
 
 import {make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {controlsOf} from "./live/controls.js";
+import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
 import {createVoice, limitOf, multiplierText} from "./live/words.js";
@@ -70,8 +71,21 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const hasPanel = given.get("panel") !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
+  let gait = null;
+  const joystick = createJoystick(
+    () => robot.gaits[gait]?.most ?? [0, 0], (motion) => send({set: motion}),
+  );
+  document.body.append(joystick.box);
+  // Walk with a gait, forwards at first; null: stand.
+  function walk(chosen) {
+    const wasStanding = gait === null;
+    gait = chosen;
+    joystick.show(gait !== null);
+    send({set: {gait, lifted: null}});
+    if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
+  }
   const controls = controlsOf(robot, settings, push, {
-    names: config.robots, name,
+    names: config.robots, name, walk,
     open(other) {
       given.set("name", other);
       location.search = given;
@@ -91,7 +105,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     },
     "push-recovery map"() {
       const {settings: present, com} = frame;
-      drawMap({...present, lifted: null}, com);
+      drawMap({...present, lifted: null, gait: null}, com);
     },
   };
   if (hasPanel) {
@@ -198,8 +212,10 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       draw(data.frame);
       if (!isLive) announce();
     }
+    if (data.stoodUp) tell({rank: 0, text: "The robot stands again. Push it."}, performance.now());
     if (data.error) showNotice(data.error);
   };
+  if (robot.gaits[given.get("gait")]) walk(given.get("gait"));
   let isLive = false;
   function announce() {
     isLive = true;

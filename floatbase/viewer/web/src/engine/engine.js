@@ -157,7 +157,7 @@ export function createEngine(mj, module, robot) {
   }
 
   function command() {
-    const time = steps * STEP;
+    const {time} = actual.data; // the plans of `Walk` use the same sum of steps
     followGait(time);
     if (walk === null && (moveFeet() | moveTargets())) placeTargets();
     assumed.data.qpos.set(qpos);

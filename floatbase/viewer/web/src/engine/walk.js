@@ -99,7 +99,8 @@ export function createWalk(robot, tick, gravity) {
   function updateGait(isSwinging, t) {
     if (inUse === requested) return false;
     if (!isSwinging) {
-      gait = inUse = requested;
+      inUse = requested;
+      gait = {...requested, start: Math.max(requested.start, t)}; // no foot lifts off earlier
       return true;
     }
     inUse = null;
@@ -129,7 +130,9 @@ export function createWalk(robot, tick, gravity) {
       gait = inUse = requested;
       stance = stanceNow(t);
       const yaw = Math.atan2(measured.rotation[3], measured.rotation[0]);
-      const middles = names.map((foot) => add(measured.feet[foot], rotated(nominal[foot], yaw), -1));
+      const middles = names.map(
+        (foot) => add(measured.feet[foot], rotated(nominal[foot], yaw), -1),
+      );
       path = {time: t, position: mean(middles), yaw, velocity: [0, 0, 0]};
       footing = {feet: measured.feet, touchdowns: {}, stepOffset: [0, 0]};
     } else {

@@ -60,7 +60,8 @@ export function limitOf(frame, robot) {
       "the controller plans with."};
   }
   const owners = (part) => frame.seen
-    .filter(([kind, , , multiplier]) => kind.includes(part) && multiplier > WEAK)
+    .filter(([kind, , , multiplier]) => kind.endsWith(part) && multiplier > WEAK)
+    .filter(([kind]) => kind !== "largest normal force") // before a foot lifts off
     .map(([, owner]) => owner);
   const motors = owners("torque limit").map(jointName);
   if (motors.length) {
