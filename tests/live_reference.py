@@ -123,7 +123,7 @@ def _run(name: str, given: dict[str, float], force: Any, duration: float) -> dic
 
 
 class _RecordedWalk:
-    """A walk that changes as scheduled; `rows` has state, centre of mass and inputs of each step."""
+    """A walk that changes as scheduled; `rows` has state, CoM and inputs of each step."""
 
     def __init__(self, walk: Walk, schedule: dict[float, Any]):
         self.walk, self.schedule, self.rows = walk, schedule, list[Any]()

@@ -84,7 +84,8 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     send({set: {gait, lifted: null}});
     if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
   }
-  const controls = controlsOf(robot, settings, push, {
+  const first = robot.gaits[given.get("gait")] ? given.get("gait") : null;
+  const controls = controlsOf(robot, {...settings, gait: first}, push, {
     names: config.robots, name, walk,
     open(other) {
       given.set("name", other);
@@ -215,7 +216,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     if (data.stoodUp) tell({rank: 0, text: "The robot stands again. Push it."}, performance.now());
     if (data.error) showNotice(data.error);
   };
-  if (robot.gaits[given.get("gait")]) walk(given.get("gait"));
+  if (first) walk(first);
   let isLive = false;
   function announce() {
     isLive = true;
