@@ -4,7 +4,7 @@
 // config: as for the viewer, with `robots`, the names to choose from. The address may have
 // ?name=…&mu=…&push=…&gait=…&panel=0.
 
-import {make, showNotice} from "./dom.js";
+import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {controlsOf} from "./live/controls.js";
 import {createJoystick} from "./live/joystick.js";
@@ -56,6 +56,7 @@ async function start(scene, worker, {config, given, name, sight}) {
     live(scene, worker, send, await ready, {config, given, name, sight});
   } catch (error) {
     showNotice(error.message);
+    parent.postMessage({floatbase: "unavailable"}, "*");
   }
 }
 
@@ -75,7 +76,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const joystick = createJoystick(
     () => robot.gaits[gait]?.most ?? [0, 0], (motion) => send({set: motion}),
   );
-  document.body.append(joystick.box);
+  element("meshcat-pane").append(joystick.box);
   // Walk with a gait, forwards at first; null: stand.
   function walk(chosen) {
     const wasStanding = gait === null;

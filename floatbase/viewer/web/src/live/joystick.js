@@ -46,6 +46,7 @@ export function createJoystick(most, change) {
     move(...knobAt(clientX - left - width / 2, clientY - top - height / 2, width / 2 - 12));
   }
   pad.onpointerdown = (event) => {
+    event.stopPropagation(); // the picture does not turn
     pad.setPointerCapture(event.pointerId);
     follow(event);
   };
