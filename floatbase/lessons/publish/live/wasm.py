@@ -27,6 +27,12 @@ MODULE = pages.DIST.parent / "live" / "tick.wasm"
 DIGEST = MODULE.with_suffix(".sha256")
 ENTRIES = ("tick", "write_targets")  # names of the exported functions
 
+# musl's mathematical functions, which make the module give the same answers in every browser:
+# those of JavaScript differ in the last digit. Debian and Ubuntu, then Fedora
+_LIBRARIES = (
+    Path("/usr/lib/wasm32-wasi/libc.a"),
+    Path("/usr/wasm32-wasi/lib/wasm32-wasi/libc.a"),
+)
 _LINKERS = ("wasm-ld", *(f"wasm-ld-{version}" for version in range(25, 13, -1)))
 # numba's helper that checks whether an array can be reshaped without a copy. The tick reshapes
 # only contiguous arrays, whose new strides follow from the new shape: (ndim, shape, strides, new
@@ -61,6 +67,11 @@ def linker() -> str | None:
     return next((path for name in _LINKERS if (path := shutil.which(name))), None)
 
 
+def library() -> Path | None:
+    """Return the C library for WebAssembly, or None if there is none."""
+    return next((path for path in _LIBRARIES if path.is_file()), None)
+
+
 def current_digest() -> str:
     """Return the digest of all sources of the module: the tick, the targets, and this file."""
     files = [Path(compiled_targets.__file__), Path(__file__)]
@@ -89,13 +100,14 @@ def build(module: Path = MODULE) -> int:
     Raises
     ------
     InputError
-        If there is no linker for WebAssembly.
+        If the linker or the C library for WebAssembly is missing.
     """
-    program = linker()
-    if program is None:
+    program, libc = linker(), library()
+    if program is None or libc is None:
         raise InputError(
-            "The linker wasm-ld is missing, which makes the WebAssembly module of the controller. "
-            "Install it (on Debian and Ubuntu: apt install lld)."
+            "The WebAssembly module of the controller needs the linker wasm-ld and the C library "
+            "of WASI, but at least one is missing. Install them (on Debian and Ubuntu: apt install "
+            "lld wasi-libc)."
         )
     with tempfile.TemporaryDirectory(prefix="floatbase-") as place:
         objects = [str(Path(place) / f"{name}.o") for name in ENTRIES]
@@ -108,7 +120,7 @@ def build(module: Path = MODULE) -> int:
         module.parent.mkdir(parents=True, exist_ok=True)
         exports = [f"--export={name}" for name in (*ENTRIES, "__heap_base", "__stack_pointer")]
         options = ["--no-entry", "--allow-undefined", "--gc-sections", "--strip-all", *exports]
-        subprocess.run([program, *options, "-o", str(module), *objects], check=True)
+        subprocess.run([program, *options, "-o", str(module), *objects, str(libc)], check=True)
     module.with_suffix(".sha256").write_text(f"{current_digest()}\n")
     return module.stat().st_size
 

@@ -21,11 +21,6 @@ class Unavailable extends Error {}
 // nearly redundant contacts, is not available: the tick then has no answer.
 function imports(module, memory) {
   const env = {
-    atan2: Math.atan2,
-    log10: Math.log10,
-    sin: Math.sin,
-    cos: Math.cos,
-    exp: Math.exp,
     __multi3(result, aLow, aHigh, bLow, bHigh) { // 128-bit product
       const mask = (1n << 64n) - 1n;
       const product = ((aHigh << 64n) | (aLow & mask)) * ((bHigh << 64n) | (bLow & mask));
