@@ -28,7 +28,9 @@ def test_the_control_step_is_up_to_date() -> None:
 
 @pytest.mark.front_end
 @pytest.mark.timeout(900)
-@pytest.mark.skipif(wasm.linker() is None, reason="wasm-ld is not installed")
+@pytest.mark.skipif(
+    None in (wasm.linker(), wasm.library()), reason="lld or wasi-libc is not installed"
+)
 def test_the_control_step_compiles_to_an_equal_module(tmp_path: Path) -> None:
     """A module that is compiled here gives the same answers as the one that is kept."""
     wasm.build(tmp_path / "tick.wasm")

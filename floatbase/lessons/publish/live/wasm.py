@@ -26,6 +26,8 @@ from floatbase.viewer.web import pages
 MODULE = pages.DIST.parent / "live" / "tick.wasm"
 DIGEST = MODULE.with_suffix(".sha256")
 ENTRIES = ("tick", "write_targets")  # names of the exported functions
+# exported as well: the page's plans of a walk need them, and must not differ between browsers
+FUNCTIONS = ("exp", "sin", "cos", "atan2", "hypot")
 
 # musl's mathematical functions, which make the module give the same answers in every browser:
 # those of JavaScript differ in the last digit. Debian and Ubuntu, then Fedora
@@ -118,7 +120,8 @@ def build(module: Path = MODULE) -> int:
             [sys.executable, "-m", __name__, *objects], env=os.environ | target, check=True
         )
         module.parent.mkdir(parents=True, exist_ok=True)
-        exports = [f"--export={name}" for name in (*ENTRIES, "__heap_base", "__stack_pointer")]
+        names = (*ENTRIES, *FUNCTIONS, "__heap_base", "__stack_pointer")
+        exports = [f"--export={name}" for name in names]
         options = ["--no-entry", "--allow-undefined", "--gc-sections", "--strip-all", *exports]
         subprocess.run([program, *options, "-o", str(module), *objects, str(libc)], check=True)
     module.with_suffix(".sha256").write_text(f"{current_digest()}\n")

@@ -27,7 +27,7 @@ test("phases follow one another, and an endless stance ends the list", () => {
 test("the path reaches its velocity at the largest acceleration", () => {
   const path = {time: 0, position: [0, 0], yaw: 0, velocity: [0, 0, 0]};
   const desired = {first: [0, 0, 0], later: [0.5, 0, 0], firstUntil: 0, begin: 0};
-  const {position: [x, y], velocity} = moved(path, desired, [1, 1, 1], 2);
+  const {position: [x, y], velocity} = moved(path, desired, [1, 1, 1], 2, Math);
   assert.ok(Math.abs(x - (0.125 + 0.75)) < 1e-12 && y === 0);
   assert.deepEqual(velocity, [0.5, 0, 0]);
 });
@@ -42,7 +42,7 @@ test("a plane passes through points on it", () => {
 test("the pendulum begins at the centre of mass and comes to rest above its last point", () => {
   const segments = [{begin: 0, end: 0.5, from: [0, 0], to: [0.1, 0]},
     {begin: 0.5, end: 1, from: [0.1, 0], to: [0.1, 0.05]}];
-  const rows = pendulum(segments, [0.02, 0.01], 5);
+  const rows = pendulum(segments, [0.02, 0.01], 5, Math);
   const [, px, , , , ax, , bx] = rows[0];
   assert.ok(Math.abs(px + ax + bx - 0.02) < 1e-12);
   const [begin, x, y, , , growX, growY] = rows.at(-1);

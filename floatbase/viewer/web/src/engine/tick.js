@@ -95,6 +95,7 @@ export function createTick(module, robot) {
   let targetArgs = [], targetShape = "";
   return {
     views,
+    math: exports, // exp, sin, cos, atan2 and hypot, the same in every browser
     // Write the targets of a walk at t, s, from the arrays `body`, `pieces` and `swings`, of which
     // the first rows are used.
     writeTargets(t, pieces, swings) {

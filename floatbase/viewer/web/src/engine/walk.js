@@ -6,8 +6,8 @@ import {liftsLater, phasesOf, stanceAt, swingAt} from "./gait.js";
 
 const UNBOUNDED = 1e6; // N: a force that no foot reaches
 
-const rotated = ([x, y], yaw) => [
-  Math.cos(yaw) * x - Math.sin(yaw) * y, Math.sin(yaw) * x + Math.cos(yaw) * y,
+const rotated = ([x, y], yaw, {sin, cos}) => [
+  cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y,
 ];
 const add = ([a, b], [x, y], factor = 1) => [a + factor * x, b + factor * y];
 const mean = (points) => [0, 1].map(
@@ -15,8 +15,9 @@ const mean = (points) => [0, 1].map(
 );
 
 // The path of the body at a later time: {time, position, yaw, velocity}; velocity: forwards and to
-// the left, m/s, and yaw rate, rad/s.
-export function moved(path, {first, later, firstUntil, begin}, acceleration, t) {
+// the left, m/s, and yaw rate, rad/s. math: sin and cos, as for all functions here; those of
+// JavaScript differ between browsers.
+export function moved(path, {first, later, firstUntil, begin}, acceleration, t, math) {
   const goal = t < firstUntil ? first : later;
   const duration = Math.max(0, t - Math.max(path.time, begin));
   const velocity = [], way = [];
@@ -26,7 +27,7 @@ export function moved(path, {first, later, firstUntil, begin}, acceleration, t) 
     velocity[i] = path.velocity[i] + Math.sign(change) * acceleration[i] * ramp;
     way[i] = (path.velocity[i] + velocity[i]) / 2 * ramp + velocity[i] * (duration - ramp);
   }
-  const position = add(path.position, rotated(way, path.yaw + way[2] / 2));
+  const position = add(path.position, rotated(way, path.yaw + way[2] / 2, math));
   return {time: t, position, yaw: path.yaw + way[2], velocity};
 }
 
@@ -48,11 +49,11 @@ const heightOn = ({slope, level}, [x, y]) => slope[0] * x + slope[1] * y + level
 
 // Rows (begin, p, its slope, a, b) of the closed form of the linear inverted pendulum, as
 // `LIPM.pieces`. segments: {begin, end, from, to} of the zero-moment point p.
-export function pendulum(segments, com, omega) {
+export function pendulum(segments, com, omega, {exp}) {
   const growing = [];
   let ahead = segments.at(-1).to; // the divergent component of motion
   for (const {begin, end, from, to} of [...segments].reverse()) {
-    const decay = Math.exp(-omega * (end - begin)), duration = end - begin;
+    const decay = exp(-omega * (end - begin)), duration = end - begin;
     const slope = [0, 1].map((i) => (to[i] - from[i]) / duration);
     const part = [0, 1].map((i) => (ahead[i] - to[i] - slope[i] / omega) * decay);
     growing.unshift(part.map((x) => x / 2));
@@ -61,7 +62,7 @@ export function pendulum(segments, com, omega) {
   const rows = [];
   let at = com;
   segments.forEach(({begin, end, from, to}, k) => {
-    const a = growing[k], growth = Math.exp(omega * (end - begin));
+    const a = growing[k], growth = exp(omega * (end - begin));
     const slope = [0, 1].map((i) => (to[i] - from[i]) / (end - begin));
     const b = [0, 1].map((i) => at[i] - from[i] - a[i]);
     rows.push([begin, ...from, ...slope, ...a, ...b]);
@@ -80,6 +81,7 @@ function zmpAt(pieces, t) {
 // robot: its data. tick: as `createTick` makes it. gravity: m/s², as the controller assumes it.
 export function createWalk(robot, tick, gravity) {
   const {constants, layout, feet: nominal, ...given} = robot.walking, names = Object.keys(nominal);
+  const {math} = tick;
   const {body, pieces: pieceRows, swings: swingRows} = tick.views;
   const omega = Math.sqrt(gravity / (given.comHeight - given.groundHeight));
   let requested = null, inUse = null, gait = null; // inUse is null while feet come down
@@ -129,9 +131,9 @@ export function createWalk(robot, tick, gravity) {
     if (plan === null) {
       gait = inUse = requested;
       stance = stanceNow(t);
-      const yaw = Math.atan2(measured.rotation[3], measured.rotation[0]);
+      const yaw = math.atan2(measured.rotation[3], measured.rotation[0]);
       const middles = names.map(
-        (foot) => add(measured.feet[foot], rotated(nominal[foot], yaw), -1),
+        (foot) => add(measured.feet[foot], rotated(nominal[foot], yaw, math), -1),
       );
       path = {time: t, position: mean(middles), yaw, velocity: [0, 0, 0]};
       footing = {feet: measured.feet, touchdowns: {}, stepOffset: [0, 0]};
@@ -145,7 +147,7 @@ export function createWalk(robot, tick, gravity) {
       const swings = plan.swings.map((swing, k) => ({...swing, end: endOf(k)}));
       let shift;
       [footing, shift] = nextFooting(swings, measured, stance, t);
-      path = moved(pathNow(), desired, given.acceleration, t);
+      path = moved(pathNow(), desired, given.acceleration, t, math);
       path.position = add(path.position, shift);
       inAir = new Map(swings.filter(({foot}) => !stance.includes(foot))
         .map((swing) => [swing.foot, swing]));
@@ -177,16 +179,16 @@ export function createWalk(robot, tick, gravity) {
     const before = plan.footing.stepOffset;
     if (!offsets.length) return [{feet, touchdowns, stepOffset: before}, [0, 0]];
     const stepOffset = mean(offsets), both = mean([before, stepOffset]);
-    const isFar = Math.hypot(...both) > constants.pathShift;
+    const isFar = math.hypot(...both) > constants.pathShift;
     return [{feet, touchdowns, stepOffset}, isFar ? both : [0, 0]];
   }
 
   // Raibert's foothold of a foot that lands at a time, (2).
   function foothold(path, foot, touchdown) {
     const {position, yaw, velocity: [forwards, left, rate]} = moved(
-      path, desired, given.acceleration, touchdown,
+      path, desired, given.acceleration, touchdown, math,
     );
-    const velocity = rotated([forwards, left], yaw), arm = rotated(nominal[foot], yaw);
+    const velocity = rotated([forwards, left], yaw, math), arm = rotated(nominal[foot], yaw, math);
     const half = (requested.period - requested.swing) / 2;
     const turning = [-rate * arm[1], rate * arm[0]];
     const centripetal = [-rate * velocity[1], rate * velocity[0]];
@@ -220,7 +222,7 @@ export function createWalk(robot, tick, gravity) {
       }
     }
     const zmp = plan === null ? centres[0] : zmpAt(plan.pieces, t);
-    const pieces = pendulum(zmpSegments(phases, centres, zmp), measured.com, omega);
+    const pieces = pendulum(zmpSegments(phases, centres, zmp), measured.com, omega, math);
     const swings = names.flatMap((foot) => {
       if (inAir.has(foot)) return [inAir.get(foot)];
       const times = swingAt(gait, foot, t);
