@@ -36,7 +36,8 @@ import loadMujoco from "./mujoco.js";
 import {FILES, NUMBERS, compare, measure} from "./compare.js";
 const read = (name, how) => fetch(name).then((response) => response[how]());
 try {
-  const named = async (names, how) => Promise.all(names.map(async (name) => [name, await how(name)]));
+  const named = (names, how) =>
+    Promise.all(names.map(async (name) => [name, await how(name)]));
   const files = Object.fromEntries([
     ...await named(FILES, (name) => read(name, "json")),
     ...await named(NUMBERS, async (name) => new Float64Array(await read(name, "arrayBuffer"))),
@@ -47,7 +48,8 @@ try {
   const found = {...await compare(given), speed: measure(given)};
   await fetch("/found", {method: "POST", body: JSON.stringify(found)});
 } catch (error) {
-  await fetch("/found", {method: "POST", body: JSON.stringify({error: String(error.stack ?? error)})});
+  const text = JSON.stringify({error: String(error.stack ?? error)});
+  await fetch("/found", {method: "POST", body: text});
 }
 </script>"""
 
@@ -123,12 +125,13 @@ def row(name: str, found: Any, python: dict[str, float], bits: str) -> str:
     states, speed = found["states"], found["speed"]
     far = max(run["firstSecond"] for run in found["runs"])
     targets = max(walk["inputs"] for walk in found["walks"])
+    equal = "same" if speed["bits"] == bits else "other"
     same = all(run["outcome"] == run["python"] for run in found["runs"] + found["walks"])
     return (
         f"{name:10} {states['states'] - states['otherActive'] - states['otherCode']:4d} of "
         f"{states['states']} {states['torque']:8.1e} {1e6 * far:6.1f} µm {targets:8.1e} "
         f"{'same' if same else 'OTHER':8} {speed['median']:7.0f} {speed['p99']:7.0f} "
-        f"{speed['median'] / python['median']:6.2f}   {'same' if speed['bits'] == bits else 'other'}"
+        f"{speed['median'] / python['median']:6.2f}   {equal}"
     )
 
 
@@ -152,7 +155,8 @@ def main(arguments: list[str] | None = None) -> None:
         Path(profile).mkdir()
         python = in_python()
         print(
-            "           states      torque  first s    targets  outcomes  median     p99  / Python bits"
+            "           states      torque  first s    targets  outcomes  median     p99  "
+            "/ Python bits"
         )
         print(f"{'Python':10} {'':43} {python['median']:7.0f} {python['p99']:7.0f}")
         node = in_node(place)
