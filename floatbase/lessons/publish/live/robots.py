@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -367,9 +368,7 @@ def _walking_problems(robot: Robot) -> dict[str, Any]:
     for facets in FACETS:
         for walk in _walks(robot, facets).values():
             for stance, made in controllers(walk).items():
-                problem = _problem_data(
-                    made, lambda mu, s=stance: Contacts.feet(robot, mu).only(*s)
-                )
+                problem = _problem_data(made, partial(_standing_feet, robot, stance))
                 assert made.compiled is not None
                 layout, names = made.compiled.layout, made.contacts.names
                 entries = {name: entries.start for name, entries in layout.names.items()}
@@ -386,6 +385,11 @@ def _walking_problems(robot: Robot) -> dict[str, Any]:
                 }
                 problems[f"walk/{'+'.join(stance)}/{facets}"] = problem
     return problems
+
+
+def _standing_feet(robot: Robot, stance: tuple[str, ...], mu: float) -> Contacts:
+    """Return the contacts of the feet of a stance."""
+    return Contacts.feet(robot, mu).only(*stance)
 
 
 def _walking_data(robot: Robot) -> dict[str, Any] | None:

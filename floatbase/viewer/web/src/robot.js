@@ -20,6 +20,7 @@ const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
+const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -214,7 +215,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       draw(data.frame);
       if (!isLive) announce();
     }
-    if (data.stoodUp) tell({rank: 0, text: "The robot stands again. Push it."}, performance.now());
+    if (data.stoodUp) tell(STOOD_UP, performance.now());
     if (data.error) showNotice(data.error);
   };
   if (first) walk(first);
