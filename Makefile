@@ -53,7 +53,7 @@ help:
 	@echo "make setup   only create .venv"
 	@echo "make lock    update environment.txt from pyproject.toml"
 	@echo "make web     check and build the pages' JavaScript (needs node 20 or later)"
-	@echo "make live    compile the controller for web pages again (needs lld)"
+	@echo "make live    compile the controller for web pages again (needs lld and wasi-libc)"
 	@echo "make clean   remove .venv and all built files"
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"

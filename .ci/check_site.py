@@ -1,8 +1,9 @@
 """Look at a whole site in a browser: `python .ci/check_site.py build/site`.
 
 Every page is opened. No page may ask another host for anything, every 3-D scene must draw, and
-every control of every panel must change its picture or its note, all without a kernel. Prints how
-long each page's first picture took and what was found.
+every control of every panel must change its picture or its note, all without a kernel. Recordings
+that a live robot replaces are checked without its script, then every robot must become live. Prints
+how long each page's first picture took and what was found.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from browsers import launched, served
+from playwright.sync_api import TimeoutError
 
+LIVE_SCRIPT = "**/floatbase-live.js"
 WAIT = 60_000  # ms for a picture on a machine that draws by software
 # what a scene shows: where everything is, in which colours and shapes, or that nothing is drawn yet
 SEEN = """() => {
@@ -77,6 +80,22 @@ def faults_of(page: Any, address: str) -> Iterator[str]:
     )
 
 
+def robot_faults(page: Any, address: str) -> Iterator[str]:
+    """Which live robots of a page do not become live."""
+    page.goto(address)
+    robots = page.locator("floatbase-robot")
+    for number in range(robots.count()):
+        began = time.perf_counter()
+        robots.nth(number).scroll_into_view_if_needed()
+        frame = robots.nth(number).locator(":scope > iframe").element_handle(timeout=WAIT)
+        try:
+            live = "document.body.classList.contains('live')"
+            frame.content_frame().wait_for_function(live, timeout=WAIT)
+        except TimeoutError:
+            yield f"robot {number} is not live"
+        print(f"{address}: live after {time.perf_counter() - began:.1f} s", file=sys.stderr)
+
+
 def _frames(page: Any, figure: Any) -> list[Any]:
     """The frames of a figure's scenes, once there are all of them."""
     scenes = figure.locator(".floatbase-scene > div").count()
@@ -127,7 +146,11 @@ def main() -> int:
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.on("request", lambda asked: elsewhere.append(asked.url))
         for path in pages:
-            for fault in faults_of(page, f"{address}/{path.relative_to(folder).as_posix()}"):
+            there = f"{address}/{path.relative_to(folder).as_posix()}"
+            page.route(LIVE_SCRIPT, lambda route: route.abort())
+            faults = list(faults_of(page, there))
+            page.unroute(LIVE_SCRIPT)
+            for fault in faults + list(robot_faults(page, there)):
                 wrong += 1
                 print(f"{path.relative_to(folder)}: {fault}")
         foreign = {url for url in elsewhere if not url.startswith((address, "data:", "blob:"))}

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import floatbase as fb
+from floatbase.behaviours import Walk
 from floatbase.control.tick import tick
 from floatbase.lessons.publish.live import robots
 
@@ -36,6 +37,14 @@ RUNS: tuple[tuple[str, dict[str, float], tuple[float, float, float], float], ...
     ("talos", {}, (0.0, 60.0, 0.0), 0.1),
     ("solo12", {"payload": 0.5, "actualPayload": 0.5}, (5.0, 0.0, 0.0), 0.1),
 )
+# robot, friction coefficient, and for each time [s] the page's settings from then on: gait, speed
+# [m/s], yaw rate [rad/s]; a push in between
+WALKS: tuple[tuple[str, float, dict[float, tuple[str | None, float, float]]], ...] = (
+    ("go2", 0.7, {0.0: ("trot", 0.4, 0.3), 1.5: ("trot", 0.6, -0.8), 2.61: (None, 0.6, -0.8)}),
+    ("solo12", 0.7, {0.0: ("walk", *robots.MOST["walk"]), 2.3: ("walk", 0.1, 0.0)}),
+)
+WALK_TIME = 3.6  # s
+WALK_PUSH = (0.0, 0.2, 0.0), 2.0, 0.1  # force [fraction of the weight], start and duration [s]
 
 
 def write(folder: Path) -> None:
@@ -59,6 +68,11 @@ def write(folder: Path) -> None:
     (folder / "states.bin").write_bytes(np.concatenate(numbers).tobytes())
     (folder / "states.json").write_text(json.dumps(index))
     (folder / "runs.json").write_text(json.dumps([_run(*given) for given in RUNS]))
+    walks = [_walk(*given) for given in WALKS]
+    (folder / "walks.bin").write_bytes(
+        np.concatenate([each.pop("numbers") for each in walks]).tobytes()
+    )
+    (folder / "walks.json").write_text(json.dumps(walks))
     (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
 
 
@@ -106,6 +120,52 @@ def _run(name: str, given: dict[str, float], force: Any, duration: float) -> dic
     com = [pin.centerOfMass(model, data, np.array(q)).tolist() for q in run.q]
     return {"robot": name, "settings": given, "force": force, "duration": duration,
             "start": PUSH_TIME, "time": RUN_TIME, "outcome": run.outcome, "com": com}  # fmt: skip
+
+
+class _RecordedWalk:
+    """A walk that changes as scheduled; `rows` has state, CoM and inputs of each step."""
+
+    def __init__(self, walk: Walk, schedule: dict[float, Any]):
+        self.walk, self.schedule, self.rows = walk, schedule, list[Any]()
+
+    @property
+    def contacts(self) -> fb.Contacts:
+        return self.walk.contacts
+
+    def __call__(self, q: Any, v: Any, t: float = 0.0) -> fb.Command:
+        walk, settings = self.walk, self.schedule.get(round(t, 6))
+        if settings and t > 0.0:
+            if settings[0] is None:
+                walk.gait = replace(walk.gait, stop=t)
+            walk.velocity, walk.yaw_rate = (settings[1], 0.0), settings[2]
+        command = walk(q, v, t)
+        compiled = walk._controllers[walk.stance].compiled
+        assert compiled is not None and command.backend == "compiled" and not command.softened
+        inputs = compiled.user_terms.inputs(command.target_values, q, v, t).packed
+        com = pin.centerOfMass(walk.robot.model, walk.robot.model.createData(), q)
+        self.rows.append(np.concatenate([q, v, com, inputs]))
+        return command
+
+
+def _walk(name: str, mu: float, schedule: dict[float, Any]) -> dict[str, Any]:
+    """A run of a `Walk`; for each step q, v, the centre of mass, and all inputs of the tick."""
+    robot = fb.load(name)
+    gait, speed, turn = schedule[0.0]
+    walk = Walk(robot, fb.Contacts.feet(robot, mu), robots.gaits(robot)[gait], (speed, 0.0), turn)
+    sim = fb.Simulation(robot, mu)
+    sim.reset(robot.standing())
+    force, start, duration = WALK_PUSH
+    push = fb.Push(robot.weight * np.array(force), start, duration)
+    recorded = _RecordedWalk(walk, schedule)
+    run = fb.rollout(sim, recorded, WALK_TIME, [push])
+    rows = recorded.rows
+    settings = [
+        {"time": time, "settings": dict(zip(("gait", "speed", "turn"), each, strict=True))}
+        for time, each in schedule.items()
+    ]
+    return {"robot": name, "mu": mu, "schedule": settings, "outcome": run.outcome,
+            "force": push.force.tolist(), "start": start, "duration": duration,
+            "lengths": [len(row) for row in rows], "numbers": np.concatenate(rows)}  # fmt: skip
 
 
 def _recovery(name: str) -> dict[str, Any]:

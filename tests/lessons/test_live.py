@@ -18,6 +18,8 @@ WEB = pages.DIST.parent
 TORQUE_TOLERANCE = 1e-8  # fraction of the motor's limit
 INPUT_TOLERANCE = 1e-10  # of M, h and J, relative to their largest entry
 COM_TOLERANCE = 1e-3  # m, over the first second
+TARGET_TOLERANCE = 1e-9  # of all targets and bounds of a walk
+WALK_TOLERANCE = 5e-3  # m, of the centre of mass of a walk that is pushed, over all its time
 
 
 def test_the_control_step_is_up_to_date() -> None:
@@ -26,7 +28,9 @@ def test_the_control_step_is_up_to_date() -> None:
 
 @pytest.mark.front_end
 @pytest.mark.timeout(900)
-@pytest.mark.skipif(wasm.linker() is None, reason="wasm-ld is not installed")
+@pytest.mark.skipif(
+    None in (wasm.linker(), wasm.library()), reason="lld or wasi-libc is not installed"
+)
 def test_the_control_step_compiles_to_an_equal_module(tmp_path: Path) -> None:
     """A module that is compiled here gives the same answers as the one that is kept."""
     wasm.build(tmp_path / "tick.wasm")
@@ -57,6 +61,14 @@ def test_runs_follow_those_of_the_library(found: dict[str, Any]) -> None:
         assert run["firstSecond"] < COM_TOLERANCE, run
         assert run["outcome"] == run["python"], run
         assert run["moved"] > 0.0
+
+
+def test_walks_have_the_targets_of_the_library(found: dict[str, Any]) -> None:
+    """Every step of a trot that turns and stops, and of a walk, for the same states."""
+    for walk in found["walks"]:
+        assert walk["inputs"] < TARGET_TOLERANCE, walk
+        assert walk["outcome"] == walk["python"] == "completed"
+        assert walk["distance"] < WALK_TOLERANCE < walk["moved"], walk
 
 
 def test_a_push_recovery_map_is_that_of_the_library(found: dict[str, Any]) -> None:

@@ -1,132 +1,21 @@
 // Compare the page's engine with the Python library: `node reference.mjs FOLDER [MODULE]`. The
-// folder holds what tests/live_reference.py writes. Prints the largest differences as JSON.
+// folder holds what tests/live_reference.py writes. Prints the largest differences as JSON; with
+// --measure, the speed of the engine instead.
 
 import {readFileSync} from "node:fs";
 import process from "node:process";
 import loadMujoco from "@mujoco/mujoco";
-import {createEngine, defaults} from "./src/engine/engine.js";
-import {pushRecovery} from "./src/engine/recovery.js";
+import {FILES, NUMBERS, compare, measure} from "./compare.js";
 
-const NO_FORCE = 1e-6; // N
-
-const folder = process.argv[2];
-const read = (name) => JSON.parse(readFileSync(`${folder}/${name}`, "utf8"));
-const wasm = process.argv[3] ?? new URL("live/tick.wasm", import.meta.url);
-const module = new WebAssembly.Module(readFileSync(wasm));
-const mj = await loadMujoco();
-const robots = {}, engines = {};
-for (const name of new Set(read("states.json").map(({robot}) => robot))) {
-  robots[name] = read(`${name}.json`);
-  engines[name] = createEngine(mj, module, robots[name]);
-}
-
-const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
-const size = (a) => a.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
-
-// Answers to the same inputs, and these inputs from MuJoCo.
-function compareStates() {
-  const bytes = readFileSync(`${folder}/states.bin`);
-  const numbers = new Float64Array(bytes.buffer.slice(bytes.byteOffset,
-    bytes.byteOffset + bytes.length));
-  const found = {states: 0, otherActive: 0, otherCode: 0, infeasible: 0, active: 0, torque: 0,
-    inputs: {M: 0, h: 0, J: 0, Ag: 0, oMi: 0, v: 0, q: 0}};
-  let at = 0;
-  for (const {robot: name, settings, count, lengths} of read("states.json")) {
-    const [q, v, M, h, J, Ag, oMi, tau, rows] = lengths.map((length) => {
-      at += length;
-      return numbers.subarray(at - length, at);
-    });
-    const engine = engines[name], robot = robots[name], {views} = engine.tick;
-    engine.set({...defaults(robot), ...settings});
-    compareInputs(engine, robot, {q, v, M, h, J, Ag, oMi}, found.inputs);
-    for (const [key, values] of Object.entries({q, v, M, h, J, Ag, oMi})) views[key].set(values);
-    const answer = engine.tick.run();
-    const {nv, d} = robot, first = nv + d + engine.tick.problem.k;
-    const active = [...views.result.subarray(first + nv + engine.tick.problem.k)]
-      .slice(0, Math.max(0, answer)).sort((a, b) => a - b);
-    found.states++;
-    if (count < 0) found.infeasible++;
-    else found.active += count;
-    if (answer !== count) found.otherCode++;
-    else if (count >= 0) {
-      const [ours, theirs] = [active, [...rows]].map((some) => namesOf(some, engine, robot));
-      if (ours.join() !== theirs.join()) found.otherActive++;
-      const differences = Array.from(tau, (x, i) =>
-        Math.abs(x - views.result[nv + i]) / robot.torqueLimits[i]);
-      found.torque = Math.max(found.torque, size(differences));
-    }
-  }
-  return found;
-}
-
-// Names of active rows. A force of zero lies at the tip of its cone, where any facets determine it:
-// such a point counts as a whole.
-function namesOf(rows, {tick}, {nv, d}) {
-  const names = rows.map((row) => {
-    const [kind, owner] = tick.problem.rows[row], point = tick.problem.points.indexOf(owner);
-    const force = tick.views.result.subarray(nv + d + 3 * point, nv + d + 3 * point + 3);
-    return point >= 0 && size(force) < NO_FORCE ? owner : `${kind} ${row}`;
-  });
-  return [...new Set(names)].sort();
-}
-
-// q and v in MuJoCo's model, and from there back.
-function compareInputs(engine, robot, given, found) {
-  const {data} = engine.assumed, {qposOfQ, qvelOfV} = robot, {q, v} = given;
-  const [x, y, z, w] = q.subarray(3, 7);
-  const R = [
-    1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-    2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-    2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
-  ];
-  q.forEach((value, i) => { data.qpos[qposOfQ[i]] = value; });
-  v.forEach((value, i) => { data.qvel[qvelOfV[i]] = value; });
-  for (let i = 0; i < 3; i++) {
-    data.qvel[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
-  }
-  engine.updateDynamics();
-  const {views} = engine.tick;
-  for (const [key, values] of Object.entries(given)) {
-    const isUsed = (value, i) => key !== "Ag" || i % 6 < 3; // the tick reads three rows of Ag
-    const [ours, theirs] = [views[key].filter(isUsed), values.filter(isUsed)];
-    const difference = largest(theirs, ours) / Math.max(1, size(theirs));
-    found[key] = Math.max(found[key], difference);
-  }
-}
-
-function compareRuns() {
-  return read("runs.json").map((run) => {
-    const robot = robots[run.robot], engine = engines[run.robot];
-    engine.set({...defaults(robot), ...run.settings});
-    engine.reset();
-    if (size(run.force) > 0) engine.push(run);
-    let distance = 0, firstSecond = 0, moved = 0, end = 0;
-    const first = run.com[0];
-    for (let step = 0; step < Math.round(run.time / 1e-3); step++) {
-      const outcome = engine.step();
-      if (step < run.com.length) {
-        const com = engine.com();
-        const far = Math.hypot(...com.map((value, i) => value - run.com[step][i]));
-        moved = Math.max(moved, Math.hypot(...com.map((value, i) => value - first[i])));
-        distance = Math.max(distance, far);
-        if (step < 1000) firstSecond = distance;
-      }
-      end = step + 1;
-      if (outcome) break;
-    }
-    return {robot: run.robot, settings: run.settings, force: run.force, python: run.outcome,
-      outcome: engine.outcome || "completed", firstSecond, distance, moved, end,
-      pythonEnd: run.com.length};
-  });
-}
-
-async function compareRecovery() {
-  const given = read("recovery.json"), robot = robots[given.robot], pushes = [];
-  for await (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
-    pushes.push(push);
-  }
-  return {pushes, python: given.pushes, resolution: given.resolution};
-}
-
-const recovery = await compareRecovery();
-console.log(JSON.stringify({states: compareStates(), runs: compareRuns(), recovery}, null, 1));
+const isMeasured = process.argv.includes("--measure");
+const [folder, wasm] = process.argv.slice(2).filter((given) => !given.startsWith("--"));
+const numbers = (bytes) => new Float64Array(bytes.buffer.slice(bytes.byteOffset,
+  bytes.byteOffset + bytes.length));
+const read = (name) => readFileSync(`${folder}/${name}`);
+const given = {
+  mj: await loadMujoco(),
+  module: new WebAssembly.Module(readFileSync(wasm ?? new URL("live/tick.wasm", import.meta.url))),
+  files: Object.fromEntries([...FILES.map((name) => [name, JSON.parse(read(name))]),
+    ...NUMBERS.map((name) => [name, numbers(read(name))])]),
+};
+console.log(JSON.stringify(isMeasured ? measure(given) : await compare(given), null, 1));

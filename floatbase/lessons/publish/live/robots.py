@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -17,9 +18,11 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
+from floatbase.behaviours import Gait, Walk
+from floatbase.behaviours._page import SHIFT_TIME, controllers, plan_data, possible_fractions
 from floatbase.control import JointLimits, WholeBodyController
 from floatbase.control._page import force_rows, pack_problem
-from floatbase.control.tick import CompiledTick, tick
+from floatbase.control.tick import tick
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask
@@ -40,6 +43,8 @@ LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
 # the fraction of the way from the middle of all feet to that of three feet that the centre of mass
 # moves before the fourth foot is lifted
 _SHIFT_FRACTION = 0.8
+# largest velocity forwards [m/s] and yaw rate [rad/s] in the page, by gait: all robots can follow
+MOST = {"trot": (0.6, 0.8), "walk": (0.2, 0.15)}
 # fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
 # hulls of the links have them, on which a fallen robot lies
 _ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
@@ -105,9 +110,13 @@ def robot_data(robot: Robot) -> dict[str, Any]:
             for name, geom in zip(sim.point_names, sim.foot_contacts.geoms, strict=True)
         ],
         "problems": {
-            name: _problem_data(robot, standing, lifted, facets)
-            for name, lifted, facets in _variants(robot)
+            **{
+                name: _standing_problem(robot, lifted, facets)
+                for name, lifted, facets in _variants(robot)
+            },
+            **_walking_problems(robot),
         },
+        "walking": _walking_data(robot),
     }
 
 
@@ -206,27 +215,35 @@ def _lost_digits(model: mujoco.MjModel, xml: str) -> dict[str, list[float]]:
     return lost
 
 
-def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int) -> dict[str, Any]:
-    """Return the problem arrays of one stance, and the places of what controls change."""
+def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str, Any]:
+    """Return the problem of standing on all feet, or on all but a lifted one."""
     made = controller(robot, lifted=lifted, facets=facets)
+    problem = _problem_data(made, lambda mu: _stance(robot, mu, lifted))
+    places = _target_places(made)
+    target = [problem["inputs"][at] for at in places["com"]]
+    problem["parameters"] |= places
+    return problem | {"lifted": lifted, "comTarget": target}
+
+
+def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]) -> dict[str, Any]:
+    """Return the problem arrays of a controller, and the places of what controls change.
+
+    stance: called with a friction coefficient; returns the contacts.
+    """
     compiled = made.compiled
     assert compiled is not None  # all of its objects are built in
     sizes, ints, floats = pack_problem(made.problem, compiled.layout)
     inputs = compiled.default_inputs
     n_floats, n_ints = tick.workspace_sizes(sizes, 0)
-    places = _target_places(compiled)
 
     def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
         limits = replace(
             made.limits, torque_limits=torque_fraction * np.array(made.limits.torque_limits)
         )
-        contacts = _stance(robot, mu, lifted)
-        problem = replace(made.problem, contacts=contacts, limits=limits)
+        problem = replace(made.problem, contacts=stance(mu), limits=limits)
         return pack_problem(problem, compiled.layout)[2]
 
     return {
-        "lifted": lifted,
-        "facets": facets,
         "sizes": sizes.tolist(),
         "ints": ints.tolist(),
         "floats": floats.tolist(),
@@ -241,9 +258,7 @@ def _problem_data(robot: Robot, standing: State, lifted: str | None, facets: int
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
             # the tables begin with a counter and the mass of joint 0, the world, and its position
             "baseMass": 1 + 4,
-            **places,
         },
-        "comTarget": inputs.packed[places["com"]].tolist(),
     }
 
 
@@ -304,8 +319,10 @@ def _check(found: Array, expected: Array) -> None:
     assert np.allclose(found, expected, rtol=_TOLERANCE, atol=_TOLERANCE)
 
 
-def _target_places(compiled: CompiledTick) -> dict[str, Any]:
+def _target_places(made: WholeBodyController) -> dict[str, Any]:
     """Return where the targets of the centre of mass and of a lifted foot are among the inputs."""
+    compiled = made.compiled
+    assert compiled is not None
 
     def places(kind: type[CoMTask] | type[FrameTask]) -> list[int]:
         (at,) = [each.entries for each in compiled.layout.tasks if isinstance(each.task, kind)]
@@ -316,3 +333,88 @@ def _target_places(compiled: CompiledTick) -> dict[str, Any]:
         found["lift"] = places(FrameTask)[2]
         found["liftedHeight"] = float(compiled.default_inputs.packed[found["lift"]])
     return found
+
+
+def gaits(robot: Robot) -> dict[str, Gait]:
+    """Return the gaits of a robot in the page, by name, none if it has no four point feet.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    dict of str to Gait
+        The gaits; they start when the weight has had time to shift.
+    """
+    if len(robot.feet) != 4:
+        return {}
+    return {
+        "trot": Gait.trot(robot, start=SHIFT_TIME),
+        "walk": Gait.walk(robot, start=SHIFT_TIME),
+    }
+
+
+def _walks(robot: Robot, facets: int) -> dict[str, Walk]:
+    """Return a walk with each gait."""
+    contacts = Contacts.feet(robot, MU)
+    return {name: Walk(robot, contacts, gait, facets=facets) for name, gait in gaits(robot).items()}
+
+
+def _walking_problems(robot: Robot) -> dict[str, Any]:
+    """Return the problems of all stances of all gaits."""
+    problems = {}
+    for facets in FACETS:
+        for walk in _walks(robot, facets).values():
+            for stance, made in controllers(walk).items():
+                problem = _problem_data(made, partial(_standing_feet, robot, stance))
+                assert made.compiled is not None
+                layout, names = made.compiled.layout, made.contacts.names
+                entries = {name: entries.start for name, entries in layout.names.items()}
+                problem["entries"] = {
+                    "com": entries["centre of mass"],
+                    "base": entries["orientation of base"],
+                    "feet": {
+                        foot.frame: entries[f"position of {foot.frame}"]
+                        for foot in robot.feet
+                        if foot.frame not in names
+                    },
+                    # the largest normal forces follow the targets and the least normal forces
+                    "largestForce": layout.size + len(names),
+                }
+                problems[f"walk/{'+'.join(stance)}/{facets}"] = problem
+    return problems
+
+
+def _standing_feet(robot: Robot, stance: tuple[str, ...], mu: float) -> Contacts:
+    """Return the contacts of the feet of a stance."""
+    return Contacts.feet(robot, mu).only(*stance)
+
+
+def _walking_data(robot: Robot) -> dict[str, Any] | None:
+    """Return what the page's plan of a walk needs to know, None for a robot that only stands."""
+    walks = _walks(robot, FACETS[0])
+    if not walks:
+        return None
+    return {
+        **plan_data(walks["trot"]),
+        "gaits": {
+            name: {
+                "offsets": dict(each.gait.offsets),
+                "period": each.gait.period,
+                "swing": each.gait.swing,
+                "most": MOST[name],
+                "firstFraction": _first_fraction(each, MOST[name]),
+            }
+            for name, each in walks.items()
+        },
+    }
+
+
+def _first_fraction(walk: Walk, most: tuple[float, float]) -> float:
+    """Return the fraction of the largest motion that the feet can follow in the first period."""
+    forwards, turning = most
+    first, later = possible_fractions(walk, np.array([forwards, 0.0, turning]))
+    assert later == 1.0
+    return first

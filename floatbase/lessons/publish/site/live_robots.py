@@ -22,16 +22,22 @@ class LessonRobot(NamedTuple):
         Attributes of the element, as the page *Embed* lists them.
     text : str
         What to try, in Markdown.
+    panel_call : str, optional
+        Call in the code cell whose recording the robot replaces once it is live. By default, the
+        robot is at the end of the lesson.
     """
 
     name: str
     attributes: dict[str, str]
     text: str
+    panel_call: str = ""
 
 
-# number of a lesson -> its live robot, at the end of the lesson
+# number of a lesson -> its live robot. Only lesson 00 has a push panel with the page's controller
 LESSON_ROBOTS = {
-    "00": LessonRobot("go2", {}, "Push go2 where you like, and find a push that makes it fall."),
+    "00": LessonRobot(
+        "go2", {}, "Once the robot is live, drag it where you like.", panel_call="push_panel("
+    ),
     "05": LessonRobot(
         "go2",
         {"panel": "1"},
@@ -76,13 +82,15 @@ def robot_script(static: str) -> str:
     return f'<script src="{static}{LIVE_FOLDER}/floatbase-live.js"></script>'
 
 
-def robot_element(robot: LessonRobot) -> str:
+def robot_element(robot: LessonRobot, instead: str = "") -> str:
     """Return the element of a live robot.
 
     Parameters
     ----------
     robot : LessonRobot
         The robot.
+    instead : str, optional
+        HTML that is shown until the robot is live; by default a sentence.
 
     Returns
     -------
@@ -91,13 +99,14 @@ def robot_element(robot: LessonRobot) -> str:
     """
     attributes = {"name": robot.name} | robot.attributes
     written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
-    style = f"display: block; margin: 1rem 0; height: {_HEIGHT}"
+    style = f"display: block; margin: 1rem 0; {'min-' if instead else ''}height: {_HEIGHT}"
     words = "A live robot appears here in a browser with WebAssembly, if the page is on a server."
-    return f'<floatbase-robot {written} style="{style}"><p>{words}</p></floatbase-robot>'
+    shown = instead or f"<p>{words}</p>"
+    return f'<floatbase-robot {written} style="{style}">{shown}</floatbase-robot>'
 
 
 def add_robot(notebook: Any, number: str) -> None:
-    """Add the live robot of a lesson to its end, in place.
+    """Add the live robot of a lesson, in place: over its push panel, or at its end.
 
     Parameters
     ----------
@@ -107,6 +116,12 @@ def add_robot(notebook: Any, number: str) -> None:
         Number of the lesson.
     """
     robot = LESSON_ROBOTS[number]
+    if robot.panel_call:
+        (cell,) = (cell for cell in notebook.cells if robot.panel_call in cell.source)
+        (shown,) = (output.data for output in cell.outputs if "text/html" in output.get("data", {}))
+        element = robot_element(robot, shown["text/html"])
+        shown["text/html"] = f"{robot_script('../_static/')}\n{element}\n<p>{robot.text}</p>"
+        return
     raw = f"{robot_script('../_static/')}\n{robot_element(robot)}"
     text = (
         f"## Live: push {robot.name}\n\n{robot.text}\n\n```{{raw}} html\n{raw}\n```\n\n"

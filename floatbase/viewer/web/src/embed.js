@@ -2,14 +2,17 @@
 //   <script src="…/floatbase-live.js"></script>
 //   <floatbase-robot name="go2" mu="0.6" push="40"></floatbase-robot>
 // The element has the size that the page gives it. What is inside it, such as an image or a
-// recording, is shown until the robot is live, and stays where it cannot be.
+// recording, is shown until the robot is live, and stays where it cannot be. With the attribute
+// `waits`, the recording is loaded only if the element sends the event `unavailable`.
 
 const HERE = document.currentScript.src;
-const KEPT = ["name", "mu", "push", "panel"];
+const PATIENCE = 20000; // ms until a robot that is not live counts as unavailable
+const KEPT = ["name", "mu", "push", "gait", "panel"];
 
 class FloatbaseRobot extends HTMLElement {
   connectedCallback() {
-    if (this.frame || typeof WebAssembly === "undefined" || HERE.startsWith("file:")) return;
+    if (this.frame) return;
+    if (typeof WebAssembly === "undefined" || HERE.startsWith("file:")) return this.giveUp();
     const near = new IntersectionObserver((entries) => {
       if (!entries.some(({isIntersecting}) => isIntersecting)) return;
       near.disconnect();
@@ -36,14 +39,23 @@ class FloatbaseRobot extends HTMLElement {
     addEventListener("message", ({source, data}) => {
       if (source !== this.frame.contentWindow || !data?.floatbase) return;
       if (data.floatbase === "live") this.takeOver();
+      if (data.floatbase === "unavailable") return this.giveUp();
       this.dispatchEvent(new CustomEvent(data.floatbase, {detail: data}));
     });
     this.frame.src = address.href;
     this.append(this.frame);
+    this.patience = setTimeout(() => this.giveUp(), PATIENCE);
+  }
+
+  giveUp() {
+    if (!this.hasAttribute("waits")) return;
+    this.removeAttribute("waits");
+    this.dispatchEvent(new Event("unavailable"));
   }
 
   // The robot is live: what was shown instead of it goes.
   takeOver() {
+    clearTimeout(this.patience);
     const height = this.offsetHeight;
     for (const child of [...this.childNodes]) if (child !== this.frame) child.remove();
     this.style.height = `${height}px`;

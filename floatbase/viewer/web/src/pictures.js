@@ -139,8 +139,14 @@ const sight = new IntersectionObserver((entries) => {
 
 function watchFigures() {
   for (const figure of document.querySelectorAll(".floatbase-picture")) {
-    near.observe(figure);
-    sight.observe(figure);
+    const watch = () => {
+      near.observe(figure);
+      sight.observe(figure);
+    };
+    // the image of a recording is enough until its live robot replaces it
+    const robot = figure.closest("floatbase-robot[waits]:defined");
+    if (robot) robot.addEventListener("unavailable", watch, {once: true});
+    else watch();
   }
 }
 

@@ -2,11 +2,12 @@
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
 // config: as for the viewer, with `robots`, the names to choose from. The address may have
-// ?name=…&mu=…&push=…&panel=0.
+// ?name=…&mu=…&push=…&gait=…&panel=0.
 
-import {make, showNotice} from "./dom.js";
+import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {controlsOf} from "./live/controls.js";
+import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
 import {createVoice, limitOf, multiplierText} from "./live/words.js";
@@ -19,6 +20,7 @@ const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
+const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -55,6 +57,7 @@ async function start(scene, worker, {config, given, name, sight}) {
     live(scene, worker, send, await ready, {config, given, name, sight});
   } catch (error) {
     showNotice(error.message);
+    parent.postMessage({floatbase: "unavailable"}, "*");
   }
 }
 
@@ -70,8 +73,22 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const hasPanel = given.get("panel") !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
-  const controls = controlsOf(robot, settings, push, {
-    names: config.robots, name,
+  let gait = null;
+  const joystick = createJoystick(
+    () => robot.gaits[gait]?.most ?? [0, 0], (motion) => send({set: motion}),
+  );
+  element("meshcat-pane").append(joystick.box);
+  // Walk with a gait, forwards at first; null: stand.
+  function walk(chosen) {
+    const wasStanding = gait === null;
+    gait = chosen;
+    joystick.show(gait !== null);
+    send({set: {gait, lifted: null}});
+    if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
+  }
+  const first = robot.gaits[given.get("gait")] ? given.get("gait") : null;
+  const controls = controlsOf(robot, {...settings, gait: first}, push, {
+    names: config.robots, name, walk,
     open(other) {
       given.set("name", other);
       location.search = given;
@@ -91,7 +108,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     },
     "push-recovery map"() {
       const {settings: present, com} = frame;
-      drawMap({...present, lifted: null}, com);
+      drawMap({...present, lifted: null, gait: null}, com);
     },
   };
   if (hasPanel) {
@@ -198,8 +215,10 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       draw(data.frame);
       if (!isLive) announce();
     }
+    if (data.stoodUp) tell(STOOD_UP, performance.now());
     if (data.error) showNotice(data.error);
   };
+  if (first) walk(first);
   let isLive = false;
   function announce() {
     isLive = true;

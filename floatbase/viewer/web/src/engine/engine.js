@@ -4,6 +4,7 @@
 import {createDynamics} from "./dynamics.js";
 import {contactForces, makeModel} from "./model.js";
 import {NO_ANSWER, createTick, setParameter} from "./tick.js";
+import {createWalk} from "./walk.js";
 
 export const STEP = 1e-3; // s
 const REST = 1.5; // s that a fallen robot lies before it is put on its feet again
@@ -18,6 +19,7 @@ const LOWER_TIME = 2; // s, at most
 export const defaults = (robot) => ({
   mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
   height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
+  gait: null, speed: 0, turn: 0, // m/s and rad/s
 });
 
 // mj: MuJoCo. module: the control step's WebAssembly module. robot: its data.
@@ -30,6 +32,7 @@ export function createEngine(mj, module, robot) {
   let settings = defaults(robot), pushes = [], outcome = "", active = 0, steps = 0, offAt = -1;
   let target = [0, 0, 0], shift = [0, 0, 0]; // m, of the centre of mass from its place at rest
   let stance = {lifted: null, since: 0, lower: 0}; // the foot that is in the air
+  let walk = null, gait = null; // the plan of a walk, and the gait that it follows or null
   let startHeight = 0, startAxis = [0, 0, 1], qpos = null, qvel = null, ctrl = null;
 
   // MuJoCo's memory may move when it grows; views into it are then empty.
@@ -37,12 +40,12 @@ export function createEngine(mj, module, robot) {
     ({qpos, qvel, ctrl} = actual.data);
   }
   function select() {
-    tick.select(`${stance.lifted ?? "all"}/${settings.facets}`);
+    tick.select(`${walk?.name ?? stance.lifted ?? "all"}/${settings.facets}`);
     const {parameters} = tick.problem;
     setParameter(views.floats, parameters.mu, settings.mu);
     setParameter(views.floats, parameters.torque, settings.torque);
     views.floats[parameters.baseMass] = assumed.baseMass + settings.payload;
-    placeTargets();
+    if (walk === null) placeTargets();
   }
   function placeTargets() {
     const {parameters} = tick.problem;
@@ -57,6 +60,7 @@ export function createEngine(mj, module, robot) {
     actual.setFriction(settings.actualMu);
     actual.setTorque(settings.torque);
     select();
+    walk?.set({motion: [settings.speed, 0, settings.turn], height: settings.height});
   }
   function reset() {
     actual.setHulls(false);
@@ -67,6 +71,7 @@ export function createEngine(mj, module, robot) {
     pushes = [];
     [outcome, active, steps, offAt] = ["", 0, 0, -1];
     stance = {lifted: null, since: 0, lower: 0};
+    [walk, gait] = [null, null];
     [target, shift] = [[0, 0, 0], [0, 0, 0]];
     startHeight = actual.data.xpos[3 * base + 2];
     startAxis = [2, 5, 8].map((i) => actual.data.xmat[9 * base + i]);
@@ -117,11 +122,48 @@ export function createEngine(mj, module, robot) {
     return false;
   }
 
+  // What the plan of a walk needs to know of the present state.
+  function measure() {
+    const {geom_xpos: places, subtree_com: coms, xmat} = assumed.data;
+    return {
+      feet: Object.fromEntries(points.map(({name, geom}) => (
+        [name, [...places.subarray(3 * geom, 3 * geom + 3)]]))),
+      com: [...coms.subarray(3 * base, 3 * base + 2)],
+      rotation: xmat.subarray(9 * base, 9 * base + 9),
+    };
+  }
+  // A gait that was chosen begins once all feet stand.
+  function followGait(time) {
+    if (walk === null) {
+      if (settings.gait === null || !robot.walking || stance.lifted || stance.lower) return;
+      walk = createWalk(robot, tick, settings.gravity);
+      walk.set({motion: [settings.speed, 0, settings.turn], height: settings.height});
+    }
+    if (gait === settings.gait) return;
+    if (gait !== null) walk.request(null, time);
+    else if (walk.isStanding) walk.request(settings.gait, time);
+    else return;
+    gait = gait === null ? settings.gait : null;
+  }
+  function moveWalk(time) {
+    const {subtree_com: coms} = assumed.data, {com, comVelocity, Ag, v} = views;
+    const mass = assumed.model.body_subtreemass[base];
+    for (let r = 0; r < 3; r++) {
+      com[r] = coms[3 * base + r];
+      comVelocity[r] = v.reduce((sum, x, i) => sum + Ag[6 * i + r] * x, 0) / mass;
+    }
+    if (walk.update(time, measure)) select();
+    walk.write(time);
+  }
+
   function command() {
-    if (moveFeet() | moveTargets()) placeTargets();
+    const {time} = actual.data; // the plans of `Walk` use the same sum of steps
+    followGait(time);
+    if (walk === null && (moveFeet() | moveTargets())) placeTargets();
     assumed.data.qpos.set(qpos);
     assumed.data.qvel.set(qvel);
     updateDynamics();
+    if (walk !== null) moveWalk(time);
     active = tick.run();
     if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
     for (let i = 0; i < d; i++) ctrl[robot.motors[i]] = views.result[nv + i];
@@ -172,7 +214,11 @@ export function createEngine(mj, module, robot) {
     // "" while the controller runs, then why it does not: "fell", "infeasible", "no answer"
     get outcome() { return outcome; },
     get pushes() { return pushes; },
-    get lifted() { return stance.lifted; },
+    get walk() { return walk; },
+    // Names of the feet in the air.
+    get lifted() {
+      return walk?.feetInAir() ?? (stance.lifted ? [stance.lifted] : []);
+    },
     set(changes) {
       settings = {...settings, ...changes};
       apply();

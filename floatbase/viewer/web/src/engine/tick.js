@@ -6,6 +6,9 @@ const ARGUMENTS = [
   ["q", 1], ["v", 1], ["inputs", 1], ["M", 2], ["h", 1], ["J", 2], ["Ag", 2], ["oMi", 2],
   ["sizes", 1], ["ints", 1], ["floats", 1], ["floatWork", 1], ["intWork", 1], ["result", 1],
 ];
+// those of `write_targets` in floatbase/behaviours/compiled_targets.py, after the time
+const TARGET_ARGUMENTS = ["com", "comVelocity", "body", "pieces", "swings", "inputs"];
+const MOST_PIECES = 16, MOST_SWINGS = 4; // of a plan
 const INTEGERS = new Set(["sizes", "ints", "intWork"]);
 const N_STAGES = 4n;
 const ITEM = 8; // bytes of a number
@@ -18,8 +21,6 @@ class Unavailable extends Error {}
 // nearly redundant contacts, is not available: the tick then has no answer.
 function imports(module, memory) {
   const env = {
-    atan2: Math.atan2,
-    log10: Math.log10,
     __multi3(result, aLow, aHigh, bLow, bHigh) { // 128-bit product
       const mask = (1n << 64n) - 1n;
       const product = ((aHigh << 64n) | (aLow & mask)) * ((bHigh << 64n) | (bLow & mask));
@@ -43,13 +44,16 @@ export function createTick(module, robot) {
   memory = exports.memory;
   const problems = Object.values(robot.problems);
   const most = (get) => Math.max(...problems.map(get));
-  const {nq, nv, bodies} = robot, n = bodies.length;
+  const {nq, nv, bodies, walking} = robot, n = bodies.length, layout = walking?.layout;
   const lengths = {
     q: nq, v: nv, M: nv * nv, h: nv, J: 6 * nv, Ag: 6 * nv, oMi: 12 * n,
     inputs: most((one) => one.inputs.length), sizes: most((one) => one.sizes.length),
     ints: most((one) => one.ints.length), floats: most((one) => one.floats.length),
     floatWork: most((one) => one.workspace[0]), intWork: most((one) => one.workspace[1]),
     result: most((one) => one.resultSize),
+    com: 3, comVelocity: 3, body: layout?.BODY_SIZE ?? 0,
+    pieces: MOST_PIECES * (layout?.PIECE_SIZE ?? 0),
+    swings: MOST_SWINGS * (layout?.SWING_SIZE ?? 0),
   };
   let at = (exports.__heap_base.value + 63) & ~63;
   const place = (bytes) => {
@@ -59,10 +63,10 @@ export function createTick(module, robot) {
   };
   const returned = place(ITEM), exception = place(ITEM);
   const begins = Object.fromEntries(
-    ARGUMENTS.map(([name]) => [name, place(ITEM * lengths[name])]),
+    Object.entries(lengths).map(([name, length]) => [name, place(ITEM * length)]),
   );
   memory.grow(Math.max(0, Math.ceil((at - memory.buffer.byteLength) / PAGE)));
-  const views = Object.fromEntries(ARGUMENTS.map(([name]) => {
+  const views = Object.fromEntries(Object.keys(lengths).map((name) => {
     const kind = INTEGERS.has(name) ? BigInt64Array : Float64Array;
     return [name, new kind(memory.buffer, begins[name], lengths[name])];
   }));
@@ -72,13 +76,15 @@ export function createTick(module, robot) {
   let args = [], problem = null;
 
   // numba's form of an array: owner, parent, items, bytes of an item, address, shape, strides
-  function asArgument([name, dimensions]) {
-    const shape = columns[name] ?? (dimensions === 2 ? [n, 12] : [sizeOf(name)]);
+  function array(name, shape) {
     const strides = name in columns ? [ITEM, ITEM * shape[0]]
-      : dimensions === 2 ? [ITEM * shape[1], ITEM] : [ITEM];
+      : shape.length === 2 ? [ITEM * shape[1], ITEM] : [ITEM];
     const count = shape.reduce((a, b) => a * b, 1);
     return [0, 0, BigInt(count), BigInt(ITEM), begins[name], ...shape.map(BigInt),
       ...strides.map(BigInt)];
+  }
+  function asArgument([name, dimensions]) {
+    return array(name, columns[name] ?? (dimensions === 2 ? [n, 12] : [sizeOf(name)]));
   }
   function sizeOf(name) {
     if (name === "floatWork") return problem.workspace[0];
@@ -86,8 +92,21 @@ export function createTick(module, robot) {
     if (name === "result") return problem.resultSize;
     return problem[name]?.length ?? lengths[name];
   }
+  let targetArgs = [], targetShape = "";
   return {
     views,
+    math: exports, // exp, sin, cos, atan2 and hypot, the same in every browser
+    // Write the targets of a walk at t, s, from the arrays `body`, `pieces` and `swings`, of which
+    // the first rows are used.
+    writeTargets(t, pieces, swings) {
+      const shape = `${pieces} ${swings} ${problem.inputs.length}`;
+      if (shape !== targetShape) {
+        targetShape = shape;
+        const rows = {pieces: [pieces, layout.PIECE_SIZE], swings: [swings, layout.SWING_SIZE]};
+        targetArgs = TARGET_ARGUMENTS.flatMap((name) => array(name, rows[name] ?? [sizeOf(name)]));
+      }
+      exports.write_targets(returned, exception, t, ...targetArgs);
+    },
     get problem() { return problem; },
     // Solve another of the robot's problems from now on.
     select(name) {

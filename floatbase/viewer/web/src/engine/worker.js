@@ -47,6 +47,7 @@ const summary = () => ({
   weight: robot.weight, bodies: robot.bodies, points: robot.points.map(({name}) => name),
   facets: robot.facets, lifted: [...new Set(Object.values(robot.problems)
     .map(({lifted}) => lifted).filter(Boolean))],
+  gaits: robot.walking?.gaits ?? {},
 });
 
 function frame() {

@@ -6,11 +6,16 @@ const SPEEDS = [1, 0.5, 0.25, 0.1];
 const slider = (value, min, max, step, more = {}) => ({value, min, max, step, ...more});
 
 // The controls of a robot, by name: {command, change(value)}; change returns messages for the
-// worker: {set}, {timeScale} and others. push: {force, towards, duration}, changed in place.
-export function controlsOf(robot, settings, push, {names, name, open}) {
+// worker: {set}, {timeScale} and others. push: {force, towards, duration}, changed in place. open:
+// called with another robot's name. walk: called with the name of a gait, or null to stand.
+export function controlsOf(robot, settings, push, {names, name, open, walk}) {
   const set = (key, factor = 1) => (value) => ({set: {[key]: value * factor}});
   const {weight} = robot, heaviest = Math.max(1, Math.round(weight / 9.81 * 0.4));
   const most = 5 * Math.ceil(2.5 * weight / 5);
+  const choices = Object.keys(robot.gaits);
+  const gaits = choices.length ? {gait: [{
+    value: choices.indexOf(settings.gait) + 1, choices: ["stand", ...choices],
+  }, (value) => walk(choices[value - 1] ?? null)]} : {};
   const all = {
     "push [N]": [slider(push.force, 0, most, 5), (value) => { push.force = value; }],
     "towards [°]": [slider(push.towards, -180, 180, 15), (value) => { push.towards = value; }],
@@ -20,6 +25,7 @@ export function controlsOf(robot, settings, push, {names, name, open}) {
     speed: [{value: 0, choices: SPEEDS.map((x) => `${x} ×`)}, (value) => (
       {timeScale: SPEEDS[value]})],
     robot: [{value: names.indexOf(name), choices: names}, (value) => { open(names[value]); }],
+    ...gaits,
     "friction model": [slider(settings.mu, 0.05, 1.2, 0.05, pair("ground and load")),
       set("mu")],
     "friction reality": [slider(settings.actualMu, 0.05, 1.2, 0.05,

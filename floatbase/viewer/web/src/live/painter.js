@@ -58,7 +58,7 @@ export function createPainter(scene, drawing, robot) {
     const three = (values) => [...values.slice(3 * i, 3 * i + 3)];
     const at = three(frame.contacts), {mu, actualMu, facets} = frame.settings;
     const measured = three(frame.measured), name = points[i];
-    const isLifted = frame.lifted === robot.points[i];
+    const isLifted = frame.lifted.includes(robot.points[i]);
     const ground = [at[0], at[1], 0];
     set(`patch/${name}`, "visible", !isLifted);
     place(`patch/${name}`, scaled(ground, [patchRadius, patchRadius, 0.12 * patchRadius]));

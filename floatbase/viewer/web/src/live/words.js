@@ -45,9 +45,10 @@ export function slippingFeet({measured, planned, settings}, {points, weight}) {
 const STOPPED = {
   fell: "The robot fell. It is put on its feet again in a moment.",
   infeasible: "No torques satisfy all the constraints, so the controller stopped. The Python " +
-    "library names the constraints that are in conflict.",
+    "library names the constraints that are in conflict. The robot is put on its feet again in a " +
+    "moment.",
   "no answer": "The controller of this page has no answer in this state. The Python library " +
-    "has a slower method for it.",
+    "has a slower method for it. The robot is put on its feet again in a moment.",
 };
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
@@ -60,7 +61,8 @@ export function limitOf(frame, robot) {
       "the controller plans with."};
   }
   const owners = (part) => frame.seen
-    .filter(([kind, , , multiplier]) => kind.includes(part) && multiplier > WEAK)
+    .filter(([kind, , , multiplier]) => kind.endsWith(part) && multiplier > WEAK)
+    .filter(([kind]) => kind !== "largest normal force") // before a foot lifts off
     .map(([, owner]) => owner);
   const motors = owners("torque limit").map(jointName);
   if (motors.length) {

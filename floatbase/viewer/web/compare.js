@@ -1,0 +1,216 @@
+// Compare the page's engine with the Python library, in node (reference.mjs) or in a browser
+// (benchmarks/live.py), and measure it.
+
+import {createEngine, defaults} from "./src/engine/engine.js";
+import {pushRecovery} from "./src/engine/recovery.js";
+
+const NO_FORCE = 1e-6; // N
+export const FILES = ["states.json", "runs.json", "walks.json", "recovery.json", "go2.json",
+  "solo12.json", "talos.json"];
+export const NUMBERS = ["states.bin", "walks.bin"]; // of float64
+let mj = null, module = null, files = null;
+const robots = {}, engines = {};
+
+// The largest differences between the page and the library. given: MuJoCo, the control step's
+// module, and the contents of FILES and NUMBERS by name.
+export async function compare(given) {
+  prepare(given);
+  const recovery = await compareRecovery();
+  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery};
+}
+
+function prepare(given) {
+  ({mj, module, files} = given);
+  for (const name of ["go2", "solo12", "talos"]) {
+    robots[name] = files[`${name}.json`];
+    engines[name] = createEngine(mj, module, robots[name]);
+  }
+}
+
+// Times of single steps of a warm engine, µs, and the last bits of three runs: a push, a fall and a
+// trot.
+export function measure(given, count = 20000) {
+  prepare(given);
+  const engine = engines.go2, times = new Float64Array(count), states = [];
+  for (let i = 0; i < 3000; i++) engine.step();
+  for (let i = 0; i < count; i++) {
+    const begin = performance.now();
+    engine.step();
+    times[i] = 1000 * (performance.now() - begin);
+  }
+  for (const [force, gait] of [[30, null], [300, null], [60, "trot"]]) {
+    engine.set({...defaults(robots.go2), gait, speed: 0.4, turn: 0.2});
+    engine.reset();
+    engine.push({force: [0, force, 0], start: 1.5, duration: 0.1});
+    for (let i = 0; i < 3000; i++) engine.step();
+    states.push([...engine.actual.data.qpos]);
+  }
+  times.sort();
+  const bits = states.map((state) => [...new Uint8Array(new Float64Array(state).buffer)]
+    .map((byte) => byte.toString(16).padStart(2, "0")).join(""));
+  return {median: times[count >> 1], p99: times[Math.floor(0.99 * count)],
+    mean: times.reduce((sum, x) => sum + x) / count, bits, com: engine.com()};
+}
+
+const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
+const size = (a) => a.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+
+// Answers to the same inputs, and these inputs from MuJoCo.
+function compareStates() {
+  const numbers = files["states.bin"];
+  const found = {states: 0, otherActive: 0, otherCode: 0, infeasible: 0, active: 0, torque: 0,
+    inputs: {M: 0, h: 0, J: 0, Ag: 0, oMi: 0, v: 0, q: 0}};
+  let at = 0;
+  for (const {robot: name, settings, count, lengths} of files["states.json"]) {
+    const [q, v, M, h, J, Ag, oMi, tau, rows] = lengths.map((length) => {
+      at += length;
+      return numbers.subarray(at - length, at);
+    });
+    const engine = engines[name], robot = robots[name], {views} = engine.tick;
+    engine.set({...defaults(robot), ...settings});
+    compareInputs(engine, robot, {q, v, M, h, J, Ag, oMi}, found.inputs);
+    for (const [key, values] of Object.entries({q, v, M, h, J, Ag, oMi})) views[key].set(values);
+    const answer = engine.tick.run();
+    const {nv, d} = robot, first = nv + d + engine.tick.problem.k;
+    const active = [...views.result.subarray(first + nv + engine.tick.problem.k)]
+      .slice(0, Math.max(0, answer)).sort((a, b) => a - b);
+    found.states++;
+    if (count < 0) found.infeasible++;
+    else found.active += count;
+    if (answer !== count) found.otherCode++;
+    else if (count >= 0) {
+      const [ours, theirs] = [active, [...rows]].map((some) => namesOf(some, engine, robot));
+      if (ours.join() !== theirs.join()) found.otherActive++;
+      const differences = Array.from(tau, (x, i) =>
+        Math.abs(x - views.result[nv + i]) / robot.torqueLimits[i]);
+      found.torque = Math.max(found.torque, size(differences));
+    }
+  }
+  return found;
+}
+
+// Names of active rows. A force of zero lies at the tip of its cone, where any facets determine it:
+// such a point counts as a whole.
+function namesOf(rows, {tick}, {nv, d}) {
+  const names = rows.map((row) => {
+    const [kind, owner] = tick.problem.rows[row], point = tick.problem.points.indexOf(owner);
+    const force = tick.views.result.subarray(nv + d + 3 * point, nv + d + 3 * point + 3);
+    return point >= 0 && size(force) < NO_FORCE ? owner : `${kind} ${row}`;
+  });
+  return [...new Set(names)].sort();
+}
+
+// q and v in MuJoCo's model, and from there back.
+function compareInputs(engine, robot, given, found) {
+  setState(engine.assumed.data, robot, given);
+  engine.updateDynamics();
+  const {views} = engine.tick;
+  for (const [key, values] of Object.entries(given)) {
+    const isUsed = (value, i) => key !== "Ag" || i % 6 < 3; // the tick reads three rows of Ag
+    const [ours, theirs] = [views[key].filter(isUsed), values.filter(isUsed)];
+    const difference = largest(theirs, ours) / Math.max(1, size(theirs));
+    found[key] = Math.max(found[key], difference);
+  }
+}
+
+function setState(data, {qposOfQ, qvelOfV}, {q, v}) {
+  const [x, y, z, w] = q.subarray(3, 7);
+  const R = [
+    1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+    2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+    2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
+  ];
+  q.forEach((value, i) => { data.qpos[qposOfQ[i]] = value; });
+  v.forEach((value, i) => { data.qvel[qvelOfV[i]] = value; });
+  for (let i = 0; i < 3; i++) {
+    data.qvel[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
+  }
+}
+
+function compareRuns() {
+  return files["runs.json"].map((run) => {
+    const robot = robots[run.robot], engine = engines[run.robot];
+    engine.set({...defaults(robot), ...run.settings});
+    engine.reset();
+    if (size(run.force) > 0) engine.push(run);
+    let distance = 0, firstSecond = 0, moved = 0, end = 0;
+    const first = run.com[0];
+    for (let step = 0; step < Math.round(run.time / 1e-3); step++) {
+      const outcome = engine.step();
+      if (step < run.com.length) {
+        const com = engine.com();
+        const far = Math.hypot(...com.map((value, i) => value - run.com[step][i]));
+        moved = Math.max(moved, Math.hypot(...com.map((value, i) => value - first[i])));
+        distance = Math.max(distance, far);
+        if (step < 1000) firstSecond = distance;
+      }
+      end = step + 1;
+      if (outcome) break;
+    }
+    return {robot: run.robot, settings: run.settings, force: run.force, python: run.outcome,
+      outcome: engine.outcome || "completed", firstSecond, distance, moved, end,
+      pythonEnd: run.com.length};
+  });
+}
+
+// Walks: the inputs of the control step for the same states, and runs of the page by itself.
+function compareWalks() {
+  const numbers = files["walks.bin"];
+  let at = 0;
+  return files["walks.json"].map((walk) => {
+    const {nq, nv} = robots[walk.robot], rows = walk.lengths.map((length) => {
+      at += length;
+      const row = numbers.subarray(at - length, at);
+      const [q, v, com, inputs] = [[0, nq], [nq, nq + nv], [nq + nv, nq + nv + 3],
+        [nq + nv + 3]].map(([from, to]) => row.subarray(from, to));
+      return {q, v, com, inputs};
+    });
+    return {robot: walk.robot, python: walk.outcome, ...followStates(walk, rows),
+      ...walkAlone(walk, rows)};
+  });
+}
+function start(walk) {
+  const engine = engines[walk.robot], robot = robots[walk.robot];
+  engine.set({...defaults(robot), mu: walk.mu, actualMu: walk.mu});
+  engine.reset();
+  return engine;
+}
+function change(engine, {schedule}, step) {
+  const now = schedule.find(({time}) => Math.round(time * 1000) === step);
+  if (now) engine.set(now.settings);
+}
+function followStates(walk, rows) {
+  const engine = start(walk), robot = robots[walk.robot];
+  let inputs = 0, where = null;
+  rows.forEach((row, step) => {
+    change(engine, walk, step);
+    setState(engine.actual.data, robot, row);
+    engine.step();
+    if (engine.outcome) throw new Error(`${walk.robot}: ${engine.outcome} at step ${step}`);
+    const difference = largest(row.inputs, engine.tick.views.inputs);
+    if (difference > inputs) [inputs, where] = [difference, step];
+  });
+  return {inputs, where};
+}
+function walkAlone(walk, rows) {
+  const engine = start(walk);
+  engine.push(walk);
+  let distance = 0, moved = 0;
+  const first = rows[0].com;
+  for (let step = 0; step < rows.length; step++) {
+    change(engine, walk, step);
+    const com = engine.com();
+    distance = Math.max(distance, Math.hypot(...com.map((x, i) => x - rows[step].com[i])));
+    moved = Math.hypot(com[0] - first[0], com[1] - first[1]);
+    if (engine.step()) break;
+  }
+  return {outcome: engine.outcome || "completed", distance, moved};
+}
+
+async function compareRecovery() {
+  const given = files["recovery.json"], robot = robots[given.robot], pushes = [];
+  for await (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
+    pushes.push(push);
+  }
+  return {pushes, python: given.pushes, resolution: given.resolution};
+}
