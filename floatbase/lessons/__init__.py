@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
-from floatbase.lessons.exercises import all_exercises, check, reveal, show_progress
+from floatbase.lessons.exercises import (
+    all_exercises,
+    check,
+    own_numbers,
+    reveal,
+    show_progress,
+)
 from floatbase.lessons.judges import NumericJudge
 from floatbase.lessons.predictions import compare, predict, review
 from floatbase.lessons.rounding import rounded
@@ -57,6 +63,7 @@ __all__ = [
     "joint_servo",
     "live_run",
     "measured_push_recovery",
+    "own_numbers",
     "plot_push_recovery",
     "predict",
     "progress",

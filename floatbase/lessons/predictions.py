@@ -109,9 +109,7 @@ def review(lesson: str = "") -> None:
         Name of a lesson, such as "02" or "C", or of a single prediction, such as "02.c". By default
         all predictions are listed.
     """
-    lesson = as_string("lesson", lesson)
-    if len(lesson) == 1:  # 2 means lesson 02, and c means lesson C
-        lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
+    lesson = lesson_name(lesson)
     stored = progress.predictions()
     known = {
         name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})
@@ -134,6 +132,14 @@ def review(lesson: str = "") -> None:
         print(
             "   ".join(f"{part:{width}}" for part, width in zip(row, widths, strict=True)).rstrip()
         )
+
+
+def lesson_name(given: str) -> str:
+    """Return the name of a lesson: "2" means lesson 02, and "c" means lesson C."""
+    given = as_string("lesson", given)
+    if len(given) == 1:
+        return f"0{given}" if given.isdigit() else given.upper()
+    return given
 
 
 def _describe_error(said: Any, result: Any, unit: str) -> str:
