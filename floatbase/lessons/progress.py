@@ -103,13 +103,13 @@ def predictions() -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict of str to dict
-        For each prediction: {"said": …, "unit": …, "is": …}, as far as they are known; see
-        `append`.
+        For each prediction: {"said": …, "unit": …, "sure": …, "is": …}, as far as they are known;
+        see `append`.
     """
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text}
+            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text, "sure": _is_bool}
             kept = {
                 key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])
             }
@@ -137,7 +137,7 @@ def append(name: str, entry: dict[str, Any]) -> str:
         Name of the exercise or prediction.
     entry : dict
         What to store. In predictions, "said" and "is" are a number, a list of numbers or a string,
-        and "unit" is a string.
+        "unit" is a string, and "sure" is True or False.
 
     Returns
     -------
@@ -293,6 +293,10 @@ def _is_answer(value: Any) -> bool:
     return _is_text(value) or (
         bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers)
     )
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool)
 
 
 def _is_text(value: Any) -> bool:
