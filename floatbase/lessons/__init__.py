@@ -28,11 +28,13 @@ if TYPE_CHECKING:
         measured_push_recovery,
         plot_push_recovery,
     )
+    from floatbase.lessons.recalling import recall
     from floatbase.lessons.submission import hand_in
 
 # imported on first use, because they load the physics and the viewer
 _LAZY = {
     "hand_in": "submission",
+    "recall": "recalling",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
         (
@@ -70,6 +72,7 @@ __all__ = [
     "props",
     "push_panel",
     "qp_plots",
+    "recall",
     "reveal",
     "review",
     "rounded",

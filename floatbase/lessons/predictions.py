@@ -67,9 +67,7 @@ def predict(
         print(f"{name}: {message}")
         return
     try:
-        said = (
-            _match_choice(given, tuple(choices)) if choices else _parse_numbers(given, unit, count)
-        )
+        said = parse_answer(given, unit, choices, count)
     except InputError as error:
         print(f"{name}: {error} To skip the prediction, leave the ... in place.")
         return
@@ -101,7 +99,7 @@ def compare(name: str, value: Any) -> None:
     stored = progress.predictions().get(name, {})
     known = stored | _unsaved.get(name, {})
     unit = _units.get(name, known.get("unit", ""))
-    shown = value if isinstance(value, str) else _format_result(value, unit)
+    shown = value if isinstance(value, str) else format_result(value, unit)
     if "said" not in known:
         print(f"{name}: {shown}")
         return
@@ -140,7 +138,7 @@ def review(lesson: str = "") -> None:
             shown, off = (
                 ("not shown yet", "")
                 if result is None
-                else (_format_result(result, unit), _describe_error(said, result, unit))
+                else (format_result(result, unit), _describe_error(said, result, unit))
             )
             if "sure" in entry and result is not None:
                 counted[entry["sure"]].append(is_right(said, result, unit))
@@ -259,10 +257,21 @@ def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
         return ""
-    problem = progress.append(name, entry)
+    problem = progress.append(name, entry | {"time": progress.now()})
     if problem:
         _unsaved[name] = entry
     return problem
+
+
+def parse_answer(answer: Any, unit: str, choices: Sequence[str], count: int) -> Any:
+    """Return the choice or the numbers that a learner's answer means; see `predict`.
+
+    Raises
+    ------
+    InputError
+        If the answer cannot be used.
+    """
+    return _match_choice(answer, choices) if choices else _parse_numbers(answer, unit, count)
 
 
 def _match_choice(answer: Any, choices: Sequence[str]) -> str:
@@ -316,7 +325,8 @@ def _stored_result(value: Any) -> Any:
     return kept if np.ndim(given) else kept[0]
 
 
-def _format_result(value: Any, unit: str) -> str:
+def format_result(value: Any, unit: str) -> str:
+    """Write a result as text: integers in full, other numbers with two significant digits."""
     if isinstance(value, str):
         return value
     return rounded(value, unit, digits=12 if np.asarray(value).dtype.kind in "iu" else 2)

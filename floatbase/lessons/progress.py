@@ -12,6 +12,7 @@ import inspect
 import json
 import os
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +117,27 @@ def predictions() -> dict[str, dict[str, Any]]:
             if kept and _is_text(name):
                 found.setdefault(name, {}).update(kept)
     return found
+
+
+def history() -> dict[str, list[dict[str, Any]]]:
+    """Return all entries about each prediction, in the order in which they were written.
+
+    Returns
+    -------
+    dict of str to list of dict
+        For each prediction: its entries with a usable "said", "is" or "recalled".
+    """
+    found: dict[str, list[dict[str, Any]]] = {}
+    for text in _lines():
+        for name, entry in _entries(text):
+            if any(_is_answer(entry.get(key)) for key in ("said", "is", "recalled")):
+                found.setdefault(name, []).append(entry)
+    return found
+
+
+def now() -> str:
+    """Return the present time in ISO format, with the zone."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
 def student() -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import datetime
 from pathlib import Path
 
 import floatbase as fb
@@ -69,7 +68,7 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
     written = {
         "form": FILE_FORMAT, "name": name.strip(), "id": student, "lesson": lesson,
         "floatbase": fb.__version__,
-        "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises,
+        "time": progress.now(), "exercises": exercises,
         "predictions": predicted,
     }  # fmt: skip
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
@@ -17,6 +16,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 import floatbase
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
 from floatbase.lessons.publish.site.references import add_links
+from floatbase.lessons.questions import predict_call
 
 RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
@@ -149,12 +149,7 @@ def _live_lesson_note(text: str) -> str:
 
 def _prediction_question(cell: Any) -> str:
     """Describe the prediction that a cell asks for."""
-    call = next(
-        node
-        for node in ast.walk(ast.parse(cell.source))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
-    )
-    given = {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords}
+    name, given = predict_call(cell.source)
     if "choices" in given:
         wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
     else:
@@ -162,7 +157,7 @@ def _prediction_question(cell: Any) -> str:
         wanted = ("a number" if count == 1 else f"{count} numbers") + (
             f", in {unit}" if unit else ""
         )
-    asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
+    asked = f"**{name}**, your prediction: {wanted}."
     return (
         f":::{{div}} live\n{asked} Make your prediction before you read on. You can type it in "
         f"in [the live lesson]({RUN_PAGE}).\n:::"
