@@ -29,11 +29,12 @@ if TYPE_CHECKING:
         plot_push_recovery,
     )
     from floatbase.lessons.recalling import recall
-    from floatbase.lessons.submission import hand_in
+    from floatbase.lessons.submission import hand_in, import_answers
 
 # imported on first use, because they load the physics and the viewer
 _LAZY = {
     "hand_in": "submission",
+    "import_answers": "submission",
     "recall": "recalling",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
@@ -62,6 +63,7 @@ __all__ = [
     "controller_factory",
     "draw_push_recovery",
     "hand_in",
+    "import_answers",
     "joint_servo",
     "live_run",
     "measured_push_recovery",

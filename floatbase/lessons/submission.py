@@ -96,6 +96,44 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
     return path
 
 
+def import_answers(path: str | Path) -> None:
+    """Add the answers that a page of the site saved to your progress.
+
+    `review`, `recall`, `show_progress` and `hand_in` then know them. What is known already stays.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that *Save my answers* wrote.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or if it is not such a file.
+    """
+    try:
+        found = json.loads(Path(path).read_bytes())
+    except (OSError, TypeError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or "it is not a file of answers"
+        raise InputError(f"{short_repr(str(path))} cannot be read: {reason}.") from None
+    kinds = ("predictions", "exercises")
+    is_ours = isinstance(found, dict) and found.get("form") == FILE_FORMAT
+    if not is_ours or not all(isinstance(found.get(kind), dict) for kind in kinds):
+        raise InputError(f"{short_repr(str(path))} is not a file of answers.")
+    stored, tried = progress.predictions(), progress.load()
+    new = {
+        name: entry
+        for kind, known in (("predictions", stored), ("exercises", tried))
+        for name, entry in found[kind].items()
+        if name not in known and isinstance(entry, dict)
+    }
+    for name, entry in new.items():
+        if problem := progress.append(name, entry):
+            print(problem)
+            return
+    print(f"{len(new)} answers and predictions were added.")
+
+
 def _is_of(name: str, lesson: str) -> bool:
     """Return whether an exercise or a prediction is part of a lesson; "" means all lessons."""
     return lesson in ("", name.split(".")[0])
