@@ -135,6 +135,16 @@ def history() -> dict[str, list[dict[str, Any]]]:
     return found
 
 
+def last(name: str, key: str) -> Any:
+    """Return the last value that was stored for an entry under a key, or None."""
+    found = None
+    for text in _lines():
+        for other, entry in _entries(text):
+            if other == name and key in entry:
+                found = entry[key]
+    return found
+
+
 def now() -> str:
     """Return the present time in ISO format, with the zone."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
@@ -142,12 +152,8 @@ def now() -> str:
 
 def student() -> str:
     """Return the id that was given to `own_numbers` last, or ""."""
-    found = ""
-    for text in _lines():
-        for name, entry in _entries(text):
-            if name == STUDENT and _is_text(entry.get("id")):
-                found = entry["id"]
-    return found
+    found = last(STUDENT, "id")
+    return found if _is_text(found) else ""
 
 
 def append(name: str, entry: dict[str, Any]) -> str:

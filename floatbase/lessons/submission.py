@@ -10,7 +10,7 @@ import floatbase as fb
 from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
-from floatbase.lessons import progress
+from floatbase.lessons import inventory, progress
 from floatbase.lessons.exercises import all_exercises, student_id
 from floatbase.lessons.predictions import lesson_name
 
@@ -58,8 +58,8 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
     known = {key: entry for key, entry in all_exercises().items() if _is_of(key, lesson)}
     tried = {key: entry for key, entry in progress.load().items() if _is_of(key, lesson)}
     predicted = {key: e for key, e in progress.predictions().items() if _is_of(key, lesson)}
-    answers = progress.answers()
-    if not tried and not predicted:
+    answers, letters = progress.answers(), inventory.stored_letters()
+    if not tried and not predicted and not letters:
         raise InputError(
             f"There is nothing to hand in yet: {progress.path()} contains no answers and no "
             f"predictions{f' in lesson {lesson}' if lesson else ''}."
@@ -69,7 +69,7 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
         "form": FILE_FORMAT, "name": name.strip(), "id": student, "lesson": lesson,
         "floatbase": fb.__version__,
         "time": progress.now(), "exercises": exercises,
-        "predictions": predicted,
+        "predictions": predicted, "inventory": letters,
     }  # fmt: skip
     try:
         path = _own_path(Path(folder), name.strip(), lesson)

@@ -79,6 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     graded.add_argument(
         "--table", type=Path, metavar="CSV", help="also write a row per learner and exercise"
     )
+    graded.add_argument(
+        "--inventory", action="store_true", help="print the gain in the concept inventory"
+    )
     graded.add_argument("--code", action="store_true", help="print the code that was handed in")
     graded.add_argument(
         "--latest", action="store_true", help="grade only the last file of each learner"
@@ -231,6 +234,7 @@ def _assign(given: argparse.Namespace) -> None:
 
 def _grade(given: argparse.Namespace) -> int:
     """Grade files; return how many could not be read."""
+    from floatbase.lessons import inventory
     from floatbase.lessons.publish import gradebook, grades
 
     policy = gradebook.Policy(
@@ -257,6 +261,8 @@ def _grade(given: argparse.Namespace) -> int:
     print(grades.overview(submissions))
     if given.code:
         print(grades.code_to_read(submissions))
+    if given.inventory:
+        print(inventory.gain_report([one.inventory for one in submissions]))
     if given.gradebook:
         for line in gradebook.write_gradebook(
             given.gradebook,

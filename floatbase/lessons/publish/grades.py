@@ -78,6 +78,8 @@ class Submission:
         Result of every exercise.
     predicted : int
         Number of predictions.
+    inventory : dict
+        Answers to the concept inventory, by time.
     """
 
     file: str
@@ -86,6 +88,7 @@ class Submission:
     time: str
     results: tuple[ExerciseResult, ...]
     predicted: int
+    inventory: dict[str, Any]
 
 
 def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
@@ -120,6 +123,7 @@ def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
         time=_one_line(found.get("time")),
         results=tuple(_exercise_results(found["exercises"], student if own_numbers else "")),
         predicted=len(found["predictions"]),
+        inventory=given if isinstance(given := found.get("inventory"), dict) else {},
     )
 
 
