@@ -247,7 +247,7 @@ def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
         assert ended.value.code == 1  # ten files could not be read
         printed = capsys.readouterr()
         assert printed.err.count("was not written by hand_in") == 10
-        assert printed.out.count("too late") == 5 and printed.out.count("2 late days") == 5
+        assert printed.out.count("too late") == 5 and printed.out.count("late days used: 2") == 5
         rows = list(csv.DictReader(table.open(encoding="utf-8")))
         if kind == "canvas":
             assert list(rows[0]) == CANVAS.splitlines()[0].split(",")

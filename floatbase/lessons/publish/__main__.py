@@ -135,6 +135,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     assigned.add_argument(
         "--until", default="", metavar="TIME", help="when students get the solutions"
     )
+    voted = commands.add_parser("lecture", help="write the questions for the lecture as slides")
+    voted.add_argument("--to", type=Path, default=Path("lecture.html"), metavar="HTML")
     laid = commands.add_parser("workspace", help="update the learner's copy of the course")
     laid.add_argument(
         "--to",
@@ -161,6 +163,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "grade":
             if unread := _grade(given):
                 parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
+        elif given.command == "lecture":
+            _lecture(given.to)
         elif given.command == "assign":
             _assign(given)
         else:
@@ -217,6 +221,13 @@ def _solutions(folder: Path) -> None:
     for line in write_solutions(folder):
         print(line)
     print(f"The solutions are in {folder}.")
+
+
+def _lecture(path: Path) -> None:
+    from floatbase.lessons.publish import site
+
+    site.lecture.write_slides(path)
+    print(f"The slides are in {path}.")
 
 
 def _assign(given: argparse.Namespace) -> None:

@@ -166,7 +166,7 @@ def write_gradebook(
             if number in chosen:
                 points = policy.points(chosen[number])
                 if days := policy.days_late(time_of(chosen[number].time)):
-                    messages.append(f"{chosen[number].file}: {days} late days.")
+                    messages.append(f"{chosen[number].file}: late days used: {days}.")
             number += 1
         written.append([*(row[name] for name in kept), points])
     text = io.StringIO(newline="")
@@ -280,7 +280,7 @@ def write_gradescope_results(
         days = policy.days_late(time)
         found = {
             "score": sum(test["score"] for test in tests if isinstance(test["score"], int)),
-            "output": f"{one.name}: {days} late days." if days else f"{one.name}.",
+            "output": f"{one.name}. Late days used: {days}." if days else f"{one.name}.",
             "tests": [*tests, *_identity(one, known)],
             "extra_data": {"late_days": days, "predictions": one.predicted},
         }

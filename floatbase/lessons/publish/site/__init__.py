@@ -5,7 +5,7 @@ lessons, `reference` writes the API reference, and `mathml` draws formulas. `con
 Sphinx. The text of the pages is in the folder `docs`. Building the site needs the extra `site`.
 """
 
-from floatbase.lessons.publish.site import mathml
+from floatbase.lessons.publish.site import lecture, mathml
 from floatbase.lessons.publish.site.addresses import PACKAGES, exported
 from floatbase.lessons.publish.site.answers import (
     exercise_form,
@@ -23,6 +23,7 @@ __all__ = [
     "build",
     "exercise_form",
     "exported",
+    "lecture",
     "mathml",
     "prediction_form",
     "prepare_lesson",
