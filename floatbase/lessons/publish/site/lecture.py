@@ -82,8 +82,8 @@ def page() -> str:
     lines = [
         "# Questions for the lecture",
         "",
-        "Four questions of each lesson, for a vote before the explanation. Ask, let the class vote, "
-        "let neighbours discuss, and let them vote again. Then show the answer.",
+        "Four questions of each lesson, for a vote before the explanation. Ask, let students vote, "
+        "discuss with their neighbours, and vote again. Then show the answer.",
         "",
         f'<a href="_static/{SLIDES}">All questions as slides</a> are one file that needs no '
         "network. The arrow keys turn the pages, and the space bar shows the answer. For lessons "
