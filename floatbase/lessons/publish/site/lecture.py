@@ -24,6 +24,7 @@ LECTURE = {
     "06": "beij", "07": "abgh", "08": "abfg", "09": "cfij", "A": "cdeg", "B": "aefh",
     "C": "abce", "P": "fghi", "X": "bceg",
 }  # fmt: skip
+_WHY = re.compile(r"\*\*Why\??\*\*:? *")
 _CODE = re.compile(r"`([^`]+)`|\$([^$]+)\$")
 
 
@@ -62,17 +63,21 @@ def lecture_questions() -> dict[str, list[LectureQuestion]]:
 
 
 def _reason(cells: list[object], name: str) -> str:
-    """Return the first paragraph below the result of a prediction."""
+    """Return the paragraph "Why?" below the result of a prediction, or the first paragraph."""
+    paragraphs: list[str] = []
     is_shown = False
     for cell in cells:
         source, kind = getattr(cell, "source", ""), getattr(cell, "cell_type", "")
         if kind == "code":
+            if is_shown and "predict(" in source:
+                break  # of the next question
             is_shown |= f'compare("{name}"' in source
         elif is_shown:
-            paragraphs = (part for part in source.split("\n\n") if not part.startswith(("#", "$$")))
-            first = next(paragraphs, "")
-            return re.sub(r"^\*\*Why\?\*\*\s*", "", " ".join(first.split()))
-    return ""
+            paragraphs += [" ".join(part.split()) for part in source.split("\n\n")]
+    why = (part for part in paragraphs if _WHY.match(part))
+    usable = (part for part in paragraphs if part[:1] not in "#$|<" and not part.endswith(":"))
+    reason = _WHY.sub("", next(why, "") or next(usable, ""), count=1)
+    return reason[:1].upper() + reason[1:]
 
 
 def page() -> str:
