@@ -232,21 +232,21 @@ class Independent:
         G = np.block([[G, E], [np.zeros((len(soft), self.n)), -np.eye(len(soft))]])
         h = np.r_[h, np.zeros(len(soft))]
         A, b = np.pad(self.A, ((0, 0), (0, len(soft)))), self.b
-        x = None
+        x = np.zeros(self.n + len(soft))
         for i, level in enumerate(levels):
             H, g, rows = self.cost(level)
             H, g = np.pad(H, (0, len(soft))), np.r_[g, weights[soft] if i == 0 else 0.0 * soft]
-            found = minimum(H, g, A, b, G, h)
+            # later levels in the change from an optimum of the earlier ones, which is feasible
+            found = minimum(H, g + H @ x, A, b if i == 0 else np.zeros(len(A)), G, h - G @ x)
             if found is None:
                 return None
-            x, strict = found
+            x, strict = x + found[0], found[1]
             for part, _ in rows:  # later levels keep what this one reached
                 A = np.vstack([A, np.pad(part, ((0, 0), (0, len(soft))))])
-                b = np.r_[b, part @ x[: self.n]]
             # a row with a positive multiplier is active at every optimum of the level
-            A, b = np.vstack([A, G[strict]]), np.r_[b, G[strict] @ x]
+            A = np.vstack([A, G[strict]])
             G, h = G[~strict], np.maximum(h, G @ x + TOLERANCE)[~strict]
-        return None if x is None else x[: self.n]
+        return x[: self.n]
 
 
 def minimum(
@@ -269,6 +269,8 @@ def minimum(
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_iter = False, 200
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TIGHT
+    if np.min(bounds, initial=0.0) >= 0.0:  # 0 is feasible, and small bounds would mislead Clarabel
+        settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-30
     cone = [clarabel.NonnegativeConeT(len(bounds))]
     program = csc_matrix(np.triu(P)), slope, csc_matrix(rows), bounds, cone, settings
     found = clarabel.DefaultSolver(*program).solve()

@@ -34,9 +34,9 @@ from floatbase.lessons.publish import (
 MARK = "FLOATBASE_STARTED_BY_TEST"
 HOME = 'os.environ["FLOATBASE_HOME"]'
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
-# s of one core: a lesson with all its answers takes up to 25, and longer where two threads share a
-# core
-LIMIT = 60.0
+# s of one core: a lesson takes at most 20, and up to 25 with all its answers; twice that on a slow
+# or busy machine
+LIMIT = 50.0
 TOOK: dict[str, float] = {}  # what each run of a lesson took
 
 

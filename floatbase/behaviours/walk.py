@@ -211,7 +211,8 @@ class Walk:
         self.height, self.pitch = height, pitch
         check_options(type(self).__name__, options)
         self._options = WalkOptions.checked(
-            self._all_contacts, clearance, reach, ramp, foothold or raibert_foothold, adjustment,
+            self._all_contacts, clearance, reach, ramp,
+            raibert_foothold if foothold is None else foothold, adjustment,
             modify_plan, swing, ground, tasks, acceleration, gains, options,
         )  # fmt: skip
         self._clear()

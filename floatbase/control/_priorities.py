@@ -138,10 +138,15 @@ def solve_levels(
     kept: dict[str, float] = {}
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
         level = replace(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
-        solution = solve(level, solver)
         if solutions:
             earlier = solutions[-1].violations
-            solution = replace(solution, earlier_violations=earlier, earlier_multipliers=dict(kept))
+            solution = replace(
+                _solve_from(solutions[-1].x, level, solver),
+                earlier_violations=earlier,
+                earlier_multipliers=dict(kept),
+            )
+        else:
+            solution = solve(level, solver)
         solutions.append(solution)
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
@@ -159,3 +164,13 @@ def solve_levels(
         b = np.concatenate([b, right, qp.G[active] @ solution.x])
         names = (*names, *labels, *active_names)
     return solutions
+
+
+def _solve_from(x: Array, qp: QP, solver: str) -> Solution:
+    """Solve a QP in the change from a point that satisfies its constraints.
+
+    With nearly dependent equalities, a solution of A x = b from b alone may miss inequalities that
+    the point satisfies.
+    """
+    change = solve(replace(qp, g=qp.g + qp.H @ x, b=np.zeros(len(qp.b)), h=qp.h - qp.G @ x), solver)
+    return replace(change, qp=qp, x=x + change.x)

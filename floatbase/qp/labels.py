@@ -72,10 +72,13 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
     InputError
         If the number of names differs from `count`, or if a name is not unique.
     """
-    labels = tuple(
-        name if isinstance(name, ConstraintLabel) else ConstraintLabel(name)
-        for name in as_strings(f"{kind}_names", names)
-    )
+    given = names if isinstance(names, tuple) else ()
+    labels = tuple(name for name in given if isinstance(name, ConstraintLabel))
+    if not labels or len(labels) < len(given):  # labels of another QP need no check
+        labels = tuple(
+            name if isinstance(name, ConstraintLabel) else ConstraintLabel(name)
+            for name in as_strings(f"{kind}_names", names)
+        )
     labels = labels or tuple(ConstraintLabel(f"{kind} {i}") for i in range(count))
     if len(labels) != count:
         raise InputError(

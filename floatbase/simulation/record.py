@@ -23,6 +23,7 @@ from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import FloatbaseError, InputError, unknown_name
 from floatbase.robots import Robot, State
+from floatbase.simulation.ground import Ground
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 
@@ -84,6 +85,8 @@ class Rollout(Value):
         of rows with fewer contact forces.
     joint_limits : JointLimits or None
         Joint limits in the last plan, as in `Command.joint_limits`.
+    ground : Ground or None
+        The ground of the simulation; None if it is not known.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -105,6 +108,7 @@ class Rollout(Value):
     planned_qdd: Array | None = None
     targets: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
     joint_limits: JointLimits | None = None
+    ground: Ground | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -435,6 +439,7 @@ class Recorder:
             planned_qdd=self._complete_rows(self._planned_qdd),
             targets=MappingProxyType(self._targets_by_name()),
             joint_limits=self._joint_limits,
+            ground=self._sim.ground,
         )
 
     def _targets_by_name(self) -> dict[str, Array]:

@@ -414,7 +414,8 @@ class Viewer(Controls, Output):
             Name of the ghost in the legend.
         **options
             As for `show`. The rollout itself determines `push`, `swing_feet` and, unless they are
-            given, `joint_limits` and `qdd`.
+            given, `joint_limits` and `qdd`. Steps, stairs and other boxes of its ground are drawn
+            unless the viewer has a ground.
 
         Returns
         -------
@@ -434,6 +435,8 @@ class Viewer(Controls, Output):
         for name, flag in {"planned": planned, "follow": follow, "paused": paused}.items():
             as_bool(name, flag)
         _check_texts(title=title, ghost_name=ghost_name)
+        if self.painter.ground is None and rollout.ground is not None and rollout.ground.boxes:
+            self.set_ground(rollout.ground)
         rows, planned_steps = (
             recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
             gait_overlay.as_steps(steps),

@@ -27,3 +27,9 @@ def test_torques_and_verdicts_are_those_of_an_independent_qp(kind: str) -> None:
         assert max(result.differences, default=0.0) < constraints.REQUIRED
         solved += len(result.differences)
     assert solved or kind == "joint limits"  # hard limits may all be infeasible
+
+
+def test_later_levels_always_have_a_solution() -> None:
+    """Rows that earlier levels keep depend nearly on each other in these problems."""
+    result = constraints.compare("priorities", judges.load("talos"), [3, 8, 18])
+    assert result.verdicts == 0 and max(result.differences) < constraints.REQUIRED

@@ -13,6 +13,7 @@ import umsgpack
 from browsers import SCREENSHOTS
 from messages import refused
 
+import floatbase as fb
 from floatbase.dynamics import Contacts, LinearConstraint
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
@@ -68,6 +69,22 @@ def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
     return (
         np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
     )
+
+
+def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(
+    viewer: Viewer, go2: Robot
+) -> None:
+    stairs = fb.Ground.stairs(2, 0.1, 0.3, 0.5)
+    sim = fb.Simulation(go2, stairs)
+    state = go2.standing()
+    controller = fb.WholeBodyController(go2, fb.Contacts.feet(go2), fb.standing_tasks(state))
+    run = fb.rollout(sim, controller, 0.01)
+    assert run.ground is stairs
+    viewer.play(run)
+    assert len(viewer.painter.drawn_ground.boxes) == len(stairs.boxes)
+    viewer.set_ground([0.0, 0.0, 1.0])
+    viewer.play(run)
+    assert not hasattr(viewer.painter.drawn_ground, "boxes")
 
 
 def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(

@@ -246,14 +246,13 @@ EXERCISES = (
         name="06.1",
         statement="The matrix of the polyhedron inside the cone for a normal that is not a unit "
         "vector, shape (5, 3).",
-        stub="rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets, inside the "
-        "cone",
+        stub="bank_rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets inside",
         solution="from floatbase.friction import tangents\n\n"
         "n_bank = bank / np.linalg.norm(bank)\n"
         "t1, t2 = tangents(n_bank)\n"
         "turns = 2 * np.pi * np.arange(5) / 5\n"
         "directions = np.outer(np.cos(turns), t1) + np.outer(np.sin(turns), t2)\n"
-        "rows = directions - 0.5 * np.cos(np.pi / 5) * n_bank",
+        "bank_rows = directions - 0.5 * np.cos(np.pi / 5) * n_bank",
         judge=ShapeJudge(
             _HalfSpaceJudge(
                 right=_rows_from_edges,

@@ -29,14 +29,14 @@ EXERCISES = (
     ),
     Exercise(
         name="07.2",
-        statement="Predict from the multipliers (prices) in `solution` how ψ changes when μ "
+        statement="Predict from the multipliers (prices) in `leaning` how ψ changes when μ "
         "increases from 0.5 to 0.505.",
-        stub='change = 0.0  # replace: from solution.multipliers and solution["forces"]',
-        solution='normal = dict(zip(contacts.names, solution["forces"][2::3]))\n'
+        stub='dpsi = 0.0  # replace: from leaning.multipliers and leaning["forces"]',
+        solution='normal = dict(zip(contacts.names, leaning["forces"][2::3]))\n'
         "more = 0.005 * np.cos(np.pi / 8)  # of μ'\n"
-        "change = -sum(\n"
+        "dpsi = -sum(\n"
         "    price * normal[row.owner] * more\n"
-        "    for row, price in solution.multipliers.items()\n"
+        "    for row, price in leaning.multipliers.items()\n"
         '    if row.kind == "friction"\n'
         ")",
         judge=NumericJudge(

@@ -127,7 +127,8 @@ def show_shifted_loads(
     loads = np.linalg.solve(moments, state.robot.weight * np.array([1.0, *moved.com[:2]]))
     view.show(moved, stand, planned=np.outer(loads, _VERTICAL), cones=False, support=True)
     told = ", ".join(f"{name[:2]} {n:.0f} N" for name, n in zip(stand.names, loads, strict=True))
-    return f"{told}; {1000 * support_margin(moved.com[:2], feet):.1f} mm inside"
+    margin = 1000 * support_margin(moved.com[:2], feet)
+    return f"{told}; {abs(margin):.1f} mm {'inside' if margin >= 0.0 else 'outside'}"
 
 
 def show_foothold(view: Viewer, state: fb.State, speed: float, time: float, ahead: float) -> str:
