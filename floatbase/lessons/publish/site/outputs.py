@@ -143,6 +143,10 @@ def _prepare_code_cell(
         if checked and (form := exercise_form(checked)):
             return form
         return new_markdown_cell(_live_lesson_note("Checks and hints are in the live lesson"))
+    if cell.source.startswith("recall("):
+        return new_markdown_cell(
+            _live_lesson_note("Questions of earlier lessons come back here in the live lesson")
+        )
     if form := review_element(cell.source):
         return form
     if _LEARNER_CALLS.search(cell.source):
