@@ -1,4 +1,4 @@
-"""The command line: `python -m floatbase robots`, `view` and `compile`."""
+"""The command line: `python -m floatbase robots`, `view`, `recall` and `compile`."""
 
 from __future__ import annotations
 
@@ -73,6 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands.add_parser(
         "compile", help="compile the controller in advance, so that the first one starts quickly"
     )
+    commands.add_parser("recall", help="ask questions of lessons that you have worked through")
     options = parser.parse_args(arguments)
     if options.command == "robots":
         print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
@@ -86,6 +87,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         Walk(go2, fb.Contacts.points(go2), Gait.trot(go2))  # compiles its targets
         print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
+        return 0
+    if options.command == "recall":
+        from floatbase.lessons.recalling import ask  # reads the lessons
+
+        ask()
         return 0
     try:
         return _run_viewer(options, sys.argv[1:] if arguments is None else arguments)

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
-from floatbase.lessons.exercises import all_exercises, check, reveal, show_progress
+from floatbase.lessons.exercises import (
+    all_exercises,
+    check,
+    own_numbers,
+    reveal,
+    show_progress,
+)
 from floatbase.lessons.judges import NumericJudge
 from floatbase.lessons.predictions import compare, predict, review
 from floatbase.lessons.rounding import rounded
@@ -22,11 +28,14 @@ if TYPE_CHECKING:
         measured_push_recovery,
         plot_push_recovery,
     )
-    from floatbase.lessons.submission import hand_in
+    from floatbase.lessons.recalling import recall
+    from floatbase.lessons.submission import hand_in, import_answers
 
 # imported on first use, because they load the physics and the viewer
 _LAZY = {
     "hand_in": "submission",
+    "import_answers": "submission",
+    "recall": "recalling",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
         (
@@ -54,15 +63,18 @@ __all__ = [
     "controller_factory",
     "draw_push_recovery",
     "hand_in",
+    "import_answers",
     "joint_servo",
     "live_run",
     "measured_push_recovery",
+    "own_numbers",
     "plot_push_recovery",
     "predict",
     "progress",
     "props",
     "push_panel",
     "qp_plots",
+    "recall",
     "reveal",
     "review",
     "rounded",

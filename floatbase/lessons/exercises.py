@@ -6,8 +6,9 @@ solution and judge. The judge computes the right value in a different way from t
 
 from __future__ import annotations
 
+import hashlib
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -16,12 +17,37 @@ from typing import Any
 
 import numpy as np
 
+from floatbase._validation import as_string
 from floatbase.affine import Quadratic
-from floatbase.errors import unknown_name
-from floatbase.lessons import progress
+from floatbase.errors import InputError, unknown_name
+from floatbase.lessons import assignment, progress
 from floatbase.lessons.judges import NO_ANSWER, Example, Verdict, array_or_verdict
 
 TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
+
+
+@dataclass(frozen=True, eq=False)
+class OwnNumber:
+    """Number in an exercise that can be another one for each student.
+
+    Parameters
+    ----------
+    text : str
+        Sentence with the number as "{}", which is shown to the student.
+    values : sequence of float
+        Numbers to choose from, in the unit of the text.
+    judge : callable
+        Function of the number that returns the judge of the exercise.
+    """
+
+    text: str
+    values: Sequence[float]
+    judge: Callable[[float], Callable[[Any], Verdict]]
+
+    def value(self, exercise: str, student: str) -> float:
+        """Return the number of a student, which is always the same on every machine."""
+        digest = hashlib.sha256(f"{exercise} {student}".encode()).digest()
+        return self.values[int.from_bytes(digest[:4]) % len(self.values)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +74,8 @@ class Exercise:
     examples : callable
         Function without arguments that returns answers with the names of the hints that they must
         get, in addition to the examples of the judge.
+    own : OwnNumber, optional
+        Number of the exercise that can differ between students.
     """
 
     name: str
@@ -58,6 +86,13 @@ class Exercise:
     explanation: str = ""
     namespace: Callable[[], Mapping[str, Any]] = dict
     examples: Callable[[], Iterable[Example]] = tuple
+    own: OwnNumber | None = None
+
+    def judge_for(self, student: str) -> Callable[[Any], Verdict]:
+        """Return the judge for a student's own number; without a student, `judge`."""
+        if self.own is None or not student:
+            return self.judge
+        return self.own.judge(self.own.value(self.name, student))
 
     def placeholder(self) -> Any:
         """Return the answer in the stub: its variable, or a tuple if it has several."""
@@ -105,7 +140,7 @@ def check(name: str, answer: Any) -> Verdict:
         If there is no such exercise.
     """
     exercise = _find_exercise(name)
-    verdict = exercise.judge(answer)
+    verdict = exercise.judge_for(progress.student())(answer)
     if answer is None or answer is Ellipsis or _is_placeholder(answer, exercise.placeholder()):
         return replace(NO_ANSWER if verdict.hint.startswith("unknown") else verdict, is_try=False)
     progress.record_try(name, verdict.right, answer)
@@ -124,6 +159,10 @@ def reveal(name: str) -> None:
     ------
     UnknownNameError
         If there is no such exercise.
+
+    Notes
+    -----
+    The package of a class may have no solutions. It then says when they appear and who has them.
     """
     exercise, tried = _find_exercise(name), progress.load().get(name, {"tries": 0, "right": 0})
     if tried["tries"] < TRIES_BEFORE_REVEAL and not tried["right"]:
@@ -133,9 +172,51 @@ def reveal(name: str) -> None:
             f"your own answer."
         )
         return
+    if not exercise.solution:
+        print(assignment.where_solutions_are(name))
+        return
     print(exercise.solution)
     if exercise.explanation:
         print(f"\n{exercise.explanation}")
+
+
+def own_numbers(student: str) -> None:
+    """Use your own numbers in the exercises that allow it, and print these numbers.
+
+    `check` uses them from now on, until another id is given.
+
+    Parameters
+    ----------
+    student : str
+        Your id in the class, such as "s123456".
+
+    Raises
+    ------
+    InputError
+        If the id is empty, too long or not printable.
+    """
+    student = student_id(student)
+    if problem := progress.append(progress.STUDENT, {"id": student}):
+        print(problem)
+        return
+    print(f"Numbers of {student}:")
+    for name, exercise in all_exercises().items():
+        if exercise.own:
+            print(f"{name}: {exercise.own.text.format(exercise.own.value(name, student))}")
+
+
+def student_id(given: Any) -> str:
+    """Check an id of a student and return it without spaces around it.
+
+    Raises
+    ------
+    InputError
+        If the id is not a printable string of 1 to 80 characters.
+    """
+    text = as_string("id", given).strip()
+    if not text or not text.isprintable() or len(text) > 80:
+        raise InputError('id must be your id in the class, such as "s123456".')
+    return text
 
 
 def show_progress() -> None:

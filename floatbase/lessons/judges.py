@@ -253,6 +253,11 @@ _GENERAL = {
 }
 
 
+def general_hint(name: str) -> str:
+    """Return the text of a hint that any exercise can give, such as "nearly"."""
+    return _GENERAL[name]
+
+
 @dataclass(frozen=True, eq=False)
 class NumericJudge:
     """Judge of numbers and arrays.

@@ -10,20 +10,28 @@ from typing import Any
 
 import numpy as np
 
-from floatbase._validation import MAX_MAGNITUDE, as_string, numeric_copy, short_repr
+from floatbase._validation import MAX_MAGNITUDE, as_bool, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.rounding import rounded
 
 _ANSWER_DIGITS = 6  # digits of a prediction, which is shown as it was typed
 _RIGHT = "right"
+# margins of a right prediction: fraction of the result, and of the largest of several results
+_PART_OF_RESULT, _PART_OF_LARGEST = 0.1, 0.02
+_ROUNDING = 1e-6  # in the unit of the prediction
 # of this process: units of the predictions, and predictions that could not be saved
 _units: dict[str, str] = {}
 _unsaved: dict[str, dict[str, Any]] = {}
 
 
 def predict(
-    name: str, *answer: Any, unit: str = "", choices: Sequence[str] = (), count: int = 1
+    name: str,
+    *answer: Any,
+    unit: str = "",
+    choices: Sequence[str] = (),
+    count: int = 1,
+    sure: bool | None = None,
 ) -> None:
     """Predict what a cell will show.
 
@@ -43,6 +51,8 @@ def predict(
         Strings to choose from. Without choices the answer is a number.
     count : int, optional
         How many numbers to predict.
+    sure : bool, optional
+        Whether you are sure. `review` then lists what you were sure of and got wrong.
     """
     _units[as_string("name of a prediction", name)] = unit
     stored = progress.predictions().get(name, {})
@@ -57,14 +67,14 @@ def predict(
         print(f"{name}: {message}")
         return
     try:
-        said = (
-            _match_choice(given, tuple(choices)) if choices else _parse_numbers(given, unit, count)
-        )
+        said = parse_answer(given, unit, choices, count)
     except InputError as error:
         print(f"{name}: {error} To skip the prediction, leave the ... in place.")
         return
-    print(f"{name}: you predict {_quoted_answer(said, unit)}.")
-    if problem := _save(name, {"said": said, "unit": unit}, stored):
+    confidence = {} if sure is None else {"sure": as_bool("sure", sure)}
+    how = {None: "", True: ", and you are sure", False: ", and you are not sure"}[sure]
+    print(f"{name}: you predict {_quoted_answer(said, unit)}{how}.")
+    if problem := _save(name, {"said": said, "unit": unit} | confidence, stored):
         print(problem)
 
 
@@ -89,11 +99,13 @@ def compare(name: str, value: Any) -> None:
     stored = progress.predictions().get(name, {})
     known = stored | _unsaved.get(name, {})
     unit = _units.get(name, known.get("unit", ""))
-    shown = value if isinstance(value, str) else _format_result(value, unit)
+    shown = value if isinstance(value, str) else format_result(value, unit)
     if "said" not in known:
         print(f"{name}: {shown}")
         return
     off = _describe_error(known["said"], result, unit)
+    if known.get("sure") and not is_right(known["said"], result, unit):
+        off = f"{off}, and you were sure" if off else "and you were sure"
     beside = f"; you predicted {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
     print(f"{name}: {shown}{', as you predicted' if off == _RIGHT else beside}")
     if isinstance(value, str) or np.all(np.isfinite(result)):
@@ -103,28 +115,35 @@ def compare(name: str, value: Any) -> None:
 def review(lesson: str = "") -> None:
     """Print a table of your predictions: name, prediction, result and how far off you were.
 
+    What you were sure of and got wrong comes first. The last line says how often you were right
+    when you were sure, and when you were not.
+
     Parameters
     ----------
     lesson : str, optional
         Name of a lesson, such as "02" or "C", or of a single prediction, such as "02.c". By default
         all predictions are listed.
     """
-    lesson = as_string("lesson", lesson)
-    if len(lesson) == 1:  # 2 means lesson 02, and c means lesson C
-        lesson = f"0{lesson}" if lesson.isdigit() else lesson.upper()
+    lesson = lesson_name(lesson)
     stored = progress.predictions()
     known = {
         name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})
     }
     rows = [("", "you predicted", "result", "")]
+    known = dict(sorted(known.items(), key=lambda item: not _is_sure_and_wrong(item[1])))
+    counted: dict[bool, list[bool]] = {True: [], False: []}  # by confidence: which were right
     for name, entry in known.items():
         if "said" in entry and lesson in ("", name, name.split(".")[0]):
             said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
             shown, off = (
                 ("not shown yet", "")
                 if result is None
-                else (_format_result(result, unit), _describe_error(said, result, unit))
+                else (format_result(result, unit), _describe_error(said, result, unit))
             )
+            if "sure" in entry and result is not None:
+                counted[entry["sure"]].append(is_right(said, result, unit))
+            if _is_sure_and_wrong(entry):
+                off = f"{off}, sure" if off else "sure"
             rows.append((name, _format_answer(said, unit), shown, off))
     if len(rows) == 1:
         print(f"There are no predictions{f' in lesson {lesson}' if lesson else ''} yet.")
@@ -134,6 +153,69 @@ def review(lesson: str = "") -> None:
         print(
             "   ".join(f"{part:{width}}" for part, width in zip(row, widths, strict=True)).rstrip()
         )
+    parts = [
+        f"{what} {sum(counted[sure])} of {len(counted[sure])} times"
+        for sure, what in ((True, "when you were sure"), (False, "when you were not sure"))
+        if counted[sure]
+    ]
+    if parts:
+        print(f"You were right {' and '.join(parts)}.")
+
+
+def _is_sure_and_wrong(entry: dict[str, Any]) -> bool:
+    if not entry.get("sure") or "said" not in entry or "is" not in entry:
+        return False
+    return not is_right(entry["said"], entry["is"], entry.get("unit", ""))
+
+
+def accepted(result: Any, unit: str) -> Any:
+    """Return which predictions count as right.
+
+    A number counts as right if it is within 10 % of the result, or within 2 % of the largest of
+    several results. A count, which has no unit, must be equal.
+
+    Parameters
+    ----------
+    result : float, sequence of float or str
+        The result, as `compare` stores it.
+    unit : str
+        Its unit.
+
+    Returns
+    -------
+    str or list of (float, float)
+        The right choice, or the lowest and the highest right number for each number.
+    """
+    if isinstance(result, str):
+        return result
+    numbers = result if isinstance(result, list) else [result]
+    least = _PART_OF_LARGEST * max(map(abs, numbers)) if len(numbers) > 1 else 0.0
+    intervals = []
+    for number in numbers:
+        is_count = isinstance(number, int) and not unit
+        margin = 0.0 if is_count else max(_PART_OF_RESULT * abs(number), least)
+        intervals.append((number - margin, number + margin))
+    return intervals
+
+
+def is_right(said: Any, result: Any, unit: str) -> bool:
+    """Return whether a prediction counts as right; see `accepted`."""
+    right = accepted(result, unit)
+    if isinstance(right, str) or isinstance(said, str):
+        return str(said).casefold() == str(right).casefold()
+    numbers = said if isinstance(said, list) else [said]
+    return len(numbers) == len(right) and all(
+        low - _ROUNDING <= x <= high + _ROUNDING
+        for x, (low, high) in zip(numbers, right, strict=True)
+    )
+
+
+def lesson_name(given: str) -> str:
+    """Return the name of a lesson: "2" means lesson 02, and "c" means lesson C."""
+    given = as_string("lesson", given)
+    if len(given) == 1:
+        return f"0{given}" if given.isdigit() else given.upper()
+    return given
 
 
 def _describe_error(said: Any, result: Any, unit: str) -> str:
@@ -175,10 +257,21 @@ def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
         return ""
-    problem = progress.append(name, entry)
+    problem = progress.append(name, entry | {"time": progress.now()})
     if problem:
         _unsaved[name] = entry
     return problem
+
+
+def parse_answer(answer: Any, unit: str, choices: Sequence[str], count: int) -> Any:
+    """Return the choice or the numbers that a learner's answer means; see `predict`.
+
+    Raises
+    ------
+    InputError
+        If the answer cannot be used.
+    """
+    return _match_choice(answer, choices) if choices else _parse_numbers(answer, unit, count)
 
 
 def _match_choice(answer: Any, choices: Sequence[str]) -> str:
@@ -232,7 +325,8 @@ def _stored_result(value: Any) -> Any:
     return kept if np.ndim(given) else kept[0]
 
 
-def _format_result(value: Any, unit: str) -> str:
+def format_result(value: Any, unit: str) -> str:
+    """Write a result as text: integers in full, other numbers with two significant digits."""
     if isinstance(value, str):
         return value
     return rounded(value, unit, digits=12 if np.asarray(value).dtype.kind in "iu" else 2)

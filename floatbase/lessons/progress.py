@@ -12,12 +12,14 @@ import inspect
 import json
 import os
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
+STUDENT = "student"  # name of the entry that holds the learner's id
 _FILE_NAME = "progress.jsonl"
 # characters of a stored answer; the longest right answer in the course has less than 20 000
 _MAX_ANSWER_LENGTH = 100_000
@@ -102,19 +104,56 @@ def predictions() -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict of str to dict
-        For each prediction: {"said": …, "unit": …, "is": …}, as far as they are known; see
-        `append`.
+        For each prediction: {"said": …, "unit": …, "sure": …, "is": …}, as far as they are known;
+        see `append`.
     """
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text}
+            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text, "sure": _is_bool}
             kept = {
                 key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])
             }
             if kept and _is_text(name):
                 found.setdefault(name, {}).update(kept)
     return found
+
+
+def history() -> dict[str, list[dict[str, Any]]]:
+    """Return all entries about each prediction, in the order in which they were written.
+
+    Returns
+    -------
+    dict of str to list of dict
+        For each prediction: its entries with a usable "said", "is" or "recalled".
+    """
+    found: dict[str, list[dict[str, Any]]] = {}
+    for text in _lines():
+        for name, entry in _entries(text):
+            if any(_is_answer(entry.get(key)) for key in ("said", "is", "recalled")):
+                found.setdefault(name, []).append(entry)
+    return found
+
+
+def last(name: str, key: str) -> Any:
+    """Return the last value that was stored for an entry under a key, or None."""
+    found = None
+    for text in _lines():
+        for other, entry in _entries(text):
+            if other == name and key in entry:
+                found = entry[key]
+    return found
+
+
+def now() -> str:
+    """Return the present time in ISO format, with the zone."""
+    return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def student() -> str:
+    """Return the id that was given to `own_numbers` last, or ""."""
+    found = last(STUDENT, "id")
+    return found if _is_text(found) else ""
 
 
 def append(name: str, entry: dict[str, Any]) -> str:
@@ -126,7 +165,7 @@ def append(name: str, entry: dict[str, Any]) -> str:
         Name of the exercise or prediction.
     entry : dict
         What to store. In predictions, "said" and "is" are a number, a list of numbers or a string,
-        and "unit" is a string.
+        "unit" is a string, and "sure" is True or False.
 
     Returns
     -------
@@ -282,6 +321,10 @@ def _is_answer(value: Any) -> bool:
     return _is_text(value) or (
         bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers)
     )
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool)
 
 
 def _is_text(value: Any) -> bool:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import datetime
 from pathlib import Path
 
 import floatbase as fb
 from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
-from floatbase.lessons import progress
-from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons import inventory, progress
+from floatbase.lessons.exercises import all_exercises, student_id
+from floatbase.lessons.predictions import lesson_name
 
 FILE_FORMAT = "answers to the floatbase course"
 
 
-def hand_in(name: str, folder: str | Path = ".") -> Path:
+def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = "") -> Path:
     """Write your answers and predictions to a file for your teacher.
 
     A file that you have handed in before is replaced. If another learner's file or any other file
@@ -30,6 +30,11 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     folder : str or Path, optional
         Folder of the file. By default the current folder, which in a lesson is the folder of the
         lessons.
+    id : str, optional
+        Your id in the class, if your teacher asks for it. By default the id that you gave to
+        `own_numbers`.
+    lesson : str, optional
+        Name of a lesson, such as "05": hand in this lesson only. By default all lessons.
 
     Returns
     -------
@@ -39,8 +44,8 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     Raises
     ------
     InputError
-        If the name or the folder is invalid, if there is nothing to hand in yet, or if the file
-        cannot be written.
+        If the name, the folder, the id or the lesson is invalid, if there is nothing to hand in
+        yet, or if the file cannot be written.
     """
     if not re.search(r"\w", as_string("name", name)) or not name.isprintable():
         raise InputError(
@@ -48,20 +53,26 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
         )
     if not isinstance(folder, (str, Path)) or "\0" in str(folder):
         raise InputError(f"folder must be the path of a folder, not {short_repr(folder)}.")
-    tried, answers, predicted = progress.load(), progress.answers(), progress.predictions()
-    if not tried and not predicted:
+    student = student_id(id) if id else progress.student()
+    lesson = lesson_name(lesson)
+    known = {key: entry for key, entry in all_exercises().items() if _is_of(key, lesson)}
+    tried = {key: entry for key, entry in progress.load().items() if _is_of(key, lesson)}
+    predicted = {key: e for key, e in progress.predictions().items() if _is_of(key, lesson)}
+    answers, letters = progress.answers(), inventory.stored_letters()
+    if not tried and not predicted and not letters:
         raise InputError(
             f"There is nothing to hand in yet: {progress.path()} contains no answers and no "
-            f"predictions."
+            f"predictions{f' in lesson {lesson}' if lesson else ''}."
         )
     exercises = {key: {**entry, "answer": answers.get(key)} for key, entry in tried.items()}
     written = {
-        "form": FILE_FORMAT, "name": name.strip(), "floatbase": fb.__version__,
-        "time": datetime.now().astimezone().isoformat(timespec="seconds"), "exercises": exercises,
-        "predictions": predicted,
+        "form": FILE_FORMAT, "name": name.strip(), "id": student, "lesson": lesson,
+        "floatbase": fb.__version__,
+        "time": progress.now(), "exercises": exercises,
+        "predictions": predicted, "inventory": letters,
     }  # fmt: skip
     try:
-        path = _own_path(Path(folder), name.strip())
+        path = _own_path(Path(folder), name.strip(), lesson)
         try:
             write_whole(path, json.dumps(written, indent=1).encode())
         except OSError:
@@ -73,7 +84,7 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
             f"{getattr(error, 'filename', None) or short_repr(folder)} cannot be written: "
             f"{getattr(error, 'strerror', error)}. Choose another folder: hand_in(…, folder=…)."
         ) from None
-    known = all_exercises()  # an older course may have had others
+    # an older course may have had other exercises
     solved = [key for key, entry in tried.items() if entry["right"] and key in known]
     done = f"{len(solved)} of {len(known)} exercises solved, {len(predicted)} predictions"
     print(f"{path}: {done}. Give this file to your teacher.")
@@ -85,12 +96,55 @@ def hand_in(name: str, folder: str | Path = ".") -> Path:
     return path
 
 
-def _own_path(folder: Path, name: str) -> Path:
+def import_answers(path: str | Path) -> None:
+    """Add the answers that a page of the site saved to your progress.
+
+    `review`, `recall`, `show_progress` and `hand_in` then know them. What is known already stays.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that *Save my answers* wrote.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or if it is not such a file.
+    """
+    try:
+        found = json.loads(Path(path).read_bytes())
+    except (OSError, TypeError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or "it is not a file of answers"
+        raise InputError(f"{short_repr(str(path))} cannot be read: {reason}.") from None
+    kinds = ("predictions", "exercises")
+    is_ours = isinstance(found, dict) and found.get("form") == FILE_FORMAT
+    if not is_ours or not all(isinstance(found.get(kind), dict) for kind in kinds):
+        raise InputError(f"{short_repr(str(path))} is not a file of answers.")
+    stored, tried = progress.predictions(), progress.load()
+    new = {
+        name: entry
+        for kind, known in (("predictions", stored), ("exercises", tried))
+        for name, entry in found[kind].items()
+        if name not in known and isinstance(entry, dict)
+    }
+    for name, entry in new.items():
+        if problem := progress.append(name, entry):
+            print(problem)
+            return
+    print(f"{len(new)} answers and predictions were added.")
+
+
+def _is_of(name: str, lesson: str) -> bool:
+    """Return whether an exercise or a prediction is part of a lesson; "" means all lessons."""
+    return lesson in ("", name.split(".")[0])
+
+
+def _own_path(folder: Path, name: str, lesson: str) -> Path:
     """Return the path of a learner's file: the first one that is free or holds this name.
 
     A free one is created, empty, so that a learner who hands in at the same time gets another one.
     """
-    stem = "answers-" + "_".join(re.findall(r"\w+", name))
+    stem = "answers-" + "_".join(re.findall(r"\w+", name)) + (lesson and f"-lesson{lesson}")
     path, number = folder / f"{stem}.json", 1
     while True:
         try:

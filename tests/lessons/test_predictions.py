@@ -14,6 +14,7 @@ import pytest
 
 from floatbase.errors import InputError
 from floatbase.lessons import check, compare, predict, progress, review, rounded
+from floatbase.lessons.predictions import is_right
 
 CHOICES = ["in the push", "at rest", "in the first millisecond"]
 
@@ -32,9 +33,13 @@ def said(capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 def lines(home: Path) -> list[Any]:
-    """What stands in the learner's file."""
+    """What stands in the learner's file, without times."""
     text = (home / "progress.jsonl").read_text() if (home / "progress.jsonl").exists() else ""
-    return [json.loads(line) for line in text.split("\n") if line]
+    found = [json.loads(line) for line in text.split("\n") if line]
+    return [
+        {name: {key: x for key, x in entry.items() if key != "time"} for name, entry in one.items()}
+        for one in found
+    ]
 
 
 @pytest.mark.parametrize(
@@ -265,3 +270,39 @@ def test_a_name_that_was_left_out_is_missed() -> None:
 def test_a_result_that_is_none_is_refused(nothing: Any) -> None:
     with pytest.raises(InputError, match="value"):
         compare("02.c", nothing)
+
+
+def test_what_was_sure_and_wrong_comes_first_and_calibration_last(home: Path, said: Any) -> None:
+    for name, answer, result, sure in (
+        ("02.c", 70, 69.2, True),
+        ("02.d", 3, 43.0, False),
+        ("02.e", 5, 80.0, True),
+        ("02.f", 90, 80.0, None),
+    ):
+        predict(name, answer, unit="mm", sure=sure)
+        compare(name, result)
+    lines = said()
+    assert "not sure" in lines[2] and "you were sure" in lines[5] and "sure" not in lines[6]
+    review()
+    _, *table, calibration = said()
+    assert [line.split()[0] for line in table] == ["02.e", "02.c", "02.d", "02.f"]
+    assert [line.endswith("sure") for line in table] == [True, False, False, False]
+    assert re.findall(r"\d+ of \d+", calibration) == ["1 of 2", "0 of 1"]
+    assert progress.predictions()["02.d"]["sure"] is False
+    with pytest.raises(InputError, match="sure"):
+        predict("02.c", 70, sure="yes")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("said", "result", "unit", "right"),
+    [
+        (45.0, 43.0, "N", True), (48.0, 43.0, "N", False), (-43.0, 43.0, "N", False),
+        (5, 6, "", False), (6, 6, "", True), (0, 0.0, "N", True), (0.1, 0.0, "N", False),
+        ([10, -10, 0], [9.8, -10.2, 0.1], "N·m", True), ([10, -10], [9.8, -10.2, 0.1], "N", False),
+        ("Yes", "yes", "", True), ("yes", 3, "", False), (3, "yes", "", False),
+    ],
+)  # fmt: skip
+def test_a_prediction_counts_as_right_within_a_tenth_of_the_result(
+    said: Any, result: Any, unit: str, right: bool
+) -> None:
+    assert is_right(said, result, unit) is right

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import NumericJudge
 from floatbase.robots import Robot
 
@@ -20,19 +20,55 @@ def _go2() -> Robot:
 
 
 @cache
-def _sum_of_forces() -> float:
+def _sum_of_forces(up: float = UP) -> float:
     """Compute the vertical contact force from M q̈ + h, with neither the mass nor the weight.
 
     The whole robot accelerates upwards.
     """
     state = _go2().standing()  # its base is level, so the third row is vertical
     qdd = np.zeros(_go2().nv)
-    qdd[2] = UP
+    qdd[2] = up
     return float((state.M @ qdd + state.h)[2])
 
 
 def _weight() -> float:
     return _go2().weight
+
+
+def _judge(up: float) -> NumericJudge:
+    """Return the judge for an upward acceleration [m/s²]."""
+    return NumericJudge(
+        right=lambda: _sum_of_forces(up),
+        tolerance=2e-3,  # g may be 9.8
+        praise="The ground carries the weight and accelerates the mass: m (g + a).",
+        mistakes={
+            "weight_alone": _weight,
+            "ma_alone": lambda: up * _go2().mass,
+            "downwards": lambda: _weight() - up * _go2().mass,
+            "acceleration": lambda: _go2().gravity + up,
+            "mass_on_g_alone": lambda: _weight() + up,
+            "g_without_mass": lambda: up * _go2().mass + _go2().gravity,
+            "g_is_10": lambda: (10.0 + up) * _go2().mass,
+            "one_foot": lambda: _sum_of_forces(up) / 4,
+            "reaction": lambda: -_sum_of_forces(up),
+        },
+        hints={
+            "weight_alone": "That is the weight alone. With this force the robot stays at "
+            "rest or keeps its velocity.",
+            "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's "
+            "force the only one?",
+            "downwards": "With this force the robot would accelerate downwards. Draw both "
+            "forces. Which one is larger?",
+            "acceleration": "That is an acceleration, in m/s². A force needs the mass.",
+            "mass_on_g_alone": "The weight is right. Multiply the acceleration by the mass before "
+            "you add it.",
+            "g_without_mass": "m a is right, but g without the mass is not a force.",
+            "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
+            "one_foot": "That is the mean force at one foot. The question is about all feet.",
+            "reaction": "That is the force of the robot on the ground. The answer is the "
+            "force of the ground on the robot.",
+        },
+    )
 
 
 EXERCISES = (
@@ -42,40 +78,10 @@ EXERCISES = (
         "the vertical forces that the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
-        judge=NumericJudge(
-            right=_sum_of_forces,
-            tolerance=2e-3,  # g may be 9.8
-            praise="The ground carries the weight and accelerates the mass: m (g + 2 m/s²).",
-            mistakes={
-                "weight_alone": _weight,
-                "ma_alone": lambda: UP * _go2().mass,
-                "downwards": lambda: _weight() - UP * _go2().mass,
-                "acceleration": lambda: _go2().gravity + UP,
-                "mass_on_g_alone": lambda: _weight() + UP,
-                "g_without_mass": lambda: UP * _go2().mass + _go2().gravity,
-                "g_is_10": lambda: (10.0 + UP) * _go2().mass,
-                "one_foot": lambda: _sum_of_forces() / 4,
-                "reaction": lambda: -_sum_of_forces(),
-            },
-            hints={
-                "weight_alone": "That is the weight alone. With this force the robot stays at "
-                "rest or keeps its velocity.",
-                "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's "
-                "force the only one?",
-                "downwards": "With this force the robot would accelerate downwards. Draw both "
-                "forces. Which one is larger?",
-                "acceleration": "That is an acceleration, in m/s². A force needs the mass.",
-                "mass_on_g_alone": "The weight is right. Multiply the 2 m/s² by the mass before "
-                "you add it.",
-                "g_without_mass": "m a is right, but g without the mass is not a force.",
-                "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
-                "one_foot": "That is the mean force at one foot. The question is about all feet.",
-                "reaction": "That is the force of the robot on the ground. The answer is the "
-                "force of the ground on the robot.",
-            },
-        ),
+        judge=_judge(UP),
         examples=lambda: [(_go2().mass * (9.8 + UP), "")],
         explanation="By Newton's law, the vertical forces of the ground minus the weight equal "
         "mass times acceleration. So their sum is m g + m a.",
+        own=OwnNumber("the acceleration is {} m/s².", (1.2, 1.4, 1.6, 2.4, 2.6, 2.8), _judge),
     ),
 )

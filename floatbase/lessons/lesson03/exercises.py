@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import NumericJudge, ShapeJudge
 from floatbase.lessons.lesson03.verdicts import (
     judge_all_pairs,
-    judge_unloading,
     pair_examples,
     standing_forces,
     unloading_examples,
+    unloading_judge,
     zeta_columns,
     zeta_mistakes,
 )
@@ -68,11 +68,12 @@ EXERCISES = (
         solution="squeezes = internal_forces(eom)  # (12, 6)\n"
         "row = squeezes[2]  # what each of them does to the vertical force of FL\n"
         "new_forces = forces + squeezes @ row * (20 - forces[2]) / (row @ row)",
-        judge=judge_unloading,
+        judge=unloading_judge(),
         namespace=lambda: {"forces": standing_forces()},
         examples=unloading_examples,
         explanation="Every λ = λ₀ + N x keeps the robot still. x is the shortest vector with "
         "row x = 20 - λ₀[2].",
+        own=OwnNumber("FL carries {} N.", (16.0, 18.0, 22.0, 24.0, 26.0, 28.0), unloading_judge),
     ),
     Exercise(
         name="03.3",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -73,9 +75,13 @@ def standing_forces() -> Array:
     return np.asarray(np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=RANK_TOLERANCE)[0])
 
 
-@array_judge((12,))
-def judge_unloading(forces: Array) -> Verdict:
-    """Judge forces that balance the standing robot with 20 N at FL."""
+def unloading_judge(load: float = 20.0) -> Callable[[Any], Verdict]:
+    """Return the judge of forces that balance the standing robot with a load [N] at FL."""
+    return array_judge((12,))(partial(_judge_unloading, load))
+
+
+def _judge_unloading(load: float, forces: Array) -> Verdict:
+    """Judge forces that balance the standing robot with a load [N] at FL."""
     eom = standing_go2_eom()
     before = standing_forces()
     if np.allclose(forces, before, atol=1e-3):
@@ -99,12 +105,12 @@ def judge_unloading(forces: Array) -> Verdict:
             "forces.",
             "moments",
         )
-    if abs(forces[2] - 20.0) > 0.05:
+    if abs(forces[2] - load) > 0.05:
         more = " That is more than before. Check the sign." if forces[2] > before[2] + 0.05 else ""
         return Verdict(
             False,
             f"The robot stays at rest, but the front left foot carries {forces[2]:.1f} N, not "
-            f"20.{more}",
+            f"{load:g}.{more}",
             "not_20",
         )
     if forces[2::3].min() < 0.0:
@@ -113,8 +119,8 @@ def judge_unloading(forces: Array) -> Verdict:
         )
     return Verdict(
         True,
-        "This is the wobbling table: FL and RR each carry 23 N less, and the other "
-        "diagonal carries it.",
+        f"This is the wobbling table: FL and RR each carry {before[2] - load:.0f} N less, and the "
+        f"other diagonal carries it.",
     )
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
-from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import (
     Example,
     NumericJudge,
@@ -63,13 +63,13 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
     return np.asarray(rows / np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)[:, None])
 
 
-def _slip_angle(facets: int | None = FACETS, inside: bool = True) -> float:
+def _slip_angle(facets: int | None = FACETS, inside: bool = True, mu: float = MU) -> float:
     """Find the steepest slope [°] whose cone contains a vertical force, by bisection."""
     low, high = 0.0, 89.0
     while high - low > 1e-9:  # degrees
         middle = 0.5 * (low + high)
         n = slope_normal(middle)
-        cone = FrictionCone(n, MU) if facets is None else FrictionPolyhedron(n, MU, facets, inside)
+        cone = FrictionCone(n, mu) if facets is None else FrictionPolyhedron(n, mu, facets, inside)
         low, high = (middle, high) if cone.contains([0.0, 0.0, 1.0]) else (low, middle)
     return low
 
@@ -208,6 +208,39 @@ def _forces() -> list[Example]:
     ]  # fmt: skip
 
 
+def _slope_judge(mu: float = MU) -> NumericJudge:
+    """Return the judge of exercise 06.2 for a friction coefficient."""
+    return NumericJudge(
+        right=lambda: _slip_angle(mu=mu),
+        praise="This is less than for the cone itself, because the facets are flat.",
+        mistakes={
+            "45": lambda: 45.0,
+            "radians": lambda: np.deg2rad(_slip_angle(mu=mu)),
+            "round": partial(_slip_angle, None, mu=mu),
+            "round_radians": lambda: np.deg2rad(_slip_angle(None, mu=mu)),
+            "sine": lambda: np.rad2deg(np.arcsin(mu * np.cos(np.pi / 8))),
+            "round_sine": lambda: np.rad2deg(np.arcsin(mu)),
+            "four_facets": partial(_slip_angle, 4, mu=mu),
+            "outside": lambda: np.rad2deg(np.arctan(mu / np.cos(np.pi / 8))),
+            "cosine_on_angle": lambda: _slip_angle(None, mu=mu) * np.cos(np.pi / 8),
+        },
+        hints={
+            "45": "At 45°, a vertical force needs μ = 1.",
+            "radians": "That is in radians.",
+            "round": "That is the round cone. A facet faces uphill, in the direction of "
+            "this force, and its middle allows less than μ.",
+            "round_radians": "That is the angle in radians, and for the round cone.",
+            "sine": "This uses a sine. On a slope, α_∥ / α_⊥ is a tangent.",
+            "round_sine": "This uses a sine and the round cone. α_∥ / α_⊥ is a tangent, and "
+            "a facet allows less than μ.",
+            "four_facets": "That is for 4 facets, as before. Here there are 8.",
+            "outside": "That is for facets outside the cone. What does the middle of a "
+            "facet allow inside?",
+            "cosine_on_angle": "This multiplies the angle by the cosine. The cosine belongs to μ.",
+        },
+    )
+
+
 EXERCISES = (
     Exercise(
         name="06.1",
@@ -268,39 +301,10 @@ EXERCISES = (
         "polyhedron with 8 facets inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
-        judge=NumericJudge(
-            right=_slip_angle,
-            praise="This is two degrees less than for the cone itself, because the facets are "
-            "flat.",
-            mistakes={
-                "45": lambda: 45.0,
-                "radians": lambda: np.deg2rad(_slip_angle()),
-                "round": partial(_slip_angle, None),
-                "round_radians": lambda: np.deg2rad(_slip_angle(None)),
-                "sine": lambda: np.rad2deg(np.arcsin(MU * np.cos(np.pi / 8))),
-                "round_sine": lambda: np.rad2deg(np.arcsin(MU)),
-                "four_facets": partial(_slip_angle, 4),
-                "outside": lambda: np.rad2deg(np.arctan(MU / np.cos(np.pi / 8))),
-                "cosine_on_angle": lambda: _slip_angle(None) * np.cos(np.pi / 8),
-            },
-            hints={
-                "45": "At 45°, a vertical force needs μ = 1.",
-                "radians": "That is in radians.",
-                "round": "That is the round cone. A facet faces uphill, in the direction of "
-                "this force, and its middle allows less than μ.",
-                "round_radians": "That is the angle in radians, and for the round cone.",
-                "sine": "This uses a sine. On a slope, α_∥ / α_⊥ is a tangent.",
-                "round_sine": "This uses a sine and the round cone. α_∥ / α_⊥ is a tangent, and "
-                "a facet allows less than μ.",
-                "four_facets": "That is for 4 facets, as before. Here there are 8.",
-                "outside": "That is for facets outside the cone. What does the middle of a "
-                "facet allow inside?",
-                "cosine_on_angle": "This multiplies the angle by the cosine. The cosine belongs "
-                "to μ.",
-            },
-        ),
+        judge=_slope_judge(),
         explanation="α_∥ / α_⊥ of a vertical force is the tangent of the slope, and the middle "
         "of a facet allows μ cos(π/8).",
+        own=OwnNumber("μ = {}.", (0.4, 0.45, 0.5, 0.55, 0.6, 0.65), _slope_judge),
     ),
     Exercise(
         name="06.3",

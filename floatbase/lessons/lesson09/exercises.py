@@ -10,7 +10,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array
 from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure, contact_wrench
-from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import (
     Example,
     NumericJudge,
@@ -84,12 +84,12 @@ def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Call
 # 09.2 ---------------------------------------------------------------------------------------------
 
 
-def _twist(facets: int = ROUND, mu: float = SOLE_MU) -> float:
+def _twist(facets: int = ROUND, mu: float = SOLE_MU, load: float = LOAD) -> float:
     """Compute the largest twist of the sole [N·m] by a linear program over its corner forces."""
     corners = np.array([[sx * LENGTH / 2, sy * WIDTH / 2, 0.0] for sx in (1, -1) for sy in (1, -1)])
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
-    limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), LOAD, np.full(4, np.inf))
-    return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, LOAD, 0.0, 0.0, 0.0])
+    limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), load, np.full(4, np.inf))
+    return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, load, 0.0, 0.0, 0.0])
 
 
 # 09.3 ---------------------------------------------------------------------------------------------
@@ -188,6 +188,45 @@ def _leans() -> list[Example]:
     ]  # fmt: skip
 
 
+def _twist_judge(load: float = LOAD) -> NumericJudge:
+    """Return the judge of exercise 09.2 for the force on the sole [N]."""
+    return NumericJudge(
+        right=lambda: _twist(load=load),
+        praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
+        mistakes={
+            "zero": lambda: 0.0,
+            "pyramids": lambda: _twist(4, load=load),
+            "half_length": lambda: SOLE_MU * load * LENGTH / 2,
+            "half_width": lambda: SOLE_MU * load * WIDTH / 2,
+            "whole_sides": lambda: SOLE_MU * load * float(np.hypot(LENGTH, WIDTH)),
+            "one_corner": lambda: _twist(load=load) / 4,
+            "four_times": lambda: 4 * _twist(load=load),
+            "no_mu": lambda: _twist(load=load) / SOLE_MU,
+            "mu_of_lesson": lambda: _twist(mu=MU, load=load),
+            "square": lambda: SOLE_MU * load * (LENGTH + WIDTH) / 2,
+            "disc": lambda: 2 / 3 * SOLE_MU * load * LENGTH / 2,
+        },
+        hints={
+            "zero": "There is no answer yet.",
+            "pyramids": "That is for pyramids with four facets inside the cones. Here the "
+            "cones are round.",
+            "half_length": "That is μ f_z times half the length. The lever arm of a corner "
+            "goes from the middle to the corner.",
+            "half_width": "That is μ f_z times half the width. The lever arm of a corner "
+            "goes from the middle to the corner.",
+            "whole_sides": "Use half the sides, not the sides: the lever arms begin in the middle.",
+            "one_corner": "That is for one corner, but four corners carry the load.",
+            "four_times": "Four corners share the load, so each has a quarter of it.",
+            "no_mu": "μ is missing: friction is less than the normal force.",
+            "mu_of_lesson": "That is for the μ of the lesson. Here it is 0.6.",
+            "square": "Half the length plus half the width is the lever arm for square "
+            "pyramids. Use the distance.",
+            "disc": "That is for a disc with the length of the sole and uniform pressure: "
+            "2/3 μ f_z times its radius.",
+        },
+    )
+
+
 EXERCISES = (
     Exercise(
         name="09.1",
@@ -247,44 +286,12 @@ EXERCISES = (
         "stands on four corners with round cones.",
         stub="largest_twist = 0.0  # N·m; replace by your expression",
         solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
-        judge=NumericJudge(
-            right=_twist,
-            praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
-            mistakes={
-                "zero": lambda: 0.0,
-                "pyramids": lambda: _twist(4),
-                "half_length": lambda: SOLE_MU * LOAD * LENGTH / 2,
-                "half_width": lambda: SOLE_MU * LOAD * WIDTH / 2,
-                "whole_sides": lambda: SOLE_MU * LOAD * float(np.hypot(LENGTH, WIDTH)),
-                "one_corner": lambda: _twist() / 4,
-                "four_times": lambda: 4 * _twist(),
-                "no_mu": lambda: _twist() / SOLE_MU,
-                "mu_of_lesson": lambda: _twist(mu=MU),
-                "square": lambda: SOLE_MU * LOAD * (LENGTH + WIDTH) / 2,
-                "disc": lambda: 2 / 3 * SOLE_MU * LOAD * LENGTH / 2,
-            },
-            hints={
-                "zero": "There is no answer yet.",
-                "pyramids": "That is for pyramids with four facets inside the cones. Here the "
-                "cones are round.",
-                "half_length": "That is μ f_z times half the length. The lever arm of a corner "
-                "goes from the middle to the corner.",
-                "half_width": "That is μ f_z times half the width. The lever arm of a corner "
-                "goes from the middle to the corner.",
-                "whole_sides": "Use half the sides, not the sides: the lever arms begin in the "
-                "middle.",
-                "one_corner": "That is for one corner, but four corners carry the load.",
-                "four_times": "Four corners share the 400 N, so each has 100 N.",
-                "no_mu": "μ is missing: friction is less than the normal force.",
-                "mu_of_lesson": "That is for the μ of the lesson. Here it is 0.6.",
-                "square": "Half the length plus half the width is the lever arm for square "
-                "pyramids. Use the distance.",
-                "disc": "That is for a disc with the length of the sole and uniform pressure: "
-                "2/3 μ f_z times its radius.",
-            },
-        ),
+        judge=_twist_judge(),
         explanation="All corners have the same lever arm. So the result is μ f_z times the "
         "distance, however they share the load.",
+        own=OwnNumber(
+            "the sole is pressed with {} N.", (320.0, 360.0, 440.0, 480.0, 520.0), _twist_judge
+        ),
     ),
     Exercise(
         name="09.3",

@@ -75,9 +75,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     graded = commands.add_parser(
         "grade", help="grade the files that learners wrote with hand_in(…)"
     )
-    graded.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    graded.add_argument("files", nargs="*", type=Path, metavar="FILE")
     graded.add_argument(
         "--table", type=Path, metavar="CSV", help="also write a row per learner and exercise"
+    )
+    graded.add_argument(
+        "--inventory", action="store_true", help="print the gain in the concept inventory"
     )
     graded.add_argument("--code", action="store_true", help="print the code that was handed in")
     graded.add_argument(
@@ -89,6 +92,51 @@ def main(arguments: Sequence[str] | None = None) -> None:
         metavar="TIME",
         help="leave out files written after TIME, such as 2026-05-31T18:00",
     )
+    graded.add_argument(
+        "--lessons", nargs="+", default=[], metavar="LESSON", help="lessons that give points"
+    )
+    graded.add_argument(
+        "--own-numbers", action="store_true", help="judge by the numbers of each student's id"
+    )
+    graded.add_argument("--due", type=_local_time, metavar="TIME", help="when answers are due")
+    graded.add_argument(
+        "--late-days", type=int, default=0, metavar="N", help="days on which late files still count"
+    )
+    graded.add_argument(
+        "--gradebook", choices=("canvas", "moodle"), help="write points as CSV to --table"
+    )
+    graded.add_argument(
+        "--roster", type=Path, metavar="CSV", help="the class, as the gradebook exports it"
+    )
+    graded.add_argument(
+        "--column", default="floatbase", metavar="NAME", help="the assignment in the gradebook"
+    )
+    graded.add_argument(
+        "--gradescope",
+        type=Path,
+        metavar="FOLDER",
+        help="write an autograder for Gradescope there; grade nothing",
+    )
+    graded.add_argument(
+        "--results", type=Path, metavar="JSON", help="grade one submission for Gradescope"
+    )
+    graded.add_argument(
+        "--metadata", type=Path, metavar="JSON", help="Gradescope's submission_metadata.json"
+    )
+    assigned = commands.add_parser("assign", help="write a package with some lessons for students")
+    assigned.add_argument("lessons", nargs="+", metavar="LESSON")
+    assigned.add_argument("--to", type=Path, required=True, metavar="FOLDER")
+    assigned.add_argument(
+        "--without-solutions", action="store_true", help="remove all solutions from the package"
+    )
+    assigned.add_argument(
+        "--teacher", default="", metavar="NAME", help="from whom students get the solutions"
+    )
+    assigned.add_argument(
+        "--until", default="", metavar="TIME", help="when students get the solutions"
+    )
+    voted = commands.add_parser("lecture", help="write the questions for the lecture as slides")
+    voted.add_argument("--to", type=Path, default=Path("lecture.html"), metavar="HTML")
     laid = commands.add_parser("workspace", help="update the learner's copy of the course")
     laid.add_argument(
         "--to",
@@ -113,9 +161,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         elif given.command == "solutions":
             _solutions(given.to)
         elif given.command == "grade":
-            unread = _grade(given.files, given.table, given.code, given.latest, given.before)
-            if unread:
+            if unread := _grade(given):
                 parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
+        elif given.command == "lecture":
+            _lecture(given.to)
+        elif given.command == "assign":
+            _assign(given)
         else:
             for line in prepare_workspace(mine=given.to):
                 print(line)
@@ -172,18 +223,71 @@ def _solutions(folder: Path) -> None:
     print(f"The solutions are in {folder}.")
 
 
-def _grade(
-    files: Sequence[Path], table: Path | None, code: bool, latest: bool, before: datetime | None
-) -> int:
-    from floatbase.lessons.publish import grades
+def _lecture(path: Path) -> None:
+    from floatbase.lessons.publish import site
 
-    submissions, unread = grades.grade_files(files, latest=latest, before=before)
+    site.lecture.write_slides(path)
+    print(f"The slides are in {path}.")
+
+
+def _assign(given: argparse.Namespace) -> None:
+    from floatbase.lessons.publish import package
+
+    package.write_assignment(
+        given.to,
+        given.lessons,
+        teacher=given.teacher,
+        until=given.until,
+        with_solutions=not given.without_solutions,
+    )
+    print(f"The package for students is in {given.to}.")
+
+
+def _grade(given: argparse.Namespace) -> int:
+    """Grade files; return how many could not be read."""
+    from floatbase.lessons import inventory
+    from floatbase.lessons.publish import gradebook, grades
+
+    policy = gradebook.Policy(
+        gradebook.lessons_with_exercises(given.lessons), given.due, given.late_days
+    )
+    if given.gradescope:
+        gradebook.write_autograder(given.gradescope, policy=policy, own_numbers=given.own_numbers)
+        print(f"The autograder is in {given.gradescope}; zip what is in this folder.")
+        return 0
+    if given.results:
+        gradebook.write_gradescope_results(
+            given.files,
+            given.results,
+            metadata=given.metadata,
+            policy=policy,
+            own_numbers=given.own_numbers,
+        )
+        return 0
+    if given.gradebook and not (given.roster and given.table):
+        raise InputError("--gradebook needs --roster CSV and --table CSV.")
+    submissions, unread = grades.grade_files(
+        given.files, latest=given.latest, before=given.before, own_numbers=given.own_numbers
+    )
     print(grades.overview(submissions))
-    if code:
+    if given.code:
         print(grades.code_to_read(submissions))
-    if table:
-        grades.write_table(submissions, table)
-        print(f"All marks: {table}")
+    if given.inventory:
+        print(inventory.gain_report([one.inventory for one in submissions]))
+    if given.gradebook:
+        for line in gradebook.write_gradebook(
+            given.gradebook,
+            submissions,
+            given.roster,
+            given.table,
+            column=given.column,
+            policy=policy,
+        ):
+            print(line)
+        print(f"Points for {given.gradebook.capitalize()}: {given.table}")
+    elif given.table:
+        grades.write_table(submissions, given.table)
+        print(f"All marks: {given.table}")
     return unread
 
 

@@ -70,25 +70,44 @@ class Submission:
         Name of the file.
     name : str
         Name of the learner.
+    id : str
+        Id of the learner in the class, or "".
     time : str
         Time at which the file was written.
     results : tuple of ExerciseResult
         Result of every exercise.
     predicted : int
         Number of predictions.
+    inventory : dict
+        Answers to the concept inventory, by time.
     """
 
     file: str
     name: str
+    id: str
     time: str
     results: tuple[ExerciseResult, ...]
     predicted: int
+    inventory: dict[str, Any]
 
 
-def grade_file(path: str | Path) -> Submission:
+def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
     """Judge again every answer of a file that `hand_in` wrote.
 
     The results that the file claims do not count, and none of its code is run.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    own_numbers : bool, optional
+        Whether to judge by the numbers that `own_numbers` gives to the id in the file. A file
+        without an id is judged by the numbers of the lessons.
+
+    Returns
+    -------
+    Submission
+        The grades.
 
     Raises
     ------
@@ -96,12 +115,15 @@ def grade_file(path: str | Path) -> Submission:
         If `hand_in` did not write the file.
     """
     found = _read(Path(path))
+    student = _one_line(found.get("id") or "").strip()
     return Submission(
         file=_one_line(Path(path).name),
         name=_one_line(found["name"]),
+        id=student,
         time=_one_line(found.get("time")),
-        results=tuple(_exercise_results(found["exercises"])),
+        results=tuple(_exercise_results(found["exercises"], student if own_numbers else "")),
         predicted=len(found["predictions"]),
+        inventory=given if isinstance(given := found.get("inventory"), dict) else {},
     )
 
 
@@ -129,7 +151,7 @@ def _read(path: Path) -> dict[str, Any]:
     return found
 
 
-def _exercise_results(entries: dict[str, Any]) -> Iterator[ExerciseResult]:
+def _exercise_results(entries: dict[str, Any], student: str) -> Iterator[ExerciseResult]:
     for name, exercise in all_exercises().items():
         entry = entries.get(name)
         entry = entry if isinstance(entry, dict) else {}
@@ -142,7 +164,7 @@ def _exercise_results(entries: dict[str, Any]) -> Iterator[ExerciseResult]:
             continue
         try:
             with np.errstate(all="ignore"):
-                verdict = exercise.judge(progress.from_json(kept))
+                verdict = exercise.judge_for(student)(progress.from_json(kept))
         except (
             Exception
         ) as error:  # a file may hold anything, and one answer must not end the others' judgement
@@ -159,7 +181,11 @@ def _one_line(value: Any) -> str:
 
 
 def grade_files(
-    files: Sequence[Path], *, latest: bool = False, before: datetime | None = None
+    files: Sequence[Path],
+    *,
+    latest: bool = False,
+    before: datetime | None = None,
+    own_numbers: bool = False,
 ) -> tuple[list[Submission], int]:
     """Judge files in their order, and report those that `hand_in` did not write.
 
@@ -168,9 +194,11 @@ def grade_files(
     files : sequence of Path
         The files.
     latest : bool
-        Whether to keep only the last file of each name.
+        Whether to keep only the last file of each id, or of each name where there is no id.
     before : datetime, optional
         Leave out files that were written later, or that do not say when.
+    own_numbers : bool
+        Whether to judge by the numbers of each student's id; see `grade_file`.
 
     Returns
     -------
@@ -187,18 +215,18 @@ def grade_files(
     submissions, unread = [], 0
     for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
-            submissions.append(grade_file(path))
+            submissions.append(grade_file(path, own_numbers=own_numbers))
         except InputError as error:
             print(error, file=sys.stderr)
             unread += 1
     if before:
-        times = [_time_of(one) for one in submissions]
+        times = [time_of(one.time) for one in submissions]
         submissions = [
             one for one, time in zip(submissions, times, strict=True) if time and time <= before
         ]
     if latest:
-        last = {one.name: one for one in sorted(submissions, key=lambda one: _order(one))}
-        submissions = [one for one in submissions if last[one.name] is one]
+        last = {(one.id or one.name): one for one in sorted(submissions, key=time_order)}
+        submissions = [one for one in submissions if last[one.id or one.name] is one]
     if not submissions:
         raise InputError(
             "There is no file to grade. Name files that learners wrote with hand_in(…)."
@@ -206,16 +234,17 @@ def grade_files(
     return submissions, unread
 
 
-def _time_of(submission: Submission) -> datetime | None:
-    """Return when a file was written, or None if it does not say so."""
+def time_of(text: str) -> datetime | None:
+    """Read a time in ISO format; None if it is no time."""
     try:
-        return datetime.fromisoformat(submission.time).astimezone()
+        return datetime.fromisoformat(text).astimezone()
     except (ValueError, OverflowError):  # also local times before year 1 or after 9999
         return None
 
 
-def _order(submission: Submission) -> float:
-    time = _time_of(submission)
+def time_order(submission: Submission) -> float:
+    """Return when a file was written, for sorting; a file that does not say so comes first."""
+    time = time_of(submission.time)
     return time.timestamp() if time else -math.inf
 
 
@@ -286,7 +315,7 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
         text = io.StringIO(newline="")
         writer = csv.writer(text)
         writer.writerow(_COLUMNS)
-        writer.writerows([_csv_safe(part) for part in row] for row in rows)
+        writer.writerows([csv_safe(part) for part in row] for row in rows)
         write_whole(path, text.getvalue().encode(), keep_link=True)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}.") from None
@@ -299,7 +328,7 @@ def _is_table(path: Path) -> bool:
         return file.read(len(header)) == header
 
 
-def _csv_safe(value: object) -> object:
+def csv_safe(value: object) -> object:
     """Keep a spreadsheet from reading a value as a formula, even if it splits cells at ";"."""
     if not isinstance(value, str):
         return value

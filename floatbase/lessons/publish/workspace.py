@@ -134,6 +134,11 @@ def write_record(folder: Path, record: dict[str, str]) -> None:
     write_whole(folder / _RECORD_FILE, json.dumps(record, indent=1).encode())
 
 
+def write_without_outputs(source: Path, target: Path) -> None:
+    """Copy a lesson without outputs, or another text as it is."""
+    write_whole(target, _course_text(source))
+
+
 def _course_text(source: Path) -> bytes:
     """Read a lesson without outputs, which would give predictions away."""
     if source.suffix != ".ipynb":

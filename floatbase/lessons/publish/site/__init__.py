@@ -5,8 +5,13 @@ lessons, `reference` writes the API reference, and `mathml` draws formulas. `con
 Sphinx. The text of the pages is in the folder `docs`. Building the site needs the extra `site`.
 """
 
-from floatbase.lessons.publish.site import mathml
+from floatbase.lessons.publish.site import lecture, mathml
 from floatbase.lessons.publish.site.addresses import PACKAGES, exported
+from floatbase.lessons.publish.site.answers import (
+    exercise_form,
+    prediction_form,
+    printed_results,
+)
 from floatbase.lessons.publish.site.build import SITE, build, replace_site
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import add_links
@@ -16,9 +21,13 @@ __all__ = [
     "SITE",
     "add_links",
     "build",
+    "exercise_form",
     "exported",
+    "lecture",
     "mathml",
+    "prediction_form",
     "prepare_lesson",
+    "printed_results",
     "replace_site",
     "run_lessons",
 ]

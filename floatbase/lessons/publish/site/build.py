@@ -19,7 +19,7 @@ from floatbase.lessons.publish.contents import equation_ranges, title_of
 from floatbase.lessons.publish.live import folder as live_folder
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
-from floatbase.lessons.publish.site import mathml, reference
+from floatbase.lessons.publish.site import lecture, mathml, reference
 from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.live_robots import (
     LESSON_ROBOTS,
@@ -98,6 +98,7 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         _write_reference(source / "api")
         _run_sphinx(source, built)
         pictures.write()
+        lecture.write_slides(built / "_static" / lecture.SLIDES, in_site=True)
         if has_live:
             live_folder.write(built / "_static" / LIVE_FOLDER)
         pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
@@ -203,6 +204,7 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str, has_live: bo
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
+        "lecture.md": lecture.page(),
         "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
         **{
             f"benchmarks/{path.name}": path.read_text(encoding="utf-8")

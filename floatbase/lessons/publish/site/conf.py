@@ -59,7 +59,11 @@ html_title = "floatbase"
 html_math_renderer = "mathml"
 html_static_path = ["static", str(pages.DIST / "pictures.js")]
 html_css_files = ["site.css", "pictures.css"]
-html_js_files = [("pictures.js", {"defer": "defer"}), ("search.js", {"defer": "defer"})]
+html_js_files = [
+    ("pictures.js", {"defer": "defer"}),
+    ("search.js", {"defer": "defer"}),
+    ("answers.js", {"defer": "defer"}),
+]
 html_show_sphinx = False
 html_copy_source = False
 html_show_sourcelink = False

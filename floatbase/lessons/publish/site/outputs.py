@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
@@ -15,8 +14,16 @@ import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 
 import floatbase
+from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
+from floatbase.lessons.publish.site.answers import (
+    exercise_form,
+    prediction_form,
+    printed_results,
+    review_element,
+)
 from floatbase.lessons.publish.site.references import add_links
+from floatbase.lessons.questions import predict_call
 
 RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
@@ -25,6 +32,7 @@ _INLINE = "module://matplotlib_inline.backend_inline"
 _CLAIMS_PROMPT = "claims of the text above, as code that fails if a claim is wrong"
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
+_CHECKED = re.compile(r'check\("(\w+\.\w+)"')
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 _LEARNER_CALLS = re.compile(
     r"^(?:review|show_progress|reveal)\(", re.MULTILINE
@@ -104,12 +112,13 @@ def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str,
         Number -> address of each lesson.
     """
     about, heading = _description(notebook), ""
+    results = printed_results(cell for cell in notebook.cells if cell.cell_type == "code")
     for i, cell in enumerate(notebook.cells):
         if cell.cell_type == "markdown":
             heading = (_HEADING.findall(cell.source) or [heading])[-1]
             cell.source = add_links(cell.source, lessons)
         else:
-            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures)
+            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures, results)
     notebook.metadata.pop("widgets", None)  # widgets need a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
@@ -122,12 +131,24 @@ def _description(notebook: Any) -> str:
     return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
 
 
-def _prepare_code_cell(cell: Any, heading: str, pictures: PicturePlacer) -> Any:
+def _prepare_code_cell(
+    cell: Any, heading: str, pictures: PicturePlacer, results: dict[str, str]
+) -> Any:
     tags = cell.metadata.get("tags", [])
     if "predict" in tags:
-        return new_markdown_cell(_prediction_question(cell))
+        form = prediction_form(cell.source, results)
+        return form or new_markdown_cell(_prediction_question(cell))
     if "check" in tags:
+        checked = all_exercises().get(_CHECKED.findall(cell.source)[0])
+        if checked and (form := exercise_form(checked)):
+            return form
         return new_markdown_cell(_live_lesson_note("Checks and hints are in the live lesson"))
+    if cell.source.startswith("recall("):
+        return new_markdown_cell(
+            _live_lesson_note("Questions of earlier lessons come back here in the live lesson")
+        )
+    if form := review_element(cell.source):
+        return form
     if _LEARNER_CALLS.search(cell.source):
         return new_markdown_cell(
             _live_lesson_note("Your predictions and solutions appear here in the live lesson")
@@ -149,12 +170,7 @@ def _live_lesson_note(text: str) -> str:
 
 def _prediction_question(cell: Any) -> str:
     """Describe the prediction that a cell asks for."""
-    call = next(
-        node
-        for node in ast.walk(ast.parse(cell.source))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
-    )
-    given = {keyword.arg: ast.literal_eval(keyword.value) for keyword in call.keywords}
+    name, given = predict_call(cell.source)
     if "choices" in given:
         wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
     else:
@@ -162,7 +178,7 @@ def _prediction_question(cell: Any) -> str:
         wanted = ("a number" if count == 1 else f"{count} numbers") + (
             f", in {unit}" if unit else ""
         )
-    asked = f"**{ast.literal_eval(call.args[0])}**, your prediction: {wanted}."
+    asked = f"**{name}**, your prediction: {wanted}."
     return (
         f":::{{div}} live\n{asked} Make your prediction before you read on. You can type it in "
         f"in [the live lesson]({RUN_PAGE}).\n:::"

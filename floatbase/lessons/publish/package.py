@@ -1,0 +1,204 @@
+"""Copy the package to a folder: for students of an assignment, and for an autograder."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from floatbase._files import write_whole
+from floatbase.errors import InputError
+from floatbase.lessons import assignment
+from floatbase.lessons.predictions import lesson_name
+from floatbase.lessons.publish.workspace import NOTEBOOKS, write_without_outputs
+
+_ROOT = NOTEBOOKS.parent
+_INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")
+_FOLDERS = ("floatbase", "assets/meshes")
+_FIRST_LESSON = "00"  # explains how a lesson works
+# arguments of an Exercise that give its answer away -> what replaces them
+_SECRET = {"solution": '""', "explanation": '""', "examples": "tuple"}
+_SOLUTION_MODULE = "lessonX/investigation.py"  # whose text is the solution of exercise X.3
+_WORD = re.compile(r"\w+")
+_Change: TypeAlias = tuple[ast.stmt | ast.expr, str]  # part of a module, and what replaces it
+
+
+def lesson_paths(lessons: Sequence[str]) -> dict[str, Path]:
+    """Return the notebook of each lesson, by its name.
+
+    Parameters
+    ----------
+    lessons : sequence of str
+        Names of lessons, such as "01" or "C"; "1" and "c" are understood.
+
+    Returns
+    -------
+    dict of str to Path
+        Name and path of each lesson, in order.
+
+    Raises
+    ------
+    InputError
+        If there is no such lesson.
+    """
+    known = {path.name.split("_")[0]: path for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
+    names = [lesson_name(name) for name in lessons]
+    if unknown := [name for name in names if name not in known]:
+        raise InputError(f"There is no lesson {unknown[0]!r}. The lessons are {', '.join(known)}.")
+    return {name: known[name] for name in known if name in names}
+
+
+def copy_package(folder: Path) -> None:
+    """Copy what `pip install` needs to a new folder: no tests and nothing that was built.
+
+    Raises
+    ------
+    InputError
+        If the folder exists and is not empty.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder} exists already. Choose a new folder: --to FOLDER.")
+    unwanted = shutil.ignore_patterns("__pycache__", "node_modules", "test", assignment.FILE.name)
+    for name in _FOLDERS:
+        shutil.copytree(_ROOT / name, folder / name, ignore=unwanted)
+    for name in (*_INSTALL, "assets/LICENSES.md"):
+        shutil.copy(_ROOT / name, folder / name)
+
+
+def write_assignment(
+    folder: Path,
+    lessons: Sequence[str],
+    *,
+    teacher: str = "",
+    until: str = "",
+    with_solutions: bool = False,
+) -> None:
+    """Write a package for students with some lessons, and without solutions.
+
+    The folder holds the package, these lessons without outputs, lesson 00, and the Makefile.
+    Solutions and explanations of all exercises are removed. The checks stay, because students need
+    them: a check computes the right value in another way than the solution.
+
+    Parameters
+    ----------
+    folder : Path
+        A new folder.
+    lessons : sequence of str
+        Names of the assigned lessons, such as "01".
+    teacher : str, optional
+        From whom students get the solutions; `reveal` prints it.
+    until : str, optional
+        When students get the solutions; `reveal` prints it.
+    with_solutions : bool, optional
+        Whether to leave the solutions in the package.
+
+    Raises
+    ------
+    InputError
+        If there is no such lesson, or if the folder exists and is not empty.
+    """
+    paths = lesson_paths(lessons)
+    paths = lesson_paths([_FIRST_LESSON]) | paths
+    copy_package(folder)
+    shutil.copy(_ROOT / "Makefile", folder)
+    # the texts for teachers and contributors are not part of it
+    (folder / "docs").mkdir()
+    shutil.copy(_ROOT / "docs" / "installation.md", folder / "docs")
+    (folder / "notebooks").mkdir()
+    for source in [*paths.values(), *sorted(NOTEBOOKS.glob("*.md"))]:
+        write_without_outputs(source, folder / "notebooks" / source.name)
+    if with_solutions:
+        return
+    _remove_solutions(folder)
+    found = {"lessons": list(lessons), "teacher": teacher, "until": until}
+    target = folder / assignment.FILE.relative_to(_ROOT)
+    write_whole(target, json.dumps(found, indent=1).encode())
+
+
+def _remove_solutions(folder: Path) -> None:
+    """Remove solutions, and the functions and constants that only solutions use."""
+    lessons = folder / "floatbase/lessons"
+    (lessons / _SOLUTION_MODULE).unlink()
+    modules = {path: path.read_text(encoding="utf-8") for path in lessons.glob("lesson*/*.py")}
+    modules = {path: _without_answers(text) for path, text in modules.items()}
+    others = [path for path in folder.rglob("*") if path.suffix in (".py", ".ipynb")]
+    elsewhere = Counter(
+        _WORD.findall(
+            "".join(path.read_text(encoding="utf-8") for path in others if path not in modules)
+        )
+    )
+    while True:
+        words = elsewhere + Counter(_WORD.findall("".join(modules.values())))
+        pruned = {
+            path: text if path.name == "__init__.py" else _without_unused(text, words)
+            for path, text in modules.items()
+        }
+        if pruned == modules:
+            break
+        modules = pruned
+    for path, text in modules.items():
+        write_whole(path, text.encode())
+
+
+def _without_answers(text: str) -> str:
+    """Replace the arguments of exercises that give the answer away."""
+    tree, module = ast.parse(text), Path(_SOLUTION_MODULE).stem
+    replaced: list[_Change] = [
+        (keyword.value, _SECRET[keyword.arg])
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call) and ast.unparse(call.func) == "Exercise"
+        for keyword in call.keywords
+        if keyword.arg in _SECRET
+    ]
+    replaced += [
+        (node, "")
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom) and module in [alias.name for alias in node.names]
+    ]
+    return _replace(text, replaced)
+
+
+def _without_unused(text: str, words: Counter[str]) -> str:
+    """Remove what nothing uses: imported names, and functions and constants of a module.
+
+    `words` counts the words of the whole course.
+    """
+    here = Counter(_WORD.findall(text))
+    replaced: list[_Change] = []
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("floatbase.lessons"):
+            used = [alias.name for alias in node.names if here[alias.name] > 1]
+            if len(used) < len(node.names):
+                line = f"from {node.module} import {', '.join(used)}" if used else ""
+                replaced.append((node, line))
+        elif isinstance(node, ast.FunctionDef) and not node.decorator_list:
+            replaced += [(node, "")] if words[node.name] == 1 else []
+        elif isinstance(node, ast.Assign):
+            targets = _WORD.findall(" ".join(ast.unparse(target) for target in node.targets))
+            replaced += [(node, "")] if all(words[name] == 1 for name in targets) else []
+    return _replace(text, replaced)
+
+
+def _replace(text: str, nodes: Sequence[_Change]) -> str:
+    """Replace the source of some nodes of a module's syntax tree."""
+    data = text.encode()
+    starts = [0]  # byte at which each line begins; the columns of `ast` are bytes
+    for line in data.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+
+    spans = [
+        (
+            starts[node.lineno - 1] + node.col_offset,
+            starts[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0),
+            new,
+        )
+        for node, new in nodes
+    ]
+    for start, end, new in sorted(spans, reverse=True):
+        data = data[:start] + new.encode() + data[end:]
+    return data.decode()

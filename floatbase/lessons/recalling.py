@@ -1,0 +1,181 @@
+"""Recall: bring back questions of earlier lessons after days, first those that were missed."""
+
+from __future__ import annotations
+
+import ast
+import re
+import textwrap
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from typing import Any
+
+from floatbase._validation import short_repr
+from floatbase.errors import InputError
+from floatbase.lessons import progress
+from floatbase.lessons.predictions import format_result, is_right, parse_answer
+from floatbase.lessons.questions import Question, all_questions
+
+PER_DAY = 3  # questions at a time
+# predictions that can be answered without the lesson's pictures
+RECALLED = (
+    "00.b", "00.c", "00.d", "01.a", "01.b", "01.d", "01.e", "01.f", "01.g", "01.h", "01.i",
+    "02.a", "02.c", "02.d", "02.i", "02.k", "03.h", "03.i", "03.j", "03.m",
+    "04.a", "04.d", "05.b", "05.c", "05.e", "06.e", "06.i", "06.j", "07.a", "07.b",
+    "07.g", "08.a", "08.b", "08.f", "08.g", "08.i", "09.c", "09.f", "09.i", "09.j",
+    "A.c", "A.d", "A.e", "C.a", "C.b", "C.c",
+)  # fmt: skip
+_FIRST, _GROWTH = timedelta(days=2), 2  # pause after a right answer, and how it grows
+_MISSED, _SURE_AND_MISSED = timedelta(days=1), timedelta(hours=12)  # pause after a wrong answer
+_OLD = timedelta(days=30)  # age of an answer without a time
+
+
+def recall(name: str = "", *answer: Any) -> None:
+    """Ask three questions of earlier lessons again, or answer one of them.
+
+    Only questions whose results you have seen are asked. A question that you missed comes back
+    after a day. One that you knew comes back after 2, 4, 8, … days. The questions of a day are
+    from different lessons, if there are enough.
+
+    Parameters
+    ----------
+    name : str, optional
+        Name of a question, such as "02.c". Without it, the questions that are due are printed.
+    *answer : float, sequence of float or str
+        Your answer, as for `predict`.
+
+    Raises
+    ------
+    InputError
+        If there is no such question, or if you have not seen its result yet.
+    """
+    if not name:
+        asked = due_questions()
+        for question in asked:
+            print(question_text(question))
+            print(f'    Answer with recall("{question.name}", …).\n')
+        if not asked:
+            print("There is nothing to recall today.")
+        return
+    settled = _settled()
+    if name not in settled:
+        raise InputError(
+            f"There is no question {short_repr(name)} whose result you have seen. recall() prints "
+            f"the questions that are due."
+        )
+    question, result = settled[name]
+    given = answer[0] if len(answer) == 1 else list(answer)
+    try:
+        said = parse_answer(given, question.unit, question.choices, question.count)
+    except InputError as error:
+        print(f"{name}: {error}")
+        return
+    right = is_right(said, result, question.unit)
+    print(f"{name}: {'right' if right else 'not yet'}, {format_result(result, question.unit)}.")
+    if not right:
+        print(f"Look it up in lesson {question.lesson}, {question.topic}.")
+    progress.append(name, {"recalled": said, "knew": right, "time": progress.now()})
+
+
+def due_questions(now: datetime | None = None) -> list[Question]:
+    """Return the questions that are due, at most three, the most overdue first.
+
+    Parameters
+    ----------
+    now : datetime, optional
+        The time; by default the present.
+
+    Returns
+    -------
+    list of Question
+        Questions from different lessons, if there are enough.
+    """
+    now = now or datetime.now().astimezone()
+    history = progress.history()
+    overdue = {}
+    for name, (question, result) in _settled().items():
+        pause, last = _MISSED, now - _OLD
+        for event in history.get(name, []):
+            pause = _next_pause(event, pause, question, result)
+            last = _time_of(event) or last
+        if now - last >= pause:
+            overdue[name] = (now - last) / pause
+    ordered = sorted(overdue, key=lambda name: (-overdue[name], name))
+    questions = [all_questions()[name] for name in ordered]
+    first = {question.lesson: question for question in reversed(questions)}.values()
+    mixed = [question for question in questions if question in first]  # one per lesson
+    return [*mixed, *(question for question in questions if question not in first)][:PER_DAY]
+
+
+def _next_pause(
+    event: dict[str, Any], pause: timedelta, question: Question, result: Any
+) -> timedelta:
+    """Return how long a question rests after an answer, from the pause before it."""
+    if "recalled" in event:
+        knew = event.get("knew") is True
+    elif "said" in event:
+        knew = is_right(event["said"], result, question.unit)
+    else:
+        return pause
+    if knew:
+        return max(_FIRST, _GROWTH * pause)
+    return _SURE_AND_MISSED if event.get("sure") else _MISSED
+
+
+def _time_of(event: dict[str, Any]) -> datetime | None:
+    try:
+        return datetime.fromisoformat(event["time"]).astimezone()
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+
+
+def _settled() -> dict[str, tuple[Question, Any]]:
+    """Return the questions whose results the learner has seen, with these results."""
+    known, seen = all_questions(), progress.predictions()
+    return {
+        name: (known[name], seen[name]["is"])
+        for name in RECALLED
+        if name in known and "said" in seen.get(name, {}) and "is" in seen[name]
+    }
+
+
+def question_text(question: Question) -> str:
+    """Write a question as plain text, wrapped for a terminal."""
+    parts = [f"{question.name}, {question.topic}", question.context, _capitalized(question.text)]
+    plain = [re.sub(r"[*$`]|\[([^\]]*)\]\([^)]*\)", r"\1", part) for part in parts if part]
+    lines = [textwrap.fill(part, 88) for part in [*plain, f"({question.form})"]]
+    return "\n".join(lines)
+
+
+def _capitalized(text: str) -> str:
+    """Begin a question with a capital letter, unless it begins with the name of a robot."""
+    return text if text.startswith(("go2", "solo8")) else text[:1].upper() + text[1:]
+
+
+def ask(read: Callable[[str], str] | None = None) -> None:
+    """Ask the questions that are due in a terminal.
+
+    Parameters
+    ----------
+    read : callable, optional
+        Function that shows a prompt and returns a line; by default `input`.
+    """
+    asked = due_questions()
+    if not asked:
+        print("There is nothing to recall today.")
+    for question in asked:
+        print(question_text(question))
+        try:
+            line = (read or input)("> ").strip()
+        except EOFError:
+            return
+        if line:
+            recall(question.name, line if question.choices else _as_numbers(line))
+        print()
+
+
+def _as_numbers(line: str) -> Any:
+    """Read numbers from a line such as "12.5" or "3, 4"; text stays text."""
+    try:
+        return ast.literal_eval(f"[{line}]" if "," in line and "[" not in line else line)
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
+        return line

@@ -1,0 +1,350 @@
+"""A class of sixty: packages without solutions, own numbers, late days, and gradebooks."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import json
+import os
+import subprocess
+import sys
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hints import MASS
+
+from floatbase.errors import InputError
+from floatbase.lessons import all_exercises, check, hand_in, own_numbers, progress, reveal
+from floatbase.lessons.publish import gradebook, grades, package
+from floatbase.lessons.publish.__main__ import main
+
+EXERCISES = all_exercises()
+DUE = datetime(2026, 5, 1, 18, tzinfo=UTC)
+LESSONS = ("00", "01", "06")  # of the assignment
+
+
+@pytest.fixture(autouse=True)
+def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """One who has just begun, in a folder of their own."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+# the package of an assignment ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def assigned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("class") / "package"
+    package.write_assignment(folder, ["1", "05"], teacher="Prof. Curie", until="31 May, 18:00")
+    return folder
+
+
+def texts_of(path: Path) -> str:
+    """All text of a file, with the strings of a program or a notebook as they are when it runs."""
+    text = path.read_bytes().decode("utf-8", "ignore")
+    if path.suffix == ".py":
+        strings = [
+            node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)
+        ]
+        text += "\n".join(value for value in strings if isinstance(value, str))
+    if path.suffix == ".ipynb":
+        text += "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
+    return text
+
+
+def test_the_package_of_an_assignment_holds_no_solution(assigned: Path) -> None:
+    files = [path for path in assigned.rglob("*") if path.is_file()]
+    found = {path: texts_of(path) for path in files}
+    secret = {(n, t) for n, e in EXERCISES.items() for t in (e.solution, e.explanation) if t}
+    assert len(secret) > 60
+    assert [(n, p) for n, t in secret for p, text in found.items() if t in text] == []
+    # the search finds them where they are
+    ours = texts_of(
+        Path(sys.modules["floatbase"].__file__).parent / "lessons/lesson05/exercises.py"
+    )
+    assert all(e.solution in ours for n, e in EXERCISES.items() if n.startswith("05."))
+    names = {path.name for path in (assigned / "notebooks").glob("*.ipynb")}
+    assert {name.split("_")[0] for name in names} == {"00", "01", "05"}
+    assert not any("solved" in path.name or "tests" in path.parts for path in files)
+
+
+def test_the_package_of_an_assignment_checks_answers_and_says_who_has_the_solutions(
+    assigned: Path, learner: Path
+) -> None:
+    program = (
+        "import sys; sys.dont_write_bytecode = True\n"
+        "from floatbase.lessons import all_exercises, check, reveal\n"
+        "for answer in (3.0, 4.0): check('00.1', answer)\n"
+        "reveal('00.1')\n"
+        "print(len(all_exercises()))\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": str(assigned)},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr
+    where, known = run.stdout.splitlines()
+    assert "Prof. Curie" in where and "31 May, 18:00" in where and "00.1" in where
+    assert int(known) == len(EXERCISES)
+
+
+def test_a_package_needs_known_lessons_and_a_new_folder(
+    assigned: Path, learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InputError, match="99"):
+        package.write_assignment(learner / "new", ["99"])
+    assert not (learner / "new").exists()
+    with pytest.raises(InputError, match="exists already"):
+        package.write_assignment(assigned, ["01"])
+    with pytest.raises(SystemExit):
+        main(["assign", "99", "--to", "new", "--without-solutions"])
+
+
+def test_solutions_stay_for_those_who_have_them(capsys: pytest.CaptureFixture[str]) -> None:
+    for answer in (3.0, 4.0):
+        check("00.1", answer)
+    reveal("00.1")
+    assert EXERCISES["00.1"].solution in capsys.readouterr().out
+
+
+# own numbers --------------------------------------------------------------------------------------
+
+OWN = [name for name, exercise in EXERCISES.items() if exercise.own]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_own_numbers_have_their_own_right_answers(name: str) -> None:
+    exercise = EXERCISES[name]
+    assert exercise.own is not None and len(set(exercise.own.values)) > 4
+    standard = [answer for answer, hint in exercise.examples() if not hint]
+    standard += [a for a, hint in getattr(exercise.judge, "examples", tuple)() if not hint]
+    for value in exercise.own.values[:3]:
+        judge = exercise.own.judge(value)
+        examples = [*getattr(judge, "examples", tuple)()]
+        assert all(judge(answer).hint == hint for answer, hint in examples)
+        assert not any(judge(answer).right for answer in standard)
+        assert str(value) in exercise.own.text.format(value)
+
+
+def test_a_student_always_gets_the_same_numbers_and_others_get_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    own = EXERCISES["00.1"].own
+    assert own is not None
+    values = {student: own.value("00.1", student) for student in map(str, range(60))}
+    assert set(values.values()) == set(own.values)
+    assert own.value("00.1", "7") == values["7"]
+    own_numbers("7")
+    printed = capsys.readouterr().out
+    assert [line.split(":")[0] for line in printed.splitlines()[1:]] == OWN
+    assert f"{values['7']} m/s²" in printed
+    assert not check("00.1", MASS * (9.81 + 2.0)).right
+    assert check("00.1", MASS * (9.81 + values["7"])).right
+    for wrong in ("", "a\nb", "a" * 81, 5):
+        with pytest.raises(InputError, match="id"):
+            own_numbers(wrong)  # type: ignore[arg-type]
+    assert progress.student() == "7"
+
+
+def test_grading_uses_the_numbers_of_the_id(learner: Path) -> None:
+    own_numbers("s7")
+    own = EXERCISES["00.1"].own
+    assert own is not None
+    check("00.1", MASS * (9.81 + own.value("00.1", "s7")))
+    path = hand_in("Ada", lesson="0")
+    assert path.name == "answers-Ada-lesson00.json"
+    for numbers, result in ((True, "right"), (False, "wrong")):
+        graded = grades.grade_file(path, own_numbers=numbers)
+        assert graded.id == "s7"
+        assert {r.result for r in graded.results if r.exercise == "00.1"} == {result}
+    with pytest.raises(InputError, match="lesson 05"):
+        hand_in("Ada", lesson="5")
+
+
+# sixty hand-ins -----------------------------------------------------------------------------------
+
+
+def right_answer(name: str, student: str) -> Any:
+    exercise = EXERCISES[name]
+    judge = exercise.judge_for(student)
+    examples = [*getattr(judge, "examples", tuple)(), *exercise.examples()]
+    return next(answer for answer, hint in examples if not hint)
+
+
+KINDS = ("right", "partial", "late", "forged", "malformed", "few")
+
+
+def class_of_sixty(folder: Path) -> dict[str, tuple[str, float | None]]:
+    """Write sixty files; return for each id what it is and the points that it deserves."""
+    names = [n for n in EXERCISES if n.split(".")[0] in LESSONS and n != "06.3"]
+    answers = {name: progress.as_json(right_answer(name, "")) for name in names if name not in OWN}
+    expected: dict[str, tuple[str, float | None]] = {}
+    for i in range(60):
+        student, kind = f"s{i:02}", KINDS[i % 6]
+        given = dict(answers)
+        for name in set(OWN) & set(names):
+            owner = f"s{i - 3:02}" if kind == "forged" else student  # copied from a neighbour
+            given[name] = progress.as_json(right_answer(name, owner))
+        if kind == "partial":
+            given = {name: answer for name, answer in given.items() if name < "01"}
+        if kind == "few":
+            given["01.3"] = 0.123
+        late = (
+            timedelta(days=1.5 if i % 12 == 2 else 4.0) if kind == "late" else -timedelta(hours=i)
+        )
+        found = {
+            "form": "answers to the floatbase course", "name": f"Student {i}", "id": student,
+            "time": (DUE + late).isoformat(), "predictions": {"00.a": {"said": "more"}},
+            "exercises": {n: {"tries": 1, "right": 1, "answer": a} for n, a in given.items()},
+        }  # fmt: skip
+        text = json.dumps(found)
+        (folder / f"{student}.json").write_text(text[:-40] if kind == "malformed" else text)
+        own = EXERCISES["00.1"].own, EXERCISES["06.2"].own
+        copied = sum(
+            o is not None and o.value(n, student) == o.value(n, f"s{i - 3:02}")
+            for n, o in zip(("00.1", "06.2"), own, strict=True)
+        )
+        points: dict[str, float | None] = {
+            "right": len(names), "partial": 1, "few": len(names) - 1, "malformed": None,
+            "late": len(names) if i % 12 == 2 else None, "forged": len(names) - 2 + copied,
+        }  # fmt: skip
+        expected[student] = kind, points[kind]
+    return expected
+
+
+CANVAS = "Student,ID,SIS User ID,SIS Login ID,Section,Week 1 (4711)\n    Points Possible,,,,,10\n"
+MOODLE = "First name,Surname,ID number,Institution,Email address\n"
+
+
+def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
+    learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = class_of_sixty(learner)
+    files = sorted(str(path) for path in learner.glob("s*.json"))
+    (learner / "canvas.csv").write_text(
+        CANVAS + "".join(f'"{i}, Student",{9000 + i},s{i:02},login{i},A,\n' for i in range(60)),
+        encoding="utf-8-sig",
+    )
+    (learner / "moodle.csv").write_text(
+        MOODLE + "".join(f"Student,{i},s{i:02},U,s{i:02}@uni.edu\n" for i in range(60))
+    )
+    options = ["--own-numbers", "--lessons", *LESSONS, "--due", DUE.isoformat(), "--late-days", "2"]
+    for kind in ("canvas", "moodle"):
+        table = learner / f"{kind}-points.csv"
+        started = time.perf_counter()
+        with pytest.raises(SystemExit) as ended:
+            main(["grade", *files, *options, "--gradebook", kind, "--roster", f"{kind}.csv",
+                  "--column", "Week 1", "--table", str(table)])  # fmt: skip
+        assert time.perf_counter() - started < 60
+        assert ended.value.code == 1  # ten files could not be read
+        printed = capsys.readouterr()
+        assert printed.err.count("was not written by hand_in") == 10
+        assert printed.out.count("too late") == 5 and printed.out.count("late days used: 2") == 5
+        rows = list(csv.DictReader(table.open(encoding="utf-8")))
+        if kind == "canvas":
+            assert list(rows[0]) == CANVAS.splitlines()[0].split(",")
+            assert rows.pop(0)["Week 1 (4711)"] == str(sum(n[:2] in LESSONS for n in EXERCISES))
+        column, key = (
+            ("Week 1 (4711)", "SIS User ID") if kind == "canvas" else ("Week 1", "ID number")
+        )
+        points = {row[key]: row[column] for row in rows}
+        wanted = {s: "" if p is None else str(p) for s, (_, p) in expected.items()}
+        assert points == wanted
+    forged = [p for kind, p in expected.values() if kind == "forged"]
+    full = max(p for _, p in expected.values() if p is not None)
+    assert np.mean([p for p in forged if p is not None]) < full - 1
+
+
+def test_files_without_an_id_are_matched_by_name_and_others_are_reported(learner: Path) -> None:
+    (learner / "roster.csv").write_text(
+        'Student,ID,SIS User ID,Section\n"Curie, Marie",1,m1,A\n"Noether, Emmy",2,e2,A\n'
+    )
+    check("00.1", 3.0)
+    files = [hand_in("marie  CURIE"), hand_in("Emmy Noether", id="e9")]
+    table = learner / "points.csv"
+    messages = gradebook.write_gradebook(
+        "canvas",
+        [grades.grade_file(path) for path in files],
+        learner / "roster.csv",
+        table,
+        column="=Week",
+        policy=gradebook.Policy(("00",)),
+    )
+    assert len(messages) == 1 and "e9 matches nobody" in messages[0]
+    assert [row[-1] for row in csv.reader(table.open())] == ["=Week", "0", ""]
+    with pytest.raises(InputError, match="ID number"):
+        gradebook.write_gradebook(
+            "moodle", [], table, table, column="Week", policy=gradebook.Policy()
+        )
+
+
+def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:
+    metadata = learner / "submission_metadata.json"
+    target = learner / "results.json"
+    gradebook.write_gradescope_results(files, target, metadata=metadata, **options)
+    found = json.loads(target.read_text())
+    assert isinstance(found, dict)
+    return found
+
+
+def test_gradescope_gets_a_score_for_each_exercise_and_only_the_teacher_learns_whose_file_it_was(
+    learner: Path,
+) -> None:
+    class_of_sixty(learner)
+    meta = {
+        "created_at": (DUE + timedelta(days=1.5)).isoformat(),
+        "assignment": {"due_date": DUE.isoformat(), "title": "Week 1"},
+        "users": [{"email": "s00@uni.edu", "id": 5, "name": "Student 0"}],
+    }
+    (learner / "submission_metadata.json").write_text(json.dumps(meta))
+    policy = gradebook.Policy(LESSONS, late_days=2)
+    found = results(learner, [learner / "s00.json"], policy=policy, own_numbers=True)
+    names = [name for name in EXERCISES if name.split(".")[0] in LESSONS]
+    assert [test["name"] for test in found["tests"]] == names
+    assert found["score"] == sum(test["score"] for test in found["tests"]) == len(names) - 1
+    assert {test["status"] for test in found["tests"]} == {"passed", "failed"}
+    assert found["extra_data"]["late_days"] == 2
+    other = results(learner, [learner / "s03.json"], policy=policy, own_numbers=True)
+    assert [t["visibility"] for t in other["tests"]] == ["visible"] * len(names) + ["hidden"]
+    late = results(learner, [learner / "s00.json"], policy=gradebook.Policy(LESSONS))
+    assert late["score"] == 0
+    for files in ([], [learner / "s04.json"], [learner / "s00.json", learner / "s01.json"]):
+        wrong = results(learner, files, policy=policy)
+        assert wrong["score"] == 0 and wrong["output"] and "tests" not in wrong
+    (learner / "submission_metadata.json").write_text("[")
+    assert results(learner, [learner / "s00.json"])["score"] > 0
+
+
+def test_an_autograder_is_a_package_and_two_programs(
+    learner: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(
+        [
+            "grade",
+            "--gradescope",
+            "auto",
+            "--lessons",
+            "0",
+            "1",
+            "--late-days",
+            "3",
+            "--own-numbers",
+        ]
+    )
+    folder = learner / "auto"
+    for name in ("setup.sh", "run_autograder"):
+        assert os.access(folder / name, os.X_OK)
+        subprocess.run(["bash", "-n", str(folder / name)], check=True)
+    run = (folder / "run_autograder").read_text()
+    assert "--late-days 3 --lessons 00 01 --own-numbers" in run
+    assert (folder / "floatbase/__init__.py").is_file() and (folder / "pyproject.toml").is_file()
+    with pytest.raises(SystemExit):
+        main(["grade", "--gradescope", "auto"])

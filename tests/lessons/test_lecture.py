@@ -1,0 +1,60 @@
+"""Questions for the lecture: four per lesson, with results and reasons from the lessons."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsers import browser_of_a_file
+
+from floatbase.lessons.publish.__main__ import main
+from floatbase.lessons.publish.site import lecture
+from floatbase.lessons.questions import all_questions
+
+browser = browser_of_a_file
+QUESTIONS = lecture.lecture_questions()
+
+
+def test_each_lesson_has_four_questions_with_a_result_and_a_reason() -> None:
+    assert set(QUESTIONS) == {question.lesson for question in all_questions().values()}
+    for asked in QUESTIONS.values():
+        assert len({one.question.name for one in asked}) == 4
+        for question, result, reason in asked:
+            assert "?" in question.text
+            assert len(reason.split()) > 3, question.name
+            if question.choices:
+                assert result in question.choices
+            else:
+                assert len(re.findall(r"\d+(?:\.\d+)?", result)) == question.count
+
+
+def test_page_and_slides_hold_all_questions(tmp_path: Path) -> None:
+    page = lecture.page()
+    main(["lecture", "--to", str(tmp_path / "slides.html")])
+    slides = (tmp_path / "slides.html").read_text(encoding="utf-8")
+    for asked in QUESTIONS.values():
+        for one in asked:
+            assert f"Answer ({one.question.name})" in page
+            assert f"<footer>{one.question.name}</footer>" in slides
+    assert slides.count("<section>") == 5 * len(QUESTIONS)
+    texts = re.sub(r"<script>.*</script>|<style>.*</style>|<math.*?</math>", "", slides, flags=re.S)
+    assert not re.search(r"[*$`]|\\\w", texts)  # no Markdown and no LaTeX is left
+    assert "http" not in re.sub(r'xmlns="[^"]*"', "", slides)
+
+
+@pytest.mark.front_end
+def test_keys_turn_the_pages_and_show_the_answer(tmp_path: Path, browser: Any) -> None:
+    lecture.write_slides(tmp_path / "slides.html")
+    page = browser.new_page()
+    page.goto((tmp_path / "slides.html").as_uri())
+    assert page.locator("section:visible h1").count() == 1
+    page.keyboard.press("ArrowRight")
+    answer = page.locator("section.now .answer")
+    assert not answer.is_visible()
+    page.keyboard.press(" ")
+    assert answer.is_visible() and "more" in answer.inner_text()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowLeft")
+    assert page.locator("section:visible").count() == 1

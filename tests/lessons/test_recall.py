@@ -1,0 +1,164 @@
+"""Recall: what was missed comes back soon, what was known later, and nothing else is asked."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import floatbase.__main__
+from floatbase.errors import InputError
+from floatbase.lessons import compare, predict, progress, recall
+from floatbase.lessons.predictions import is_right
+from floatbase.lessons.questions import all_questions
+from floatbase.lessons.recalling import PER_DAY, RECALLED, ask, due_questions, question_text
+
+START = datetime(2026, 3, 2, 9, tzinfo=UTC)
+WEEKS = {0: "00", 1: "01", 7: "02", 9: "03", 14: "04", 21: "05"}  # day -> lesson of that day
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Of a learner who has just begun."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+    return tmp_path
+
+
+def write(home: Path, entries: list[dict[str, Any]]) -> None:
+    (home / "progress.jsonl").write_text("\n".join(json.dumps(entry) for entry in entries))
+
+
+def settled(name: str, day: float, right: bool, sure: bool | None = None) -> dict[str, Any]:
+    """A line about a prediction, as `predict` and `compare` write it."""
+    time = (START + timedelta(days=day)).isoformat()
+    entry = {"said": 1.0 if right else 2.0, "is": 1.0, "unit": "N", "time": time}
+    return {name: entry | ({} if sure is None else {"sure": sure})}
+
+
+def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read() -> None:
+    known = all_questions()
+    assert len(set(RECALLED)) == len(RECALLED) >= 40
+    assert len(known) > 140
+    for name in RECALLED:
+        text = question_text(known[name])
+        assert text.startswith(name) and "?" in text
+        assert max(map(len, text.splitlines())) <= 88
+        assert "**" not in text and "Predict" not in text
+
+
+def test_four_weeks_of_a_learner(home: Path) -> None:
+    """A learner who knows two of three answers works through a lesson now and then."""
+    random = np.random.default_rng(1)
+    known = all_questions()
+    entries: list[dict[str, Any]] = []
+    taught: set[str] = set()
+    asked: dict[str, list[tuple[int, bool]]] = {}
+    per_day = []
+    for day in range(28):
+        write(home, entries)
+        now = START + timedelta(days=day, hours=1)
+        today = due_questions(now)
+        per_day.append(len(today))
+        assert {question.name for question in today} <= taught
+        for question in today:
+            right = bool(random.random() < 2 / 3)
+            asked.setdefault(question.name, []).append((day, right))
+            event = {"recalled": 1.0, "knew": right, "time": now.isoformat()}
+            entries.append({question.name: event})
+        if day in WEEKS:
+            names = [name for name in known if known[name].lesson == WEEKS[day]]
+            entries += [settled(name, day + 0.1, bool(random.random() < 0.5)) for name in names]
+            taught |= set(names)
+    assert per_day[0] == 0 and max(per_day) == PER_DAY
+    assert sum(per_day) > 28  # more than a question a day
+    assert len(asked) > 12
+    pauses: dict[bool, list[int]] = {True: [], False: []}
+    for days in asked.values():
+        for (before, right), (after, _) in pairwise(days):
+            pauses[right].append(after - before)
+    assert min(pauses[True]) >= 2 and min(pauses[False]) >= 1
+    assert np.mean(pauses[True]) > np.mean(pauses[False])
+
+
+@pytest.mark.parametrize(
+    ("right", "sure", "hours"),
+    [(True, None, 48), (False, None, 24), (False, True, 12), (True, True, 48)],
+)
+def test_a_question_rests_according_to_its_last_answer(
+    home: Path, right: bool, sure: bool | None, hours: int
+) -> None:
+    write(home, [settled("02.d", 0, right, sure)])
+    for off, asked in ((-1, []), (1, ["02.d"])):
+        now = START + timedelta(hours=hours + off)
+        assert [question.name for question in due_questions(now)] == asked
+
+
+def test_right_answers_double_the_pause(home: Path) -> None:
+    entries, day = [settled("02.d", 0, True)], 2.0
+    for pause in (4.0, 8.0, 16.0):
+        time = (START + timedelta(days=day)).isoformat()
+        entries.append({"02.d": {"recalled": 1.0, "knew": True, "time": time}})
+        write(home, entries)
+        assert due_questions(START + timedelta(days=day + pause - 0.1)) == []
+        assert len(due_questions(START + timedelta(days=day + pause + 0.1))) == 1
+        day += pause
+
+
+def test_what_was_missed_comes_first_and_lessons_are_mixed(home: Path) -> None:
+    names = ["01.a", "01.b", "01.d", "02.d", "03.h"]
+    write(home, [settled(name, 0, name != "03.h") for name in names])
+    asked = [question.name for question in due_questions(START + timedelta(days=5))]
+    assert asked == ["03.h", "01.a", "02.d"]
+
+
+def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recall()
+    assert "nothing to recall" in capsys.readouterr().out
+    predict("02.d", 10, unit="N")
+    predict("02.c", "they stay", choices=["they sink", "they stay", "they fly up"])
+    with pytest.raises(InputError, match=r"02\.d"):
+        recall("02.d", 43)  # its result has not been shown yet
+    compare("02.d", 43.1)
+    compare("02.c", "they fly up")
+    recall()
+    assert "nothing" in capsys.readouterr().out.splitlines()[-1]  # not on the same day
+    recall("02.d", 43)
+    recall("02.d", 12)
+    recall("02.d", "heavy")
+    recall("02.c", "they fly")
+    right, wrong, where, unusable, choice = capsys.readouterr().out.splitlines()
+    assert "right" in right and "43 N" in right and "not yet" in wrong and "lesson 02" in where
+    assert "number" in unusable and "they fly up" in choice
+    kept = [event["knew"] for event in progress.history()["02.d"] if "recalled" in event]
+    assert kept == [True, False]
+    assert progress.predictions()["02.d"]["said"] == 10  # predictions stay as they were
+
+
+def test_the_command_asks_what_is_due(
+    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    entry = {"said": 5, "is": [18, 12], "unit": "", "time": "2026-01-01T00:00:00+00:00"}
+    guess = {"01.e": {"said": "true", "is": "false"}}
+    write(home, [{"01.d": entry}, settled("02.d", -60, False), guess])
+    answers = iter(["18, 12", "", "__import__('os')"])
+    monkeypatch.setattr("builtins.input", lambda prompt: next(answers))
+    assert floatbase.__main__.main(["recall"]) == 0
+    assert {name: len(events) for name, events in progress.history().items()} == {
+        "01.d": 2, "02.d": 1, "01.e": 1,
+    }  # fmt: skip
+    assert progress.history()["01.d"][-1]["knew"] is True
+    ask(lambda prompt: (_ for _ in ()).throw(EOFError))
+
+
+def test_damaged_times_and_answers_do_no_harm(home: Path) -> None:
+    for time in ("", "x", 5, None, "9999-12-31T23:59"):
+        write(home, [{"02.d": {"said": 1.0, "is": 2.0, "unit": "N", "time": time}}])
+        due_questions()
+    write(home, [{"02.d": {"said": "text", "is": 2.0}}, {"02.d": {"recalled": 3, "knew": "yes"}}])
+    assert [question.name for question in due_questions()] == ["02.d"]
+    assert not is_right("text", 2.0, "")

@@ -1,0 +1,174 @@
+"""Answers on the site: judged in the browser, kept there, and read by review and grade."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsers import browser_of_a_file, served
+
+import floatbase.lessons.publish.site as site
+from floatbase.errors import InputError
+from floatbase.lessons import all_exercises, import_answers, progress, review
+from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook
+from floatbase.lessons.questions import all_questions
+
+browser = browser_of_a_file
+SCRIPT = Path(site.__file__).parent / "static" / "answers.js"
+
+
+class NoPictures:
+    def place(self, data: Any) -> None:
+        """No picture is shown."""
+
+
+def elements(lesson: str) -> list[str]:
+    """The forms of a lesson, as HTML."""
+    path = next(NOTEBOOKS.glob(f"{lesson}_*.ipynb"))
+    prepared = site.prepare_lesson(read_notebook(path), NoPictures(), {})
+    cells = [cell.source for cell in prepared.cells if "data-answers" in cell.source]
+    return [cell.removeprefix("```{raw} html\n").removesuffix("\n```") for cell in cells]
+
+
+def data_of(element: str) -> Any:
+    return json.loads(html.unescape(re.findall('data-answers="([^"]*)"', element)[0]))
+
+
+LESSONS = sorted({question.lesson for question in all_questions().values()})
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson: str) -> None:
+    cells = read_notebook(next(NOTEBOOKS.glob(f"{lesson}_*.ipynb"))).cells
+    code = [cell for cell in cells if cell.cell_type == "code"]
+    results = site.printed_results(code)
+    asked = [cell.source for cell in code if "predict" in cell.metadata.get("tags", [])]
+    forms = [site.prediction_form(source, results) for source in asked]
+    found = [data_of(form.source) for form in forms if form]
+    names = [name for name, question in all_questions().items() if question.lesson == lesson]
+    assert [data["name"] for data in found] == names
+    for data in found:
+        if data["choices"]:
+            assert data["right"] == data["result"] in data["choices"]
+        else:
+            numbers = data["result"] if isinstance(data["result"], list) else [data["result"]]
+            assert len(numbers) == data["count"] == len(data["right"])
+            assert all(a <= x <= b for x, (a, b) in zip(numbers, data["right"], strict=True))
+
+
+def test_exercises_of_a_few_numbers_have_a_form_and_the_judges_own_hints() -> None:
+    exercises = {}
+    for name, exercise in all_exercises().items():
+        if name in ("00.1", "01.1", "03.2", "09.2", "C.1"):
+            made = site.exercise_form(exercise)
+            exercises[name] = made and data_of(made.source)
+    assert exercises["01.1"] is None and exercises["03.2"] is None  # a matrix, and free forces
+    for name in ("00.1", "09.2", "C.1"):
+        judge = all_exercises()[name].judge
+        for answer, _ in getattr(judge, "examples")():  # noqa: B009
+            cases = exercises[name]["cases"]
+            fits = [c for c in cases if c["right"][0][0] <= float(answer) <= c["right"][0][1]]
+            assert fits[0]["text"] == judge(answer).text
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any]:
+    """A page with the forms of lessons 00 and 03."""
+    folder = tmp_path_factory.mktemp("answers")
+    forms = "\n".join(elements("03") + [e for e in elements("00") if "-exercise" in e])
+    (folder / "page.html").write_text(
+        f"<!doctype html><meta charset=utf-8>{forms}<script>{SCRIPT.read_text()}</script>"
+    )
+    with served(folder) as address:
+        opened = browser.new_context(accept_downloads=True).new_page()
+        faults: list[str] = []
+        opened.on("pageerror", lambda error: faults.append(str(error)))
+        opened.goto(f"{address}/page.html")
+        yield opened
+        assert faults == []
+
+
+def fill(form: Any, kind: str) -> str:
+    """Answer a question "right", "wrong" or with "nonsense", and return what the page says."""
+    data = json.loads(form.locator("xpath=..").get_attribute("data-answers"))
+    if data["choices"]:
+        wrong = next(choice for choice in data["choices"] if choice != data["result"])
+        answer = {"right": data["result"], "wrong": wrong, "nonsense": ""}[kind]
+        form.locator("select").select_option(answer)
+    else:
+        numbers = data["result"] if isinstance(data["result"], list) else [data["result"]]
+        texts = {
+            "right": ", ".join(map(str, numbers)),
+            "wrong": ", ".join(str(2 * x + 7) for x in numbers),
+            "nonsense": "heavy 40 mm",
+        }
+        form.locator("input[name=answer]").fill(texts[kind])
+    form.locator("button").click()
+    return str(form.locator("output").inner_text())
+
+
+@pytest.mark.front_end
+def test_a_reader_answers_lesson_03_reloads_and_hands_in(
+    page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forms = page.locator(".answers-prediction form")
+    names = [name for name, question in all_questions().items() if question.lesson == "03"]
+    assert forms.count() == len(names)
+    for i, form in enumerate(forms.all()):
+        said = fill(form, "nonsense")
+        assert "Write" in said or "Choose" in said
+        assert page.evaluate("localStorage.length") == int(i > 0)
+        if i % 3 == 0:
+            form.locator("input[name=sure]").check()
+        assert "not right" in fill(form, "wrong")
+        if i % 2:
+            assert ": right" in fill(form, "right")
+    exercise = page.locator(".answers-exercise form")
+    for answer, shown in (("1,2", "Write"), ("157.8", "weight alone"), ("189.97", "Right")):
+        exercise.locator("input").fill(answer)
+        exercise.locator("button").click()
+        assert shown in exercise.locator("output").inner_text()
+
+    before = [form.locator("output").inner_text() for form in forms.all()]
+    page.reload()
+    assert [form.locator("output").inner_text() for form in forms.all()] == before
+    rows = [row.inner_text().split("\t") for row in page.locator("tr").all()][1:]
+    sure = [name for i, name in enumerate(names) if i % 3 == 0 and not i % 2]
+    assert [row[0] for row in rows if row[3] == "sure"] == sure == [row[0] for row in rows[:3]]
+    calibration = f"when you were sure {len(names[::3]) - len(sure)} of {len(names[::3])} times"
+    assert calibration in page.locator(".answers-review p").inner_text()
+
+    page.locator(".answers-review input").fill("Ada Lovelace")
+    with page.expect_download() as download:
+        page.locator(".answers-review button").click()
+    assert download.value.suggested_filename == "answers-Ada_Lovelace.json"
+    path = tmp_path / "answers.json"
+    download.value.save_as(path)
+
+    graded = grades.grade_file(path)
+    assert (graded.name, graded.predicted) == ("Ada Lovelace", len(names))
+    assert {(r.exercise, r.result, r.tries) for r in graded.results if r.tries} == {
+        ("00.1", "right", 2)
+    }
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    import_answers(path)
+    import_answers(path)  # adds nothing
+    assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
+    capsys.readouterr()
+    review("03")
+    _, *table, calibration = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in table][: len(sure)] == sure
+    assert f"of {len(names[::3])}" in calibration
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"form": "answers to the floatbase course"}'])
+def test_another_file_is_not_imported(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    for path in (tmp_path / "a.json", tmp_path / "none.json", 5):
+        with pytest.raises(InputError, match="answers|read"):
+            import_answers(path)  # type: ignore[arg-type]
