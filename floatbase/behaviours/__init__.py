@@ -7,7 +7,9 @@ from floatbase.behaviours.footholds import (
     support_margin,
 )
 from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.horizon import HorizonMotion, HorizonQP
 from floatbase.behaviours.lipm import LIPM, CoMPlan
+from floatbase.behaviours.mpc import MPC
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.plan import StepPlan
@@ -18,9 +20,12 @@ from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
     "LIPM",
+    "MPC",
     "CoMPlan",
     "Gains",
     "Gait",
+    "HorizonMotion",
+    "HorizonQP",
     "Stand",
     "StepPlan",
     "Swing",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import cos, inf, sin
@@ -61,6 +61,7 @@ from floatbase.objectives import Task
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
+Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
 _EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
@@ -178,6 +179,10 @@ class Walk:
     __setattr__ = refuse_new_attributes
     waits_for_weight = True
     """Whether a new gait begins later if the weight must first shift."""
+    may_fly = False
+    """Whether all feet may be in the air at the same time, and the body need not sway."""
+    force_weight: float | None = None
+    """Weight of a task on the contact forces in each stance [1/N²]; None for no such task."""
 
     def __init__(
         self,
@@ -246,7 +251,7 @@ class Walk:
     @gait.setter
     def gait(self, gait: Gait) -> None:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
-        if len(gait.feet) == len(self._all_contacts):
+        if len(gait.feet) == len(self._all_contacts) and not self.may_fly:
             check_always_supported(gait)
         if hasattr(self, "_controllers"):  # the constructor has checked its arguments
             self._prepare(gait)
@@ -416,6 +421,7 @@ class Walk:
         controller = self._controllers[active.plan.stance]
         targets = controller.targets_at(t)
         active.write(t, com, com_velocity, targets)
+        self._adjust_targets(q, v, t, active, controller.targets, targets)
         self._time = t
         return controller(q, v, t, targets)
 
@@ -450,7 +456,7 @@ class Walk:
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
-        self._controllers = StanceControllers(self._posture, self._options)
+        self._controllers = StanceControllers(self._posture, self._options, self.force_weight)
         data = self._robot.model.createData()
         self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
         self._start_time = self._next_change = -inf
@@ -467,7 +473,8 @@ class Walk:
         """Check the friction that a gait needs, and make the controllers of its stances."""
         limits = self._controllers.limits
         facets, inner = limits.facets, limits.inner_approximation
-        check_friction(gait, self._posture, self._all_contacts, facets, inner)
+        if not self.may_fly:
+            check_friction(gait, self._posture, self._all_contacts, facets, inner)
         self._controllers.prepare(gait)
 
     def _limit_speed(self, stacklevel: int) -> None:
@@ -538,9 +545,7 @@ class Walk:
             )  # fmt: skip
         finally:
             self._planning_path = None
-        if self._options.modify_plan is not None:
-            changed = self._options.modify_plan(plan, state)
-            plan = as_instance("the result of modify_plan", changed, StepPlan)
+        plan = self._modified(plan, state)
         self._history.append(plan)
         self._update_lean(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
@@ -550,6 +555,18 @@ class Walk:
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._clock.next_change(t, plan.replan_time)
+
+    def _modified(self, plan: StepPlan, state: State) -> StepPlan:
+        """Return the plan to use instead of a new plan at the measured state."""
+        if self._options.modify_plan is None:
+            return plan
+        changed = self._options.modify_plan(plan, state)
+        return as_instance("the result of modify_plan", changed, StepPlan)
+
+    def _adjust_targets(
+        self, q: Array, v: Array, t: float, active: ActivePlan, entries: Entries, targets: Array
+    ) -> None:
+        """Change the targets of one control step; entries: those of each task. `MPC` does so."""
 
     @property
     def _leaning_pose(self) -> BodyPose:
