@@ -250,7 +250,7 @@ class Gait(Value):
     def flying_trot(
         robot: Robot, stance: float = 0.16, flight: float = 0.04, start: float = 1.0
     ) -> Gait:
-        """Return a flying trot: between two diagonal stances of a quadruped, all feet are in the air.
+        """Return a flying trot, in which all feet are in the air between two diagonal stances.
 
         `Walk` refuses this gait, because no foot stands in flight; use `MPC`.
 
@@ -455,22 +455,31 @@ class Gait(Value):
         return min(times)
 
 
+def flight_offset(gait: Gait) -> float | None:
+    """Return the fraction of the period at which all feet are in the air; None if one stands.
+
+    It suffices to check each lift-off: the fewest feet stand when one has just lifted off.
+    """
+    endless = replace(gait, stop=None)
+    if any(gait.next_swing(foot, gait.start) for foot in gait.feet):
+        for offset in gait.offsets.values():
+            if not endless.stance(gait.start + (1.0 + offset) * gait.period):
+                return offset
+    return None
+
+
 def check_always_supported(gait: Gait) -> None:
     """Raise `InputError` for a gait that has all feet in the air at some time.
 
-    All contacts are assumed to be feet of the gait. It suffices to check each lift-off: the fewest
-    feet stand when one has just lifted off.
+    All contacts are assumed to be feet of the gait.
     """
-    if not any(gait.next_swing(foot, gait.start) for foot in gait.feet):
-        return
-    endless = replace(gait, stop=None)
-    for offset in gait.offsets.values():
-        if not endless.stance(gait.start + (1.0 + offset) * gait.period):
-            raise InputError(
-                f"This gait has all feet in the air at the fraction {offset:g} of its period. At "
-                "least one foot must stand at any time. Use other offsets or a shorter swing, or use MPC, "
-                "which can fly."
-            )
+    offset = flight_offset(gait)
+    if offset is not None:
+        raise InputError(
+            f"This gait has all feet in the air at the fraction {offset:g} of its period. At least "
+            "one foot must stand at any time. Use other offsets or a shorter swing, or use MPC, "
+            "which can fly."
+        )
 
 
 def _in_turn(

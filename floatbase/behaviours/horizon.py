@@ -22,7 +22,7 @@ Eliminating the states leaves one affine map from all forces u to all states of 
 and the forces follow from a quadratic program with friction pyramids:
 
     (M6)  min  ½ Σ_k ‖x_k - x_k,ref‖²_Q + ½ R ‖u‖²
-    (M7)  |λ_x| ≤ μ λ_z,  |λ_y| ≤ μ λ_z,  0 ≤ λ_z ≤ λ_max
+    (M7)  |λ_x| ≤ μ λ_z,  |λ_y| ≤ μ λ_z,  0 ≤ λ_z ≤ max_load m g
 
 A foot in the air has no force in u. If all feet are in the air, the horizon only predicts the
 flight, and forces before it and after it decide how the robot takes off and lands.
@@ -44,8 +44,8 @@ from floatbase.qp import QP
 
 # of (Θ, p, ω, ṗ): heights and attitudes matter, and horizontal velocity more than position
 STATE_WEIGHTS = (25.0, 25.0, 10.0, 2.0, 2.0, 50.0, 0.3, 0.3, 0.3, 0.5, 0.5, 0.3)
-FORCE_WEIGHT = 0.02  # of a force in units of the robot's weight
-THETA, P, OMEGA, P_DOT = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+# entries of the state
+THETA, COM, OMEGA, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 _PYRAMID = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0], [0, 0, -1.0], [0, 0, 1]])
 _NO_BOUND = -1e30  # DAQP treats this as no bound
 _NO_INERTIA = "inertia must be symmetric and positive definite [kg·m²]."
@@ -82,15 +82,14 @@ class HorizonQP(Value):
         Length of an interval [s].
     mu : float, optional
         Friction coefficient of the pyramids [-].
-    max_force : float, optional
-        Largest normal force of a foot [N]; by default twice the weight.
+    max_load : float, optional
+        Largest normal force of a foot, as a multiple of the weight [-].
     gravity : float, optional
         Gravitational acceleration [m/s²].
     state_weights : array_like, shape (12,), optional
         Diagonal of Q, the weights of (Θ, p, ω, ṗ) [1/rad², 1/m², ...].
     force_weight : float, optional
-        Weight R of the forces [1/N²]; by default it is inversely proportional to the square of the
-        weight, so that robots of all sizes behave alike.
+        Weight of the squared forces, in units of the weight; R is force_weight / (m g)² [-].
 
     Notes
     -----
@@ -116,12 +115,12 @@ class HorizonQP(Value):
     inertia: Array = field(metadata=checked(as_array, (3, 3), "kg·m²"))
     dt: float = field(default=0.03, metadata=checked(as_positive, "s", maximum=1.0))
     mu: float = field(default=0.6, metadata=checked(as_positive, ""))
-    max_force: float | None = None
+    max_load: float = field(default=2.0, metadata=checked(as_positive, ""))
     gravity: float = field(default=9.81, metadata=checked(as_positive, "m/s²"))
     state_weights: Array = field(
         default_factory=lambda: np.array(STATE_WEIGHTS), metadata=checked(as_array, (12,))
     )
-    force_weight: float | None = None
+    force_weight: float = field(default=0.02, metadata=checked(as_positive, ""))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -130,14 +129,6 @@ class HorizonQP(Value):
         inertia = self.inertia
         if not np.allclose(inertia, inertia.T) or np.linalg.eigvalsh(inertia)[0] <= 0.0:
             raise InputError(_NO_INERTIA)
-        weight = self.mass * self.gravity
-        for name, default, unit in (
-            ("max_force", 2.0 * weight, "N"),
-            ("force_weight", FORCE_WEIGHT / weight**2, "1/N²"),
-        ):
-            value = getattr(self, name)
-            value = default if value is None else as_positive(name, value, unit)
-            object.__setattr__(self, name, value)
 
     def solve(
         self,
@@ -196,9 +187,10 @@ class HorizonQP(Value):
     def _matrices(self, S: Array, error: Array) -> tuple[Array, Array, Array, Array]:
         """Return H, g, G and h of (M6), (M7), where `error` is s minus the reference."""
         QS, n_forces = np.tile(self.state_weights, len(S) // 12)[:, None] * S, S.shape[1] // 3
-        H = S.T @ QS + self.force_weight * np.eye(S.shape[1])
+        weight = self.mass * self.gravity
+        H = S.T @ QS + self.force_weight / weight**2 * np.eye(S.shape[1])  # (M6)
         faces = _PYRAMID - np.outer([1, 1, 1, 1, 0, 0], [0, 0, self.mu])  # (M7)
-        h = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, self.max_force], n_forces)
+        h = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, self.max_load * weight], n_forces)
         return H, error @ QS, np.kron(np.eye(n_forces), faces), h
 
     def _prediction(
@@ -221,18 +213,18 @@ class HorizonQP(Value):
         S, s = np.zeros((n, 12, 3 * int(stands.sum()))), np.zeros((n, 12))
         X, column = np.zeros(S.shape[1:]), 0
         fall = np.zeros(12)
-        fall[P], fall[P_DOT] = [0, 0, -self.gravity * dt**2 / 2], [0, 0, -self.gravity * dt]
+        fall[COM], fall[VELOCITY] = [0, 0, -self.gravity * dt**2 / 2], [0, 0, -self.gravity * dt]
         inverse = np.linalg.inv(self.inertia)
         for k in range(n):
             Rz = rotation_z(reference[k, 2])
             A = np.eye(12)
-            A[THETA, OMEGA], A[P, P_DOT] = dt * Rz.T, dt * np.eye(3)  # (M1)
+            A[THETA, OMEGA], A[COM, VELOCITY] = dt * Rz.T, dt * np.eye(3)  # (M1)
             X, x = A @ X, A @ x + fall
             for r in feet[k, stands[k]]:
                 turn = Rz @ inverse @ Rz.T @ _cross_matrix(r)  # ω̇ of a unit force, (M2)
                 force = slice(column, column + 3)
-                X[OMEGA, force], X[P_DOT, force] = dt * turn, dt / m * np.eye(3)  # (M3)
-                X[THETA, force], X[P, force] = dt**2 / 2 * Rz.T @ turn, dt**2 / 2 / m * np.eye(3)
+                X[OMEGA, force], X[VELOCITY, force] = dt * turn, dt / m * np.eye(3)  # (M3)
+                X[THETA, force], X[COM, force] = dt**2 / 2 * Rz.T @ turn, dt**2 / 2 / m * np.eye(3)
                 column += 3
             S[k], s[k] = X, x
         return S.reshape(12 * n, -1), s.ravel(), stands, (s - reference).ravel()

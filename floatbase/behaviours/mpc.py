@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import cos, inf, pi, remainder
 from typing import Any
@@ -12,11 +13,12 @@ import pinocchio as pin
 
 from floatbase._validation import Array, as_instance, as_integer, as_positive
 from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
-from floatbase.behaviours.horizon import OMEGA, P, P_DOT, THETA, HorizonMotion, HorizonQP
+from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, flight_offset
+from floatbase.behaviours.horizon import COM, OMEGA, THETA, VELOCITY, HorizonMotion, HorizonQP
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import flat_foot_names
 from floatbase.behaviours.plan import StepPlan
+from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import com_target
 from floatbase.behaviours.walk import Entries, Walk
 from floatbase.dynamics import Contacts
@@ -35,9 +37,8 @@ class MPC(Walk):
     Gait, footholds, swings and options are those of `Walk`. The difference is the motion of the
     body. Every `solve_period`, a `HorizonQP` computes the contact forces of the next `n` intervals
     from the measured state. The whole-body controller follows the accelerations and the forces of
-    the first interval. All feet may be in the air at the same time, so that `Gait.flying_trot` and
-    `Gait.pronk` are possible. Friction for a swaying body is not needed, since the body may also
-    turn.
+    the first interval. All feet may be in the air at the same time, as in `Gait.flying_trot` and
+    `Gait.pronk`.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ class MPC(Walk):
     dt : float, optional
         Length of an interval [s].
     solve_period : float, optional
-        Time between two solutions [s]. A change of stance also needs a new solution.
+        Time between two solutions, at most `dt` [s]. A change of stance also needs a new solution.
     **options : object
         Options of `Walk`. Here `ramp` is 0 by default, because the horizon loads the feet.
 
@@ -68,8 +69,9 @@ class MPC(Walk):
     Notes
     -----
     The horizon is that of [DiCarlo2018]_. As in [Kim2019]_, a whole-body controller follows its
-    forces. Footholds and their adjustment are those of `Walk`, for a pendulum whose zero-moment
-    point moves along the path.
+    forces. The horizon tracks the pendulum of `Walk`, which also adjusts the footholds. In a gait
+    with flight, the pendulum's zero-moment point moves along the path, because a robot in the air
+    has none.
 
     Examples
     --------
@@ -81,7 +83,10 @@ class MPC(Walk):
     MPC(go2, 4 feet, 1 and 0 m/s)
     """
 
-    may_fly, waits_for_weight = True, False
+    may_fly = True
+    _made_anew = Walk._made_anew | {
+        "_horizon", "_contact_offsets", "_motion", "_solved", "_measured",
+    }  # fmt: skip
 
     def __init__(
         self,
@@ -105,9 +110,9 @@ class MPC(Walk):
                 f"Use Walk for a robot with soles."
             )
         self._n = as_integer("n", n, 1, 100)
-        self._solve_period = as_positive("solve_period", solve_period, "s", maximum=1.0)
         self._dt = as_positive("dt", dt, "s", maximum=1.0)
-        self.force_weight = _FORCE_FRACTION * 10.0 / robot.mass**2
+        self._solve_period = as_positive("solve_period", solve_period, "s", maximum=self._dt)
+        self._force_weight = _FORCE_FRACTION * 10.0 / robot.mass**2
         super().__init__(robot, contacts, gait, velocity, yaw_rate, ramp=ramp, **options)
 
     @property
@@ -139,21 +144,17 @@ class MPC(Walk):
     def _forget_plan(self) -> None:
         super()._forget_plan()
         self._motion: HorizonMotion | None = None
-        self._solved = -inf, None  # time, and the plan then
+        self._solved: tuple[float, StepPlan | None] = -inf, None  # time, and the plan then
 
     def _modified(self, plan: StepPlan, state: State) -> StepPlan:
-        """Let the pendulum follow the path: its zero-moment point does not sway from foot to foot.
-
-        The horizon tracks this motion, and the feet in the air correct deviations from it.
-        """
-        t = plan.time
-        times = t + _PATH_STEP * np.arange(_PATH_STEPS + 1)
-        points = [plan.path.moved(self._desired, time).position for time in times]
-        segments = [
-            (times[i], times[i + 1], points[i], points[i + 1]) for i in range(_PATH_STEPS)
-        ]
-        pendulum = LIPM(segments, state.com[:2], self.omega)
-        return super()._modified(replace(plan, plan=pendulum), state)
+        """Let the pendulum of a gait with flight follow the path, without a sway."""
+        gait = self._clock.gait
+        if len(gait.feet) == len(self._all_contacts) and flight_offset(gait) is not None:
+            times = plan.time + _PATH_STEP * np.arange(_PATH_STEPS + 1)
+            points = [plan.path.moved(self._desired, time).position for time in times]
+            segments = list(zip(times[:-1], times[1:], points[:-1], points[1:], strict=True))
+            plan = replace(plan, plan=LIPM(segments, state.com[:2], self.omega))
+        return super()._modified(plan, state)
 
     def _adjust_targets(
         self, q: Array, v: Array, t: float, active: ActivePlan, entries: Entries, targets: Array
@@ -165,7 +166,7 @@ class MPC(Walk):
         s, motion = t - self._solved[0], self._motion
         assert motion is not None
         x, (R, c, turning, velocity) = motion.states[0], self._measured
-        a, alpha = (x[P_DOT] - velocity) / self._dt, (x[OMEGA] - turning) / self._dt
+        a, alpha = (x[VELOCITY] - velocity) / self._dt, (x[OMEGA] - turning) / self._dt
         R = pin.exp3(turning * s + alpha * s * s / 2.0) @ R
         com = c + velocity * s + a * s * s / 2.0, velocity + a * s, a
         targets[entries["centre of mass"]] = np.concatenate(com)
@@ -183,7 +184,7 @@ class MPC(Walk):
         theta = pin.rpy.matrixToRpy(R @ self._posture.rotation("base").T)
         theta[2] = reference[0, 2] + remainder(theta[2] - reference[0, 2], 2.0 * pi)
         feet, stance = self._schedule(state, t, active)
-        feet -= np.concatenate([[state.com], reference[:-1, P]])[:, None]
+        feet -= np.concatenate([[state.com], reference[:-1, COM]])[:, None]
         x = np.concatenate([theta, state.com, turning, state.com_velocity])
         self._motion = self._horizon.solve(x, reference, feet, stance)
         self._solved = t, active.plan
@@ -195,7 +196,7 @@ class MPC(Walk):
             time = t + (k + 1) * self._dt
             path = active.path.moved(self._desired, time)
             row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
-            row[P], row[P_DOT], _ = com_target(self._posture, pose, active.plan, time)
+            row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
         return reference
 
     def _schedule(
@@ -221,9 +222,12 @@ class MPC(Walk):
                 points[k, i], stance[k, i] = point + offset, times is None
         return points, stance
 
-    def _landing(self, foot: str, touchdown: float, before: Array, swings: Any) -> Array:
+    def _landing(
+        self, foot: str, touchdown: float, before: Array, swings: Mapping[str, SwingPath]
+    ) -> Array:
         """Return where a foot will stand after a touchdown [s]; before: where it stood before."""
         swing = swings.get(foot)
         if swing is not None and abs(swing.touchdown - touchdown) < TIME_TOLERANCE:
             return np.array(swing.end)
-        return np.array([*self._options.foothold(foot, touchdown, self)[:2], before[2]])
+        foothold = np.asarray(self._options.foothold(foot, touchdown, self), float)
+        return np.array([*foothold[:2], before[2]])

@@ -67,8 +67,6 @@ _EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an ed
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
-# attributes of a walk that its copies do not share
-_MADE_ANEW = {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -180,9 +178,12 @@ class Walk:
     waits_for_weight = True
     """Whether a new gait begins later if the weight must first shift."""
     may_fly = False
-    """Whether all feet may be in the air at the same time, and the body need not sway."""
-    force_weight: float | None = None
-    """Weight of a task on the contact forces in each stance [1/N²]; None for no such task."""
+    """Whether all feet may be in the air at the same time."""
+    # attributes that copies do not share
+    _made_anew = frozenset(
+        {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
+    )
+    _force_weight: float | None = None  # 1/N², of a task on the contact forces
 
     def __init__(
         self,
@@ -456,7 +457,7 @@ class Walk:
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
-        self._controllers = StanceControllers(self._posture, self._options, self.force_weight)
+        self._controllers = StanceControllers(self._posture, self._options, self._force_weight)
         data = self._robot.model.createData()
         self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
         self._start_time = self._next_change = -inf
@@ -587,7 +588,7 @@ class Walk:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
-        return {key: value for key, value in vars(self).items() if key not in _MADE_ANEW}
+        return {key: value for key, value in vars(self).items() if key not in self._made_anew}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
