@@ -1,4 +1,4 @@
-"""Legged locomotion: gaits, swing paths, footholds, centre-of-mass plans, `Walk` and `Stand`."""
+"""Legged locomotion: gaits, footholds, centre-of-mass plans, `Walk`, `Stand`, `MPC` and `Jump`."""
 
 from floatbase.behaviours.footholds import (
     capture_point,
@@ -8,6 +8,7 @@ from floatbase.behaviours.footholds import (
 )
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.horizon import HorizonMotion, HorizonQP
+from floatbase.behaviours.jump import Jump, JumpPlan
 from floatbase.behaviours.lipm import LIPM, CoMPlan
 from floatbase.behaviours.mpc import MPC
 from floatbase.behaviours.options import Gains
@@ -26,6 +27,8 @@ __all__ = [
     "Gait",
     "HorizonMotion",
     "HorizonQP",
+    "Jump",
+    "JumpPlan",
     "Stand",
     "StepPlan",
     "Swing",

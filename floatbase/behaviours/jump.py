@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import cos, e, pi, sqrt
 from typing import Any, Literal, TypeAlias
 
@@ -29,7 +30,8 @@ from floatbase.robots import Robot, State
 Phase: TypeAlias = Literal["stand", "crouch", "push", "flight", "landing"]
 
 # fractions of the height of the centre of mass above the feet
-_CROUCH, _EXTENSION, _TUCK = 0.3, 0.05, 0.15
+_CROUCH, _TUCK = 0.3, 0.15
+_MIN_HEIGHT, _MAX_SIZE = 0.02, 10.0  # m: a larger number must be in another unit
 _CROUCH_TIME = 0.4  # s
 _BODY_WEIGHT = 1e2  # of the tasks on the body
 _SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
@@ -47,9 +49,9 @@ class JumpPlan:
     ----------
     crouch, push, take_off, touchdown : float
         Times at which the phases begin, and at which the feet are planned to land [s].
-    depth, extension : float
-        How far the centre of mass is below its standing height before the push, and above it at
-        take-off [m].
+    depth : float
+        How far the centre of mass is below its standing height before the push [m]. At take-off, it
+        is at its standing height.
     velocity : ndarray, shape (2,)
         Velocity of the centre of mass at take-off, forwards and upwards [m/s].
     acceleration : ndarray, shape (2,)
@@ -63,7 +65,6 @@ class JumpPlan:
     take_off: float
     touchdown: float
     depth: float
-    extension: float
     velocity: Array
     acceleration: Array
     lead: float
@@ -72,11 +73,12 @@ class JumpPlan:
     def of(height: float, distance: float, start: float, leg: float, gravity: float) -> JumpPlan:
         """Plan a jump in closed form.
 
-        With the take-off velocity (v_x, v_z) and the stroke s of the push at constant acceleration,
+        With the take-off velocity (v_x, v_z) and the depth d of the crouch, from which the robot
+        pushes off at constant acceleration,
 
-            (J1)  v_z = √(2 g (height - extension)),     flight T = 2 v_z / g
-            (J2)  push t = 2 s / v_z,                    a = (v_x, v_z) / t
-            (J3)  distance = v_x (t / 2 + T + 1 / ω),    lead = v_x / ω
+            (J1)  v_z = √(2 g height),  flight T = 2 v_z / g
+            (J2)  push t = 2 d / v_z,     a = (v_x, v_z) / t
+            (J3)  distance = v_x (t / 2 + T + 1 / ω),  lead = v_x / ω
 
         where v_x / ω is the capture point of a pendulum of the height `leg`: there the feet land.
 
@@ -93,16 +95,15 @@ class JumpPlan:
         gravity : float
             Gravitational acceleration [m/s²].
         """
-        depth, extension = _CROUCH * leg, _EXTENSION * leg
-        upwards = sqrt(2.0 * gravity * (height - extension))  # (J1)
-        flight, push = 2.0 * upwards / gravity, 2.0 * (depth + extension) / upwards  # (J2)
+        depth, upwards = _CROUCH * leg, sqrt(2.0 * gravity * height)  # (J1)
+        flight, push = 2.0 * upwards / gravity, 2.0 * depth / upwards  # (J2)
         lead_time = sqrt(leg / gravity)  # 1 / ω
         forwards = distance / (push / 2.0 + flight + lead_time)  # (J3)
         velocity = np.array([forwards, upwards])
         begin = start + _CROUCH_TIME
         return JumpPlan(
-            start, begin, begin + push, begin + push + flight, depth, extension, velocity,
-            velocity / push, forwards * lead_time,
+            start, begin, begin + push, begin + push + flight, depth, velocity, velocity / push,
+            forwards * lead_time,
         )  # fmt: skip
 
     def com_offset(self, t: float) -> tuple[Array, Array, Array]:
@@ -169,6 +170,11 @@ class Jump:
     """
 
     __setattr__ = refuse_new_attributes
+    _phase: Phase
+    _time: float  # s, of the last control step
+    _acceleration: Array  # q̈ then
+    _com: Array  # at take-off or touchdown
+    _com_velocity: Array
 
     def __init__(
         self,
@@ -186,9 +192,8 @@ class Jump:
         self._standing = standing = robot.standing()
         centre = contacts.positions(standing).mean(axis=0)
         leg = float(standing.com[2] - centre[2])
-        minimum = 2.0 * _EXTENSION * leg
-        height = as_number("height", height, "m", minimum, 10.0)
-        distance = as_number("distance", distance, "m", -10.0, 10.0)
+        height = as_number("height", height, "m", _MIN_HEIGHT, _MAX_SIZE)
+        distance = as_number("distance", distance, "m", -_MAX_SIZE, _MAX_SIZE)
         start = as_positive("start", start, "s", allow_zero=True)
         self._plan = JumpPlan.of(height, distance, start, leg, robot.gravity)
         self._leg, self._com_offset = leg, standing.com - [*centre[:2], 0.0]
@@ -255,9 +260,9 @@ class Jump:
 
     def _restart(self) -> None:
         """Begin again."""
-        self._phase: Phase = "stand"
+        self._phase = "stand"
         self._time, self._acceleration = -np.inf, np.zeros(self._robot.nv)
-        self._com = self._com_velocity = np.zeros(3)  # at take-off or touchdown
+        self._com = self._com_velocity = np.zeros(3)
         self._since, self._goal = 0.0, self._standing.com
 
     def _observe(self, q: Array, v: Array) -> None:
@@ -295,15 +300,15 @@ class Jump:
         self._phase, self._since = phase, t
         self._com, self._com_velocity = state.com, state.com_velocity
 
+    def _posture_target(self, t: float) -> tuple[Array, Array, Array]:
+        """Return the target of the posture task, which `_observe` sets."""
+        return self._posture
+
     def _com_target(self, t: float) -> tuple[Array, Array, Array]:
         """Return the target of the centre of mass at t [s]."""
         if self._phase != "landing":
-            return tuple(
-                np.array([part[0], 0.0, part[1]]) + base
-                for part, base in zip(
-                    self._plan.com_offset(t), (self._standing.com, 0.0, 0.0), strict=True
-                )
-            )
+            planned = [np.array([part[0], 0.0, part[1]]) for part in self._plan.com_offset(t)]
+            return self._standing.com + planned[0], planned[1], planned[2]
         # critical damping: the body sinks by v / (e rate), as far as in the crouch
         rate = max(
             self._plan.velocity[1] / (e * self._plan.depth), sqrt(self._robot.gravity / self._leg)
@@ -323,7 +328,7 @@ class Jump:
         w = u * (1.0 - u)
         fraction, rate, bend = minimum_jerk(u)
         fall = np.array([0.0, 0.0, -gravity])
-        last = standing.point(foot) - standing.com + [plan.lead, 0.0, -plan.extension]
+        last = standing.point(foot) - standing.com + [plan.lead, 0.0, 0.0]
         first = last - [plan.lead + self._plan.com_offset(plan.take_off)[0][0], 0.0, 0.0]
         tuck = np.array([0.0, 0.0, _TUCK * self._leg])
         change = last - first
@@ -338,16 +343,16 @@ class Jump:
     def _controller(self, contacts: Contacts, **options: Any) -> WholeBodyController:
         """Return the controller of a phase."""
         standing = self._standing
-        tasks: list[Task] = [PostureTask(lambda t: self._posture, weight=1e-2)]
+        rotation, weight = standing.frame_pose("base").rotation, _BODY_WEIGHT
+        tasks: list[Task] = [
+            PostureTask(self._posture_target, weight=1e-2),
+            OrientationTask("base", rotation, kp=200.0, weight=weight if len(contacts) else 1.0),
+        ]
         if len(contacts):
-            rotation = standing.frame_pose("base").rotation
-            tasks.append(OrientationTask("base", rotation, kp=200.0, weight=_BODY_WEIGHT))
             tasks.append(CoMTask(self._com_target, kp=150.0, weight=_BODY_WEIGHT))
         else:
             for foot in self._all_contacts.names:
-                tasks.append(
-                    FrameTask(foot, lambda t, foot=foot: self._foot_target(foot, t), kp=600.0)
-                )
+                tasks.append(FrameTask(foot, partial(self._foot_target, foot), kp=600.0))
             for foot in sorted(flat_foot_names(self._all_contacts)):
                 tasks.append(OrientationTask(foot, standing.frame_pose(foot).rotation, kp=600.0))
         return WholeBodyController(self._robot, contacts, tasks, **{**options, **self._options})
@@ -369,12 +374,14 @@ class Jump:
                 f"{what} needs a friction coefficient of {slope:.2f} in every direction, but the "
                 f"contacts allow {mu:.2f}. Use a smaller distance."
             )
-        q, v, h = np.array(self._standing.q), np.zeros(robot.nv), _DRY_RUN_STEP
+        q, h = np.array(self._standing.q), _DRY_RUN_STEP
+        v: Array = np.zeros(robot.nv)
         joints, limits = slice(robot.nv - robot.d, None), JointLimits.of(robot)
         motor_limits = self._options.get("torque_limits")
         torque_limits = robot.torque_limits if motor_limits is None else motor_limits
-        needed, largest = np.zeros((2, robot.d)), np.array(
-            [np.broadcast_to(torque_limits, robot.d), limits.velocity]
+        needed, largest = (
+            np.zeros((2, robot.d)),
+            np.array([np.broadcast_to(torque_limits, robot.d), limits.velocity]),
         )
         for t in np.arange(plan.crouch, plan.take_off, h):
             self._observe(q, v)
