@@ -214,17 +214,17 @@ class HorizonQP(Value):
         X, column = np.zeros(S.shape[1:]), 0
         fall = np.zeros(12)
         fall[COM], fall[VELOCITY] = [0, 0, -self.gravity * dt**2 / 2], [0, 0, -self.gravity * dt]
-        inverse = np.linalg.inv(self.inertia)
+        inverse, unit, A = np.linalg.inv(self.inertia), np.eye(3), np.eye(12)
+        A[COM, VELOCITY] = dt * unit
         for k in range(n):
             Rz = rotation_z(reference[k, 2])
-            A = np.eye(12)
-            A[THETA, OMEGA], A[COM, VELOCITY] = dt * Rz.T, dt * np.eye(3)  # (M1)
+            A[THETA, OMEGA] = dt * Rz.T  # (M1)
             X, x = A @ X, A @ x + fall
             for r in feet[k, stands[k]]:
                 turn = Rz @ inverse @ Rz.T @ _cross_matrix(r)  # ω̇ of a unit force, (M2)
                 force = slice(column, column + 3)
-                X[OMEGA, force], X[VELOCITY, force] = dt * turn, dt / m * np.eye(3)  # (M3)
-                X[THETA, force], X[COM, force] = dt**2 / 2 * Rz.T @ turn, dt**2 / 2 / m * np.eye(3)
+                X[OMEGA, force], X[VELOCITY, force] = dt * turn, dt / m * unit  # (M3)
+                X[THETA, force], X[COM, force] = dt**2 / 2 * Rz.T @ turn, dt**2 / 2 / m * unit
                 column += 3
             S[k], s[k] = X, x
         return S.reshape(12 * n, -1), s.ravel(), stands, (s - reference).ravel()

@@ -191,10 +191,10 @@ class MPC(Walk):
 
     def _reference(self, t: float, active: ActivePlan) -> Array:
         """Return the desired state at the end of each interval, shape (n, 12)."""
-        reference, pose = np.zeros((self._n, 12)), self._leaning_pose
+        reference, pose, now = np.zeros((self._n, 12)), self._leaning_pose, active.path
         for k, row in enumerate(reference):
             time = t + (k + 1) * self._dt
-            path = active.path.moved(self._desired, time)
+            path = now.moved(self._desired, time)
             row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
             row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
         return reference
