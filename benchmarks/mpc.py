@@ -23,7 +23,6 @@ from typing import Any
 import clarabel
 import daqp
 import numpy as np
-import osqp
 from scipy import sparse
 
 import floatbase as fb
@@ -220,10 +219,10 @@ def solvers() -> Iterator[str]:
     yield f"at most {worst:.0e} of the weight. Times to solve the quadratic program of a flying"
     yield "trot, without assembling it:"
     yield ""
-    yield "| n | variables | DAQP | Clarabel | OSQP |"
-    yield "|---|---|---|---|---|"
+    yield "| n | variables | DAQP | Clarabel |"
+    yield "|---|---|---|---|"
     for n in HORIZONS:
-        times: dict[str, list[float]] = {"daqp": [], "clarabel": [], "osqp": []}
+        times: dict[str, list[float]] = {"daqp": [], "clarabel": []}
         for horizon, arguments in recorded(n)[10:60]:
             qp = horizon.qp(*arguments)
             H, g, G, h = (np.array(a) for a in (qp.H, qp.g, qp.G, qp.h))
@@ -239,12 +238,7 @@ def solvers() -> Iterator[str]:
                 cones = [clarabel.NonnegativeConeT(len(h))]
                 clarabel.DefaultSolver(P, g, C, h, cones, settings).solve()
 
-            def by_osqp(P=P, g=g, C=C, h=h, none=none) -> None:
-                solver = osqp.OSQP()
-                solver.setup(P, g, C, none, h, verbose=False, eps_abs=1e-4, eps_rel=1e-4)
-                solver.solve()
-
-            for label, solve in zip(times, (by_daqp, by_clarabel, by_osqp), strict=True):
+            for label, solve in zip(times, (by_daqp, by_clarabel), strict=True):
                 begin = time.thread_time()
                 solve()
                 times[label].append(time.thread_time() - begin)
