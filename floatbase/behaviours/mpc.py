@@ -11,10 +11,18 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_instance, as_integer, as_positive
+from floatbase._validation import Array, as_array, as_instance, as_integer, as_positive
 from floatbase.behaviours.active_plan import ActivePlan
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, flight_offset
-from floatbase.behaviours.horizon import COM, OMEGA, THETA, VELOCITY, HorizonMotion, HorizonQP
+from floatbase.behaviours.horizon import (
+    COM,
+    OMEGA,
+    STATE_WEIGHTS,
+    THETA,
+    VELOCITY,
+    HorizonMotion,
+    HorizonQP,
+)
 from floatbase.behaviours.lipm import LIPM
 from floatbase.behaviours.options import flat_foot_names
 from floatbase.behaviours.plan import StepPlan
@@ -58,6 +66,8 @@ class MPC(Walk):
         Length of an interval [s].
     solve_period : float, optional
         Time between two solutions, at most `dt` [s]. A change of stance also needs a new solution.
+    state_weights : array_like, shape (12,), optional
+        Weights of `HorizonQP`.
     **options : object
         Options of `Walk`. Here `ramp` is 0 by default, because the horizon loads the feet.
 
@@ -99,6 +109,7 @@ class MPC(Walk):
         n: int = 10,
         dt: float = 0.03,
         solve_period: float = 0.02,
+        state_weights: npt.ArrayLike = STATE_WEIGHTS,
         ramp: float = 0.0,
         **options: Any,
     ):
@@ -112,6 +123,7 @@ class MPC(Walk):
         self._n = as_integer("n", n, 1, 100)
         self._dt = as_positive("dt", dt, "s", maximum=1.0)
         self._solve_period = as_positive("solve_period", solve_period, "s", maximum=self._dt)
+        self._state_weights = as_array("state_weights", state_weights, (12,))
         self._force_weight = _FORCE_FRACTION * 10.0 / robot.mass**2
         super().__init__(robot, contacts, gait, velocity, yaw_rate, ramp=ramp, **options)
 
@@ -133,7 +145,12 @@ class MPC(Walk):
         inner = cos(pi / limits.facets) if limits.inner_approximation else 1.0
         mu = inner * min(contact.mu for contact in posture.contacts.friction_contacts)
         self._horizon = HorizonQP(
-            robot.mass, np.array(data.Ig.inertia), self._dt, mu, gravity=robot.gravity
+            robot.mass,
+            np.array(data.Ig.inertia),
+            self._dt,
+            mu,
+            gravity=robot.gravity,
+            state_weights=self._state_weights,
         )
         self._contact_offsets = {
             name: posture.contacts.only(name).positions(posture.state)[0]
