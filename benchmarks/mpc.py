@@ -1,7 +1,8 @@
 """Measure `MPC` beside `Walk`, and `Jump`, on MuJoCo.
 
-    python benchmarks/mpc.py              -> benchmarks/mpc.md
-    python benchmarks/mpc.py --pushes 30  more pushes
+    python benchmarks/mpc.py               -> benchmarks/mpc.md
+    python benchmarks/mpc.py pushes jumps  measure only these sections again
+    python benchmarks/mpc.py --pushes 30   more pushes
 
 All robots and speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.
 The control period is 2 ms. Times are processor times of the thread.
@@ -129,7 +130,8 @@ def pushes(n: int) -> Iterator[str]:
                 angle, begin, change = rng.uniform([0, 0.7, 0.5], [2 * np.pi, 1.2, 1.5])
                 force = robot.mass * change / 0.1 * np.array([np.cos(angle), np.sin(angle), 0.0])
                 push = fb.Push(force, begin)
-                run = fb.rollout(fb.Simulation(robot), walk, begin + 1.4, [push], PERIOD)
+                duration = PERIOD * round((begin + 1.4) / PERIOD)
+                run = fb.rollout(fb.Simulation(robot), walk, duration, [push], PERIOD)
                 if run.outcome == "completed":
                     tilts.append(tilt(run))
             cells.append(f"{len(tilts)} of {n}, {np.mean(tilts):.1f}°" if tilts else f"0 of {n}")
@@ -273,10 +275,22 @@ def jumps() -> Iterator[str]:
 
 
 def main() -> None:
+    sections: dict[str, Callable[[], Iterator[str]]] = {
+        "speed": speeds,  # by the first word of the heading
+        "jumps": jumps,
+        "pushes": lambda: pushes(arguments.pushes),
+        "time": horizons,
+        "solvers": solvers,
+    }
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sections", nargs="*", choices=[*sections, []], help="all by default")
     parser.add_argument("--pushes", type=int, default=12)
     arguments = parser.parse_args()
-    lines = [
+    path = Path(__file__).with_suffix(".md")
+    parts = dict.fromkeys(sections, "")
+    for part in path.read_text(encoding="utf-8").split("## ")[1:] if path.exists() else ():
+        parts[part.replace(",", " ").split()[0].lower()] = part
+    intro = [
         "# Model predictive control and jumps: measured results",
         "",
         f"Made by `python benchmarks/mpc.py` with floatbase {fb.__version__}. All robots and",
@@ -285,10 +299,10 @@ def main() -> None:
         "stances of 0.1 s and flights of 0.04 s. Times are processor times of the thread.",
         "",
     ]
-    path = Path(__file__).with_suffix(".md")
-    for section in (speeds(), jumps(), pushes(arguments.pushes), horizons(), solvers()):
-        lines += [*section, ""]
-        path.write_text("\n".join(lines), encoding="utf-8")  # also what there is so far
+    for name in arguments.sections or sections:
+        parts[name] = "\n".join([*sections[name](), "", ""]).removeprefix("## ")
+        written = "".join(f"## {part}" for part in parts.values() if part)
+        path.write_text("\n".join(intro) + "\n" + written.rstrip() + "\n", encoding="utf-8")
     print(path)
 
 
