@@ -36,6 +36,7 @@ from floatbase.robots import Robot, State
 # of a force beside the acceleration that it gives the centre of mass: the horizon's forces decide
 # how the feet share the load, but its accelerations matter more
 _FORCE_FRACTION = 0.02
+_GAIT_PHASES = 20  # in which a gait with flight has at least two flights
 _PATH_STEP, _PATH_STEPS = 0.1, 20  # s, of the path that the pendulum follows
 
 
@@ -96,6 +97,7 @@ class MPC(Walk):
     may_fly = True
     _made_anew = Walk._made_anew | {
         "_horizon", "_contact_offsets", "_motion", "_solved", "_measured",
+        "_flight",
     }  # fmt: skip
 
     def __init__(
@@ -165,13 +167,26 @@ class MPC(Walk):
 
     def _modified(self, plan: StepPlan, state: State) -> StepPlan:
         """Let the pendulum of a gait with flight follow the path, without a sway."""
-        gait = self._clock.gait
-        if len(gait.feet) == len(self._all_contacts) and flight_offset(gait) is not None:
+        self._flight = self._first_flight()
+        if self._flight is not None:
             times = plan.time + _PATH_STEP * np.arange(_PATH_STEPS + 1)
             points = [plan.path.moved(self._desired, time).position for time in times]
             segments = list(zip(times[:-1], times[1:], points[:-1], points[1:], strict=True))
             plan = replace(plan, plan=LIPM(segments, state.com[:2], self.omega))
         return super()._modified(plan, state)
+
+    def _first_flight(self) -> tuple[float, float, float] | None:
+        """Return begin and duration of the gait's first flight, and the time to the next one [s].
+
+        None if a foot always stands. All flights are assumed to be like the first one.
+        """
+        gait = replace(self._clock.gait, stop=None)
+        if len(gait.feet) < len(self._all_contacts) or flight_offset(gait) is None:
+            return None
+        phases = gait.phases(gait.start, _GAIT_PHASES, gait.period)
+        flights = [(begin, end) for begin, end, stance in phases if not stance]
+        begin, end = flights[0]
+        return begin, end - begin, flights[1][0] - begin
 
     def _adjust_targets(
         self, q: Array, v: Array, t: float, active: ActivePlan, entries: Entries, targets: Array
@@ -214,7 +229,30 @@ class MPC(Walk):
             path = now.moved(self._desired, time)
             row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
             row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
+            rise, speed = self._bounce(time)
+            row[COM.stop - 1] += rise
+            row[VELOCITY.stop - 1] += speed
         return reference
+
+    def _bounce(self, t: float) -> tuple[float, float]:
+        """Return height [m] and vertical velocity [m/s] of the reference at t, for a flying gait.
+
+        Flights of the duration T follow a parabola, from g T / 2 to -g T / 2. In the stance between
+        them, the velocity changes back at a constant rate. Before the first flight and after the
+        last one, the reference is level.
+        """
+        flight, gravity = self._flight, self.robot.gravity
+        if flight is None or self._clock.gait.stop is not None:
+            return 0.0, 0.0
+        begin, T, interval = flight
+        stance = interval - T
+        if t < begin - stance:
+            return 0.0, 0.0
+        s = (t - begin) % interval
+        if s < T:
+            return gravity / 2.0 * s * (T - s), gravity * (T / 2.0 - s)
+        s, scale = s - T, gravity * T / stance
+        return -scale / 2.0 * s * (stance - s), scale * (s - stance / 2.0)
 
     def _schedule(
         self, state: State, t: float, active: ActivePlan
