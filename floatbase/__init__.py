@@ -13,7 +13,7 @@ Control
 Simulation
     `Simulation`, `Ground`, `Push`, `rollout`, `Rollout`, `sweep`, `push_recovery`
 Walking
-    `from floatbase.behaviours import Gait, Walk, Stand`
+    `from floatbase.behaviours import Gait, Walk, Stand, MPC, Jump`
 3-D viewer
     `Viewer`
 Errors

@@ -1,4 +1,4 @@
-"""Legged locomotion: gaits, swing paths, footholds, centre-of-mass plans, `Walk` and `Stand`."""
+"""Legged locomotion: gaits, footholds, centre-of-mass plans, `Walk`, `Stand`, `MPC` and `Jump`."""
 
 from floatbase.behaviours.footholds import (
     capture_point,
@@ -7,7 +7,10 @@ from floatbase.behaviours.footholds import (
     support_margin,
 )
 from floatbase.behaviours.gait import Gait
+from floatbase.behaviours.horizon import HorizonMotion, HorizonQP
+from floatbase.behaviours.jump import Jump, JumpPlan
 from floatbase.behaviours.lipm import LIPM, CoMPlan
+from floatbase.behaviours.mpc import MPC
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.plan import StepPlan
@@ -18,9 +21,14 @@ from floatbase.behaviours.walk import Walk, raibert_foothold
 
 __all__ = [
     "LIPM",
+    "MPC",
     "CoMPlan",
     "Gains",
     "Gait",
+    "HorizonMotion",
+    "HorizonQP",
+    "Jump",
+    "JumpPlan",
     "Stand",
     "StepPlan",
     "Swing",

@@ -32,7 +32,8 @@ class Gait(Value):
     """A periodic contact schedule: which foot is in the air at which time.
 
     Foot f lifts off at start + (n + offsets[f]) period for n = 0, 1, 2, ..., and stays in the air
-    for `swing`. `trot`, `crawl`, `walk`, `pace`, `bound` and `pronk` make the usual gaits.
+    for `swing`. `trot`, `crawl`, `walk`, `pace`, `bound`, `flying_trot` and `pronk` make the usual
+    gaits.
 
     Parameters
     ----------
@@ -246,10 +247,39 @@ class Gait(Value):
         return _in_turn(robot, offsets, 2, swing, pause, start)
 
     @staticmethod
+    def flying_trot(
+        robot: Robot, stance: float = 0.16, flight: float = 0.04, start: float = 1.0
+    ) -> Gait:
+        """Return a flying trot, in which all feet are in the air between two diagonal stances.
+
+        `Walk` refuses this gait, because no foot stands in flight; use `MPC`.
+
+        Parameters
+        ----------
+        robot : Robot
+            A robot with four feet.
+        stance : float, optional
+            Time that a foot spends on the ground [s].
+        flight : float, optional
+            Time without any foot on the ground after each stance [s].
+        start : float, optional
+            Time of the first lift-off [s].
+
+        Returns
+        -------
+        Gait
+            The gait.
+        """
+        stance = as_positive("stance", stance, "s", maximum=_MAX_PERIOD)
+        flight = as_positive("flight", flight, "s", maximum=_MAX_PERIOD)
+        trot = Gait.trot(robot, stance, flight, start)
+        return replace(trot, swing=stance + 2.0 * flight)
+
+    @staticmethod
     def pronk(robot: Robot, swing: float = 0.25, pause: float = 0.25, start: float = 1.0) -> Gait:
         """Return a pronk, in which all feet of a quadruped swing together.
 
-        The robot flies during each swing, so `Walk` refuses this gait.
+        The robot flies during each swing, so `Walk` refuses this gait; use `MPC`.
 
         Parameters
         ----------
@@ -425,22 +455,31 @@ class Gait(Value):
         return min(times)
 
 
+def flight_offset(gait: Gait) -> float | None:
+    """Return the fraction of the period at which all feet are in the air; None if one stands.
+
+    It suffices to check each lift-off: the fewest feet stand when one has just lifted off.
+    """
+    endless = replace(gait, stop=None)
+    if any(gait.next_swing(foot, gait.start) for foot in gait.feet):
+        for offset in gait.offsets.values():
+            if not endless.stance(gait.start + (1.0 + offset) * gait.period):
+                return offset
+    return None
+
+
 def check_always_supported(gait: Gait) -> None:
     """Raise `InputError` for a gait that has all feet in the air at some time.
 
-    All contacts are assumed to be feet of the gait. It suffices to check each lift-off: the fewest
-    feet stand when one has just lifted off.
+    All contacts are assumed to be feet of the gait.
     """
-    if not any(gait.next_swing(foot, gait.start) for foot in gait.feet):
-        return
-    endless = replace(gait, stop=None)
-    for offset in gait.offsets.values():
-        if not endless.stance(gait.start + (1.0 + offset) * gait.period):
-            raise InputError(
-                f"This gait has all feet in the air at the fraction {offset:g} of its period. At "
-                "least one foot must stand at any time, because running is not supported. Use "
-                "other offsets or a shorter swing."
-            )
+    offset = flight_offset(gait)
+    if offset is not None:
+        raise InputError(
+            f"This gait has all feet in the air at the fraction {offset:g} of its period. At least "
+            "one foot must stand at any time. Use other offsets or a shorter swing, or use MPC, "
+            "which can fly."
+        )
 
 
 def _in_turn(

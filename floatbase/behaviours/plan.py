@@ -408,7 +408,8 @@ def _stance_centres(
     footholds: dict[str, _Foothold] = {}
     for begin, end, names in phases:
         stance = [name for name in posture.contacts.names if name in names or name not in gait.feet]
-        points = [posture.foot_centre(name, feet[name], yaw) for name in stance]
+        # in flight there is no ZMP: the plan then keeps to the middle of all feet
+        points = [posture.foot_centre(name, feet[name], yaw) for name in stance or feet]
         centre, before = np.mean(points, axis=0), dict(feet)
         for foot in gait.feet:
             times = gait.swing_at(foot, begin)

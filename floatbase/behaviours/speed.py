@@ -145,14 +145,14 @@ def _leg_reach(state: State, foot: str, direction: Array) -> float:
 
     The result is the smaller of the two distances from the foot's place in the standing posture.
     """
-    root = _leg_joints(state.robot, foot)[-1]
+    root = leg_joints(state.robot, foot)[-1]
     leg = state.point(foot) - state.joint_transforms[root][:3, 3]
     along = abs(float(leg[:2] @ direction))
     square = _leg_length(state.robot, foot) ** 2 - float(leg @ leg) + along**2
     return sqrt(max(square, 0.0)) - along
 
 
-def _leg_joints(robot: Robot, foot: str) -> list[int]:
+def leg_joints(robot: Robot, foot: str) -> list[int]:
     """Return the joints of a leg, from the foot to the hip."""
     model, joints = robot.model, []
     joint = model.frames[robot.frame_id(foot)].parentJoint
@@ -179,7 +179,7 @@ def _longest_leg(robot: Robot, foot: str, limits: Mapping[int, tuple[float, floa
     limits: lower and upper limit of joints by their index [rad or m]; other joints turn fully.
     """
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id(foot)
-    leg, q = _leg_joints(robot, foot), np.array(robot.standing().q)
+    leg, q = leg_joints(robot, foot), np.array(robot.standing().q)
 
     def distance(i: int, position: float) -> float:
         q[i] = position

@@ -14,7 +14,7 @@ from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.posture import WalkingPosture
 from floatbase.behaviours.targets import UNBOUNDED, normal_force_bound
 from floatbase.control import JointLimits, WholeBodyController
-from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
+from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task
 
 _RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at which a ramp begins
 # per rad/s²: the weight of a task. A knee that touches its stop is better than a fall: of 24
@@ -31,6 +31,8 @@ class StanceControllers:
         The standing posture.
     options : WalkOptions
         Options of the walk.
+    force_weight : float, optional
+        Weight of a task on the contact forces [1/N²]; None for no such task.
 
     Attributes
     ----------
@@ -38,8 +40,11 @@ class StanceControllers:
         The plan in use, which bounds the normal forces while all feet stand.
     """
 
-    def __init__(self, posture: WalkingPosture, options: WalkOptions):
+    def __init__(
+        self, posture: WalkingPosture, options: WalkOptions, force_weight: float | None = None
+    ):
         self._posture, self._options, self.plan = posture, options, None
+        self._force_weight = force_weight
         self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         robot, contacts = posture.state.robot, posture.contacts
         full_load = _RAMP_LOAD_FACTOR * robot.weight / len(contacts)
@@ -103,6 +108,8 @@ class StanceControllers:
             if foot in self._posture.flat_feet:
                 rotation = self._posture.rotation(foot)
                 tasks.append(OrientationTask(foot, rotation, kp=swing, weight=swing_weight))
+        if self._force_weight is not None:
+            tasks.append(ForceTask(weight=self._force_weight))
         return [*tasks, *self._options.tasks]
 
     def _normal_force_bounds(

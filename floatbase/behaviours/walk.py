@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import cos, inf, sin
@@ -61,13 +61,12 @@ from floatbase.objectives import Task
 from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
+Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
 _EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
-# attributes of a walk that its copies do not share
-_MADE_ANEW = {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
@@ -178,6 +177,13 @@ class Walk:
     __setattr__ = refuse_new_attributes
     waits_for_weight = True
     """Whether a new gait begins later if the weight must first shift."""
+    may_fly = False
+    """Whether all feet may be in the air at the same time."""
+    # attributes that copies do not share
+    _made_anew = frozenset(
+        {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
+    )
+    _force_weight: float | None = None  # 1/N², of a task on the contact forces
 
     def __init__(
         self,
@@ -247,7 +253,7 @@ class Walk:
     @gait.setter
     def gait(self, gait: Gait) -> None:
         check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
-        if len(gait.feet) == len(self._all_contacts):
+        if len(gait.feet) == len(self._all_contacts) and not self.may_fly:
             check_always_supported(gait)
         if hasattr(self, "_controllers"):  # the constructor has checked its arguments
             self._prepare(gait)
@@ -417,6 +423,7 @@ class Walk:
         controller = self._controllers[active.plan.stance]
         targets = controller.targets_at(t)
         active.write(t, com, com_velocity, targets)
+        self._adjust_targets(q, v, t, active, controller.targets, targets)
         self._time = t
         return controller(q, v, t, targets)
 
@@ -451,7 +458,7 @@ class Walk:
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
-        self._controllers = StanceControllers(self._posture, self._options)
+        self._controllers = StanceControllers(self._posture, self._options, self._force_weight)
         data = self._robot.model.createData()
         self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
         self._start_time = self._next_change = -inf
@@ -468,7 +475,8 @@ class Walk:
         """Check the friction that a gait needs, and make the controllers of its stances."""
         limits = self._controllers.limits
         facets, inner = limits.facets, limits.inner_approximation
-        check_friction(gait, self._posture, self._all_contacts, facets, inner)
+        if not self.may_fly:
+            check_friction(gait, self._posture, self._all_contacts, facets, inner)
         self._controllers.prepare(gait)
 
     def _limit_speed(self, stacklevel: int) -> None:
@@ -539,9 +547,7 @@ class Walk:
             )  # fmt: skip
         finally:
             self._planning_path = None
-        if self._options.modify_plan is not None:
-            changed = self._options.modify_plan(plan, state)
-            plan = as_instance("the result of modify_plan", changed, StepPlan)
+        plan = self._modified(plan, state)
         self._history.append(plan)
         self._update_lean(plan)
         self._controllers.plan, controller = plan, self._controllers[stance]
@@ -551,6 +557,18 @@ class Walk:
             self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
         self._next_change = self._clock.next_change(t, plan.replan_time)
+
+    def _modified(self, plan: StepPlan, state: State) -> StepPlan:
+        """Return the plan to use instead of a new plan at the measured state."""
+        if self._options.modify_plan is None:
+            return plan
+        changed = self._options.modify_plan(plan, state)
+        return as_instance("the result of modify_plan", changed, StepPlan)
+
+    def _adjust_targets(
+        self, q: Array, v: Array, t: float, active: ActivePlan, entries: Entries, targets: Array
+    ) -> None:
+        """Change the targets of one control step; entries: those of each task. `MPC` does so."""
 
     @property
     def _leaning_pose(self) -> BodyPose:
@@ -571,7 +589,7 @@ class Walk:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
-        return {key: value for key, value in vars(self).items() if key not in _MADE_ANEW}
+        return {key: value for key, value in vars(self).items() if key not in self._made_anew}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

@@ -35,7 +35,7 @@ GENERAL = {
 # passed other conditions
 GUARDS = {
     "03": {"pulls"}, "05": {"slips"},
-    "09": {"in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
+    "09": {"in_the_air", "beyond"}, "10": {"falls"}, "C": {"empty"}, "P": {"short"},
 }  # fmt: skip
 
 

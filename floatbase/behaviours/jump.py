@@ -1,0 +1,406 @@
+"""`Jump`: crouch, push off, fly without contacts, and land on soft contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from math import cos, e, pi, sqrt
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from floatbase._geometry import minimum_jerk
+from floatbase._validation import (
+    Array,
+    as_instance,
+    as_number,
+    as_positive,
+    refuse_new_attributes,
+)
+from floatbase.behaviours.options import as_vector, check_options, flat_foot_names
+from floatbase.behaviours.speed import leg_joints
+from floatbase.control import Command, JointLimits, WholeBodyController
+from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
+from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
+from floatbase.robots import Robot, State
+
+Phase: TypeAlias = Literal["stand", "crouch", "push", "flight", "landing"]
+
+# fractions of the height of the centre of mass above the feet
+_CROUCH, _TUCK = 0.3, 0.15
+_MIN_HEIGHT, _MAX_SIZE = 0.02, 10.0  # m: a larger number must be in another unit
+_CROUCH_TIME = 0.4  # s
+_BODY_WEIGHT = 1e2  # of the tasks on the body
+_SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
+_TOUCH_HEIGHT = 2e-3  # m above the ground, below which a foot has landed
+_EARLIEST_LANDING = 0.5  # fraction of the flight
+_DRY_RUN_STEP = 2e-3  # s
+_MIN_FRACTION = 0.95  # of the take-off velocity that a dry run must reach
+
+
+@dataclass(frozen=True)
+class JumpPlan:
+    """Times and velocities of a jump.
+
+    Parameters
+    ----------
+    crouch, push, take_off, touchdown : float
+        Times at which the phases begin, and at which the feet are planned to land [s].
+    depth : float
+        How far the centre of mass is below its standing height before the push [m]. At take-off, it
+        is at its standing height.
+    velocity : ndarray, shape (2,)
+        Velocity of the centre of mass at take-off, forwards and upwards [m/s].
+    acceleration : ndarray, shape (2,)
+        Its acceleration during the push, forwards and upwards [m/s²].
+    lead : float
+        How far the feet land in front of the centre of mass, so that it comes to rest [m].
+    """
+
+    crouch: float
+    push: float
+    take_off: float
+    touchdown: float
+    depth: float
+    velocity: Array
+    acceleration: Array
+    lead: float
+
+    @staticmethod
+    def of(height: float, distance: float, start: float, leg: float, gravity: float) -> JumpPlan:
+        """Plan a jump in closed form.
+
+        With the take-off velocity (v_x, v_z) and the depth d of the crouch, from which the robot
+        pushes off at constant acceleration,
+
+            (J1)  v_z = √(2 g height),  flight T = 2 v_z / g
+            (J2)  push t = 2 d / v_z,     a = (v_x, v_z) / t
+            (J3)  distance = v_x (t / 2 + T + 1 / ω),  lead = v_x / ω
+
+        where v_x / ω is the capture point of a pendulum of the height `leg`: there the feet land.
+
+        Parameters
+        ----------
+        height : float
+            Rise of the centre of mass above its standing height [m].
+        distance : float
+            Distance of the landing place [m].
+        start : float
+            Beginning of the crouch [s].
+        leg : float
+            Height of the centre of mass above the feet [m].
+        gravity : float
+            Gravitational acceleration [m/s²].
+        """
+        depth, upwards = _CROUCH * leg, sqrt(2.0 * gravity * height)  # (J1)
+        flight, push = 2.0 * upwards / gravity, 2.0 * depth / upwards  # (J2)
+        lead_time = sqrt(leg / gravity)  # 1 / ω
+        forwards = distance / (push / 2.0 + flight + lead_time)  # (J3)
+        velocity = np.array([forwards, upwards])
+        begin = start + _CROUCH_TIME
+        return JumpPlan(
+            start, begin, begin + push, begin + push + flight, depth, velocity, velocity / push,
+            forwards * lead_time,
+        )  # fmt: skip
+
+    def com_offset(self, t: float) -> tuple[Array, Array, Array]:
+        """Return the planned motion of the centre of mass before take-off, relative to standing.
+
+        Position [m], velocity [m/s] and acceleration [m/s²], each (2,): forwards and upwards.
+        """
+        if t < self.push:
+            u = (t - self.crouch) / (self.push - self.crouch)
+            down = np.array([0.0, -self.depth])
+            s, rate, acceleration = minimum_jerk(u)
+            T = self.push - self.crouch
+            return s * down, rate / T * down, acceleration / T**2 * down
+        s = min(t, self.take_off) - self.push
+        return (
+            np.array([0.0, -self.depth]) + self.acceleration * s * s / 2.0,
+            self.acceleration * s,
+            self.acceleration,
+        )
+
+
+class Jump:
+    """A controller that jumps once: it stands, crouches, pushes off, flies, lands and stands again.
+
+    The jump is planned in closed form, for a push at constant acceleration. In flight, there are no
+    contacts, and the feet move relative to the centre of mass to the place where they land. After
+    the landing, the contacts are soft, because the feet do not land at the same time.
+
+    Before it accepts a jump, the controller integrates the push with the equations of motion,
+    without a simulator and without torque limits. It refuses a jump for which a motor is too weak
+    or too slow.
+
+    If the time jumps back, the controller begins again.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    contacts : Contacts
+        All contacts of the robot, such as `Contacts.feet(robot)`.
+    height : float
+        Rise of the centre of mass above its standing height [m].
+    distance : float, optional
+        Distance of the landing place from the start, forwards [m].
+    start : float, optional
+        Time at which the robot begins to crouch [s].
+    **options : object
+        Further options of `fb.WholeBodyController`, such as `facets`.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, if the friction is too low for the distance, or if a motor
+        is too weak or too slow for the jump. The message gives the number and the limit.
+
+    Examples
+    --------
+    >>> import floatbase as fb
+    >>> from floatbase.behaviours import Jump
+    >>> robot = fb.load("go2")
+    >>> jump = Jump(robot, fb.Contacts.feet(robot), height=0.2)
+    >>> round(float(jump.plan.velocity[1]), 2)
+    1.9
+    """
+
+    __setattr__ = refuse_new_attributes
+    _phase: Phase
+    _time: float  # s, of the last control step
+    _acceleration: Array  # q̈ then
+    _com: Array  # at take-off or touchdown
+    _com_velocity: Array
+
+    def __init__(
+        self,
+        robot: Robot,
+        contacts: Contacts,
+        height: float,
+        distance: float = 0.0,
+        *,
+        start: float = 0.5,
+        **options: Any,
+    ):
+        self._robot = as_instance("robot", robot, Robot)
+        self._all_contacts = as_instance("contacts", contacts, Contacts)
+        check_options(type(self).__name__, options)
+        self._standing = standing = robot.standing()
+        centre = contacts.positions(standing).mean(axis=0)
+        leg = float(standing.com[2] - centre[2])
+        height = as_number("height", height, "m", _MIN_HEIGHT, _MAX_SIZE)
+        distance = as_number("distance", distance, "m", -_MAX_SIZE, _MAX_SIZE)
+        start = as_positive("start", start, "s", allow_zero=True)
+        self._plan = JumpPlan.of(height, distance, start, leg, robot.gravity)
+        self._leg, self._com_offset = leg, standing.com - [*centre[:2], 0.0]
+        self._height, self._distance, self._options = height, distance, options
+        model = robot.model
+        legs = [j for foot in contacts.names for j in leg_joints(robot, foot)]
+        self._legs = np.array(model.idx_qs)[legs], np.array(model.idx_vs)[legs]
+        self._posture = np.array(standing.q), np.zeros(robot.d), np.zeros(robot.d)
+        self._restart()
+        self._dry_run()
+        self._restart()
+        self._stand = self._controller(contacts, on_infeasible="soften")
+        self._fly = self._controller(contacts.only())
+        self._land = self._controller(contacts, contact_weight=_SOFT_CONTACTS)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._robot
+
+    @property
+    def plan(self) -> JumpPlan:
+        """Times and velocities of the jump."""
+        return self._plan
+
+    @property
+    def phase(self) -> Phase:
+        """Present phase."""
+        return self._phase
+
+    @property
+    def contacts(self) -> Contacts:
+        """Contacts of the present phase."""
+        return self._all_contacts.only() if self._phase == "flight" else self._all_contacts
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
+        """Compute the command of one control step.
+
+        Parameters
+        ----------
+        q : array_like, shape (nq,)
+            Configuration.
+        v : array_like, shape (nv,)
+            Velocity.
+        t : float, optional
+            The time [s].
+
+        Returns
+        -------
+        Command
+            Joint torques, with the planned accelerations and contact forces.
+        """
+        t = as_number("t", t, "s")
+        if t < self._time:
+            self._restart()
+        self._time = t
+        q, v = as_vector("q", q, self._robot.nq), as_vector("v", v, self._robot.nv)
+        self._update(q, v, t)
+        self._observe(q, v)
+        controller = {"flight": self._fly, "landing": self._land}.get(self._phase, self._stand)
+        command = controller(q, v, t)
+        self._acceleration = command.qdd
+        return command
+
+    def _restart(self) -> None:
+        """Begin again."""
+        self._phase = "stand"
+        self._time, self._acceleration = -np.inf, np.zeros(self._robot.nv)
+        self._com = self._com_velocity = np.zeros(3)
+        self._since, self._goal = 0.0, self._standing.com
+
+    def _observe(self, q: Array, v: Array) -> None:
+        """Let the posture task follow the measured legs, so that it does not brake them.
+
+        Their last accelerations are targets, too: if the task reduced them, the arms would swing.
+        """
+        in_q, in_v = self._legs
+        position, velocity, acceleration = self._posture
+        joints = in_v - (self._robot.nv - self._robot.d)
+        position[in_q], velocity[joints] = q[in_q], v[in_v]
+        acceleration[joints] = self._acceleration[in_v]
+
+    def _update(self, q: Array, v: Array, t: float) -> None:
+        """Change the phase if it is time to do so."""
+        plan, standing = self._plan, self._standing
+        if self._phase in ("stand", "crouch", "push"):
+            if t >= plan.take_off:
+                self._begin("flight", State(self._robot, q, v), t)
+            elif t >= plan.crouch:
+                self._phase = "push" if t >= plan.push else "crouch"
+        elif self._phase == "flight":
+            flown = (t - plan.take_off) / (plan.touchdown - plan.take_off)
+            if flown < _EARLIEST_LANDING:
+                return
+            state = State(self._robot, q, v)
+            heights = [state.point(f)[2] - standing.point(f)[2] for f in self._all_contacts.names]
+            if min(heights) < _TOUCH_HEIGHT:
+                self._begin("landing", state, t)
+                feet = self._all_contacts.positions(state).mean(axis=0)
+                self._goal = np.array([*feet[:2], 0.0]) + self._com_offset
+
+    def _begin(self, phase: Phase, state: State, t: float) -> None:
+        """Begin a phase in a measured state."""
+        self._phase, self._since = phase, t
+        self._com, self._com_velocity = state.com, state.com_velocity
+
+    def _posture_target(self, t: float) -> tuple[Array, Array, Array]:
+        """Return the target of the posture task, which `_observe` sets."""
+        return self._posture
+
+    def _com_target(self, t: float) -> tuple[Array, Array, Array]:
+        """Return the target of the centre of mass at t [s]."""
+        if self._phase != "landing":
+            planned = [np.array([part[0], 0.0, part[1]]) for part in self._plan.com_offset(t)]
+            return self._standing.com + planned[0], planned[1], planned[2]
+        # critical damping: the body sinks by v / (e rate), as far as in the crouch
+        rate = max(
+            self._plan.velocity[1] / (e * self._plan.depth), sqrt(self._robot.gravity / self._leg)
+        )
+        s, offset = t - self._since, self._com - self._goal
+        slope, decay = self._com_velocity + rate * offset, np.exp(-rate * s)
+        position = decay * (offset + slope * s)
+        velocity = decay * slope - rate * position
+        acceleration = -rate * decay * slope - rate * velocity
+        return self._goal + position, velocity, acceleration
+
+    def _foot_target(self, foot: str, t: float) -> tuple[Array, Array, Array]:
+        """Return the target of a foot in flight, which moves with the falling centre of mass."""
+        plan, standing, gravity = self._plan, self._standing, self._robot.gravity
+        s, T = max(t - self._since, 0.0), plan.touchdown - plan.take_off
+        u = min(s / T, 1.0)
+        w = u * (1.0 - u)
+        fraction, rate, bend = minimum_jerk(u)
+        fall = np.array([0.0, 0.0, -gravity])
+        last = standing.point(foot) - standing.com + [plan.lead, 0.0, 0.0]
+        first = last - [plan.lead + self._plan.com_offset(plan.take_off)[0][0], 0.0, 0.0]
+        tuck = np.array([0.0, 0.0, _TUCK * self._leg])
+        change = last - first
+        return (
+            self._com + self._com_velocity * s + fall * s * s / 2.0
+            + first + fraction * change + 64.0 * w**3 * tuck,
+            self._com_velocity + fall * s
+            + rate / T * change + 192.0 * w * w * (1.0 - 2.0 * u) / T * tuck,
+            fall + bend / T**2 * change + 384.0 * w * (1.0 - 5.0 * w) / T**2 * tuck,
+        )  # fmt: skip
+
+    def _controller(self, contacts: Contacts, **options: Any) -> WholeBodyController:
+        """Return the controller of a phase."""
+        standing = self._standing
+        rotation, weight = standing.frame_pose("base").rotation, _BODY_WEIGHT
+        tasks: list[Task] = [
+            PostureTask(self._posture_target, weight=1e-2),
+            OrientationTask("base", rotation, kp=200.0, weight=weight if len(contacts) else 1.0),
+        ]
+        if len(contacts):
+            tasks.append(CoMTask(self._com_target, kp=150.0, weight=_BODY_WEIGHT))
+        else:
+            for foot in self._all_contacts.names:
+                tasks.append(FrameTask(foot, partial(self._foot_target, foot), kp=600.0))
+            for foot in sorted(flat_foot_names(self._all_contacts)):
+                tasks.append(OrientationTask(foot, standing.frame_pose(foot).rotation, kp=600.0))
+        return WholeBodyController(self._robot, contacts, tasks, **{**options, **self._options})
+
+    def _dry_run(self) -> None:
+        """Raise `InputError` if a motor or the friction is not sufficient for the push."""
+        robot, plan, gravity = self._robot, self._plan, self._robot.gravity
+        what = f"A jump of {robot.name} with a height of {self._height:g} m"
+        what += f" and a distance of {self._distance:g} m" if self._distance else ""
+        controller = self._controller(
+            self._all_contacts, on_infeasible="soften", torque_limits=np.inf, joint_limits=None
+        )
+        facets = controller.limits.facets
+        scale = cos(pi / facets) if controller.limits.inner_approximation else 1.0
+        mu = scale * min(contact.mu for contact in self._all_contacts.friction_contacts)
+        slope = abs(plan.acceleration[0]) / (gravity + plan.acceleration[1])
+        if slope > mu:
+            raise InputError(
+                f"{what} needs a friction coefficient of {slope:.2f} in every direction, but the "
+                f"contacts allow {mu:.2f}. Use a smaller distance."
+            )
+        q, h = np.array(self._standing.q), _DRY_RUN_STEP
+        v: Array = np.zeros(robot.nv)
+        joints, limits = slice(robot.nv - robot.d, None), JointLimits.of(robot)
+        motor_limits = self._options.get("torque_limits")
+        torque_limits = robot.torque_limits if motor_limits is None else motor_limits
+        needed, largest = (
+            np.zeros((2, robot.d)),
+            np.array([np.broadcast_to(torque_limits, robot.d), limits.velocity]),
+        )
+        for t in np.arange(plan.crouch, plan.take_off, h):
+            self._observe(q, v)
+            command = controller(q, v, t)
+            self._acceleration = command.qdd
+            v = v + h * command.qdd
+            q = pin.integrate(robot.model, q, h * v)
+            needed = np.maximum(needed, [np.abs(command.tau), np.abs(v[joints])])
+        kind, joint = np.unravel_index(np.argmax(needed / largest), needed.shape)
+        if needed[kind, joint] > largest[kind, joint]:
+            unit, quantity = (("N·m", "torque"), ("rad/s", "speed"))[kind]
+            raise InputError(
+                f"{what} needs a {quantity} of {needed[kind, joint]:.3g} {unit} in joint "
+                f"{robot.joint_names[joint]}, but its limit is {largest[kind, joint]:.3g} {unit}. "
+                f"Use a smaller height or distance."
+            )
+        reached = State(robot, q, v).com_velocity[2]
+        if reached < _MIN_FRACTION * plan.velocity[1]:
+            raise InputError(
+                f"{what} needs a take-off velocity of {plan.velocity[1]:.2f} m/s, but the legs "
+                f"reach only {reached:.2f} m/s. Use a smaller height."
+            )

@@ -1,0 +1,14 @@
+"""Lesson 10, A horizon."""
+
+from floatbase.lessons.lesson10.exercises import EXERCISES, run_jump
+from floatbase.lessons.lesson10.helpers import angular_momentum, mean_load
+from floatbase.lessons.lesson10.pictures import plot_loads, plot_step
+
+__all__ = [
+    "EXERCISES",
+    "angular_momentum",
+    "mean_load",
+    "plot_loads",
+    "plot_step",
+    "run_jump",
+]

@@ -1,0 +1,139 @@
+"""Exercises of lesson 10, A horizon."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+import floatbase as fb
+from floatbase._validation import Array
+from floatbase.behaviours import Jump
+from floatbase.errors import InputError
+from floatbase.lessons.exercises import Exercise
+from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
+from floatbase.lessons.lesson08 import largest_tilt, run_go2
+from floatbase.simulation import Rollout
+
+MU = 0.6
+HEIGHT, DEPTH = 0.15, 0.09  # m, of exercise 10.1
+FAR, CLEAR, TILT = 580.0, 155.0, 4.0  # mm, mm, °: requirements of exercise 10.2
+_DURATION = 1.6  # s, of the jump of exercise 10.2
+
+
+def _push_force() -> float:
+    """Compute the force of exercise 10.1 from the work that it does on the body [N]."""
+    robot = fb.load("go2")
+    energy = robot.weight * (DEPTH + HEIGHT)  # from the crouch to the top
+    return energy / DEPTH
+
+
+@cache
+def run_jump(height: float, distance: float) -> Rollout:
+    """Simulate a jump of go2.
+
+    Parameters
+    ----------
+    height, distance : float
+        Height and distance, as for `Jump` [m].
+
+    Returns
+    -------
+    Rollout
+        The record.
+
+    Raises
+    ------
+    InputError
+        If a motor or the friction is insufficient.
+    """
+    robot = fb.load("go2")
+    jump = Jump(robot, fb.Contacts.feet(robot, mu=MU), height, distance, start=0.1)
+    return run_go2(jump, _DURATION)
+
+
+@array_judge((2,))
+def _judge_jump(given: Array) -> Verdict:
+    """Judge a jump in simulation."""
+    height, distance = given.tolist()
+    if not (0.02 <= height <= 1.0 and 0.0 <= distance <= 2.0):
+        return Verdict(
+            False, "The height must be from 0.02 to 1 m, and the distance from 0 to 2 m.", "range"
+        )
+    try:
+        record = run_jump(height, distance)
+    except InputError as error:
+        return Verdict(False, f"The jump is refused. {error}", "refused")
+    feet = 1e3 * (record.foot_positions - record.foot_positions[0])
+    far, clear = float(feet[-1, :, 0].min()), float(feet[:, :, 2].min(axis=1).max())
+    tilt = largest_tilt(record)
+    text = f"the feet land {far:.0f} mm ahead, all are {clear:.0f} mm up at the top, and the "
+    text += f"body tilts by {tilt:.1f}°"
+    if record.outcome != "completed":
+        return Verdict(False, f"The robot falls: {text}.", "falls")
+    if far < FAR:
+        return Verdict(False, f"Too short: {text}.", "short")
+    if clear < CLEAR:
+        return Verdict(False, f"Too low for the bushes: {text}.", "low")
+    if tilt > TILT:
+        return Verdict(
+            False, f"The body tilts too far: {text}. Shorter flights leave less time.", "tilts"
+        )
+    return Verdict(True, f"In simulation: {text}.")
+
+
+def _jumps() -> list[Example]:
+    return [
+        ((0.12, 0.6), ""), ((0.6, 0.6), "refused"), ((0.05, 0.6), "refused"),
+        ((0.12, 0.4), "short"), ((0.1, 0.6), "low"), ((0.18, 0.58), "tilts"),
+        ((-0.1, 0.6), "range"),
+    ]  # fmt: skip
+
+
+EXERCISES = (
+    Exercise(
+        name="10.1",
+        statement="go2 crouches by 0.09 m and jumps 0.15 m high, measured from its standing "
+        "height. What constant vertical force, N, must the ground exert during the push-off?",
+        stub="push_off = 0.0  # replace: N",
+        solution='push_off = fb.load("go2").weight * (1 + 0.15 / 0.09)',
+        judge=NumericJudge(
+            right=_push_force,
+            praise="The force lifts the weight through the crouch, and the rest becomes height.",
+            mistakes={
+                "zero": lambda: 0.0,
+                "no_weight": lambda: fb.load("go2").weight * HEIGHT / DEPTH,
+                "impulse": lambda: fb.load("go2").mass * np.sqrt(2 * 9.81 * HEIGHT),
+                "inverse": lambda: fb.load("go2").weight * (1 + DEPTH / HEIGHT),
+                "one_foot": lambda: _push_force() / 4,
+                "mass": lambda: _push_force() / 9.81,
+                "both": lambda: fb.load("go2").weight * (HEIGHT + DEPTH) / HEIGHT / 2,
+            },
+            hints={
+                "zero": "There is no answer yet. How fast must the body be at take-off?",
+                "no_weight": "That is the force that accelerates the body. The ground also "
+                "carries the weight.",
+                "impulse": "That is the impulse, N·s. Over which distance does the force act?",
+                "inverse": "Crouch and height are swapped: a deeper crouch needs less force.",
+                "one_foot": "That is for one foot. The question is for all four.",
+                "mass": "That uses the mass instead of the weight.",
+                "both": "The work is force times crouch, not force times height.",
+            },
+        ),
+        explanation="The work of the force in the crouch, F d, lifts the body by d + h. So F = "
+        "m g (1 + h / d).",
+        namespace=lambda: {"fb": fb},
+    ),
+    Exercise(
+        name="10.2",
+        statement="A jump over bushes, (height, distance), in m. All feet must land at least "
+        "580 mm ahead, and all must be at least 155 mm above the ground at the top. The body "
+        "must not tilt by more than 4°.",
+        stub="jump_over = np.array([0.05, 0.3])  # height, distance, m",
+        solution="jump_over = np.array([0.12, 0.6])",
+        judge=_judge_jump,
+        examples=_jumps,
+        explanation="A low jump is short, so it must be fast, and the push-off needs friction. A "
+        "high jump needs fast knees. Between both, the motors suffice.",
+    ),
+)

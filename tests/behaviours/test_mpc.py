@@ -1,0 +1,220 @@
+"""`HorizonQP` and `MPC`: the quadratic program, its predictions, and walks with flight."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import judges
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+from messages import raises
+from scipy.linalg import expm
+
+import floatbase as fb
+from floatbase.behaviours import MPC, Gait, HorizonMotion, HorizonQP, Walk
+from floatbase.control import Command
+from floatbase.errors import InputError
+from floatbase.simulation import Rollout
+
+PERIOD = 2e-3  # s
+Problem = tuple[HorizonQP, tuple[Any, Any, Any, npt.NDArray[np.bool_]]]
+
+
+def random_problem(seed: int, n: int = 6) -> Problem:
+    """Return a horizon and its arguments, with flight in some intervals."""
+    rng = np.random.default_rng(seed)
+    half = rng.normal(size=(3, 3))
+    mass = rng.uniform(2.0, 60.0)
+    horizon = HorizonQP(
+        mass, 0.02 * mass * (half @ half.T + np.eye(3)), dt=rng.uniform(0.02, 0.05),
+        mu=rng.uniform(0.2, 1.0),
+    )  # fmt: skip
+    reference = np.tile(0.2 * rng.normal(size=12), (n, 1)) + 0.02 * rng.normal(size=(n, 12))
+    feet = rng.normal(size=(n, 4, 3)) * [0.3, 0.2, 0.05] - [0.0, 0.0, 0.4]
+    stance = rng.random((n, 4)) < 0.6
+    stance[rng.integers(n)] = False
+    return horizon, (reference[0] + 0.1 * rng.normal(size=12), reference, feet, stance)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_forces_are_those_of_an_independent_solver(seed: int) -> None:
+    horizon, problem = random_problem(seed)
+    expected = fb.solve(horizon.qp(*problem), "cvxpy").x
+    forces = horizon.solve(*problem).forces
+    weight = horizon.mass * horizon.gravity
+    assert np.abs(forces[problem[3]].ravel() - expected).max() < 1e-5 * weight
+    assert not forces[~problem[3]].any()
+    normal, sideways = forces[..., 2:], np.abs(forces[..., :2])
+    assert np.all(sideways <= horizon.mu * normal + 1e-6 * weight)
+    assert np.all(normal <= horizon.max_load * weight * (1.0 + 1e-9))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_states_are_those_of_the_matrix_exponential(seed: int) -> None:
+    horizon, (x, reference, feet, stance) = random_problem(seed)
+    motion = horizon.solve(x, reference, feet, stance)
+    for k, forces in enumerate(motion.forces):
+        c, s = np.cos(reference[k, 2]), np.sin(reference[k, 2])
+        Rz = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rate = np.zeros((13, 13))  # of (x, 1)
+        rate[0:3, 6:9], rate[3:6, 9:12] = Rz.T, np.eye(3)
+        moment = np.cross(feet[k], forces).sum(axis=0)
+        rate[6:9, 12] = np.linalg.solve(Rz @ horizon.inertia @ Rz.T, moment)
+        rate[9:12, 12] = forces.sum(axis=0) / horizon.mass - [0.0, 0.0, horizon.gravity]
+        x = (expm(horizon.dt * rate) @ [*x, 1.0])[:12]
+        assert np.allclose(motion.states[k], x, atol=1e-9)
+
+
+def test_a_flight_follows_the_closed_form() -> None:
+    horizon, (x, reference, feet, stance) = random_problem(0)
+    motion = horizon.solve(x, reference, feet, np.zeros_like(stance))
+    assert not motion.forces.any()
+    t = horizon.dt * np.arange(1, len(reference) + 1)[:, None]
+    g = np.array([0.0, 0.0, horizon.gravity])
+    assert np.allclose(motion.states[:, 3:6], x[3:6] + x[9:12] * t - g * t**2 / 2.0)
+    assert np.allclose(motion.states[:, 9:12], x[9:12] - g * t)
+    assert np.allclose(motion.states[:, 6:9], x[6:9])
+
+
+def test_four_feet_share_the_weight() -> None:
+    horizon = HorizonQP(mass=10.0, inertia=0.1 * np.eye(3), force_weight=1e-6)
+    feet = np.tile([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)], (8, 1, 1))
+    motion = horizon.solve(np.zeros(12), np.zeros((8, 12)), feet, np.ones((8, 4), dtype=bool))
+    assert np.allclose(motion.forces, [0.0, 0.0, horizon.mass * horizon.gravity / 4.0], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"mass": -1.0}, ("mass", "-1")),
+        ({"inertia": -np.eye(3)}, ("inertia", "positive definite")),
+        ({"state_weights": -np.ones(12)}, ("state_weights",)),
+        ({"dt": 0.0}, ("dt", "0")),
+    ],
+)
+def test_a_horizon_checks_its_numbers(arguments: dict[str, Any], words: tuple[str, ...]) -> None:
+    with raises(InputError, *words):
+        HorizonQP(**{"mass": 1.0, "inertia": np.eye(3), **arguments})
+
+
+def test_a_horizon_checks_the_stance() -> None:
+    horizon, (x, reference, feet, stance) = random_problem(0)
+    with raises(InputError, "stance", "bool"):
+        horizon.solve(x, reference, feet, stance.astype(float))
+    with raises(InputError, "feet"):
+        horizon.solve(x, reference, feet[:-1], stance)
+
+
+class Observed:
+    """A controller that records its commands and the solutions of its horizon."""
+
+    def __init__(self, walk: MPC):
+        self.walk, self.robot = walk, walk.robot
+        self.commands: list[Command] = []
+        self.motions: dict[float, HorizonMotion] = {}
+
+    @property
+    def contacts(self) -> fb.Contacts:
+        return self.walk.contacts
+
+    def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float) -> Command:
+        before, command = self.walk.motion, self.walk(q, v, t)
+        self.commands.append(command)
+        if self.walk.motion is not before and self.walk.motion is not None:
+            self.motions[t] = self.walk.motion
+        return command
+
+
+def walked(
+    name: str, gait: Gait, velocity: float, duration: float, **options: Any
+) -> tuple[Rollout, Observed]:
+    robot = judges.load(name)
+    observed = Observed(
+        MPC(robot, fb.Contacts.feet(robot, mu=0.6), gait, (velocity, 0.0), **options)
+    )
+    return fb.rollout(fb.Simulation(robot), observed, duration, control_period=PERIOD), observed
+
+
+@pytest.fixture(scope="module")
+def flying() -> tuple[Rollout, Observed]:
+    return walked("go2", Gait.flying_trot(judges.load("go2"), start=0.2), 0.5, 2.0)
+
+
+def test_a_flying_trot_reaches_its_speed_on_the_compiled_backend(
+    flying: tuple[Rollout, Observed],
+) -> None:
+    run, observed = flying
+    assert run.outcome == "completed"
+    last_second = run.time >= 1.0
+    x, t = run.com[last_second, 0], run.time[last_second]
+    assert (x[-1] - x[0]) / (t[-1] - t[0]) == pytest.approx(0.5, rel=0.05)
+    assert {command.backend for command in observed.commands} == {"compiled"}
+    flights = [i for i in range(len(run)) if len(run.contacts_at(i)) == 0]
+    assert len(flights) > 0.15 * len(run)
+    # the horizon is solved at 50 Hz, and at each change of stance
+    assert 90 < len(observed.motions) < 150
+
+
+def test_in_flight_momentum_follows_the_closed_form(flying: tuple[Rollout, Observed]) -> None:
+    run, _ = flying
+    robot, data = run.robot, run.robot.model.createData()
+    untouched = [
+        len(run.contacts_at(i)) == 0 and not run.measured[i].any() for i in range(len(run))
+    ]
+    first = next(i for i in range(len(run)) if run.time[i] > 1.0 and untouched[i])
+    indices = range(first, first + untouched[first:].index(False))
+    assert len(indices) >= 5
+    momenta = np.array(
+        [
+            pin.computeCentroidalMomentum(robot.model, data, run.q[i], run.v[i]).vector.copy()
+            for i in indices
+        ]
+    )
+    t = run.time[indices] - run.time[first]
+    scale = 1e-3 * robot.mass  # 1 mm/s
+    assert np.allclose(momenta[:, 2] - momenta[0, 2], -robot.weight * t, atol=scale)
+    assert np.allclose(momenta[:, [0, 1, 3, 4, 5]], momenta[0, [0, 1, 3, 4, 5]], atol=scale)
+
+
+def test_predictions_of_90_ms_agree_with_mujoco(flying: tuple[Rollout, Observed]) -> None:
+    run, observed = flying
+    errors = []
+    for t, motion in observed.motions.items():
+        i = round((t + 0.09) / PERIOD)
+        if t > 0.8 and i < len(run):
+            errors.append(motion.states[2, 3:6] - run.com[i])
+    assert np.abs(errors).max() < 0.005  # m; the body moves 45 mm forwards meanwhile
+
+
+@pytest.mark.parametrize("name", ["solo12", "anymal_kinova"])
+def test_other_robots_pronk_with_the_same_numbers(name: str) -> None:
+    run, _ = walked(name, Gait.pronk(judges.load(name), 0.2, 0.2, start=0.2), 0.2, 1.6)
+    assert run.outcome == "completed"
+    assert max(np.rad2deg(np.arccos(1 - 2 * (run.q[:, 3:5] ** 2).sum(axis=1)))) < 10.0
+    feet = run.foot_positions[:, :, 2]
+    assert (feet - feet[0]).min(axis=1).max() > 0.01  # m, of the lowest foot
+
+
+def test_copies_and_restarts_walk_alike() -> None:
+    robot = judges.load("go2")
+    walk = MPC(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.0), (0.3, 0.0))
+    runs = [
+        fb.rollout(fb.Simulation(robot), each, 0.5, control_period=PERIOD)
+        for each in (walk, walk, copy.deepcopy(walk))
+    ]
+    assert all(np.array_equal(run.tau, runs[0].tau) for run in runs)
+
+
+def test_walk_refuses_flight_and_mpc_refuses_soles() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot)
+    with raises(InputError, "MPC"):
+        Walk(robot, contacts, Gait.flying_trot(robot))
+    talos = judges.load("talos")
+    with raises(InputError, "flat foot", "left_sole_link"):
+        MPC(talos, fb.Contacts.feet(talos), Gait.walk(talos))
+    with raises(InputError, "solve_period", "0.05"):
+        MPC(robot, contacts, Gait.trot(robot), solve_period=0.05)
