@@ -21,7 +21,7 @@ SLIDES = "lecture.html"  # in the site's static files
 # four predictions of each lesson that a class can vote on without the lesson's pictures
 LECTURE = {
     "00": "abcd", "01": "efgh", "02": "acik", "03": "hijm", "04": "adgh", "05": "bcek",
-    "06": "beij", "07": "abgh", "08": "abfg", "09": "cfij", "A": "cdeg", "B": "aefh",
+    "06": "beij", "07": "abgh", "08": "abfg", "09": "cfij", "10": "abde", "A": "cdeg", "B": "aefh",
     "C": "abce", "P": "fghi", "X": "bceg",
 }  # fmt: skip
 _WHY = re.compile(r"\*\*Why\??\*\*:? *")
