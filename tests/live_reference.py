@@ -13,6 +13,7 @@ import pinocchio as pin
 
 import floatbase as fb
 from floatbase.behaviours import Walk
+from floatbase.behaviours._page import controllers
 from floatbase.control.tick import tick
 from floatbase.lessons.publish.live import robots
 
@@ -139,7 +140,7 @@ class _RecordedWalk:
                 walk.gait = replace(walk.gait, stop=t)
             walk.velocity, walk.yaw_rate = (settings[1], 0.0), settings[2]
         command = walk(q, v, t)
-        compiled = walk._controllers[walk.stance].compiled
+        compiled = controllers(walk)[walk.stance].compiled
         assert compiled is not None and command.backend == "compiled" and not command.softened
         inputs = compiled.user_terms.inputs(command.target_values, q, v, t).packed
         com = pin.centerOfMass(walk.robot.model, walk.robot.model.createData(), q)

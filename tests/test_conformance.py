@@ -207,7 +207,7 @@ LEFT_OUT = {
     "made by `slider_panel`": ("SliderPanel",),
     "judges whatever a learner may give": (
         "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in",
-        "array_or_verdict", "predict", "reveal", "review",
+        "array_or_verdict", "predict", "recall", "reveal", "review",
     ),
     "the page's server, with tests of its own": ("Window",),
     "packages call these among themselves, with what they have checked": (
@@ -255,6 +255,9 @@ LEFT_OUT = {
     "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
     "starts processes, with tests of its own": ("sweep", "read_sweep", "push_recovery"),
+    "plans of jumps and horizons, with tests of their own": (
+        "HorizonMotion", "HorizonQP", "Jump", "JumpPlan", "MPC",
+    ),
     "starts a thread": (
         "LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start",
         "LiveSimulation.reset",

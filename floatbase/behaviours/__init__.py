@@ -7,7 +7,7 @@ from floatbase.behaviours.footholds import (
     support_margin,
 )
 from floatbase.behaviours.gait import Gait
-from floatbase.behaviours.horizon import HorizonMotion, HorizonQP
+from floatbase.behaviours.horizon import STATE_WEIGHTS, HorizonMotion, HorizonQP
 from floatbase.behaviours.jump import Jump, JumpPlan
 from floatbase.behaviours.lipm import LIPM, CoMPlan
 from floatbase.behaviours.mpc import MPC
@@ -22,6 +22,7 @@ from floatbase.behaviours.walk import Walk, raibert_foothold
 __all__ = [
     "LIPM",
     "MPC",
+    "STATE_WEIGHTS",
     "CoMPlan",
     "Gains",
     "Gait",

@@ -94,6 +94,11 @@ class JumpPlan:
             Height of the centre of mass above the feet [m].
         gravity : float
             Gravitational acceleration [m/s²].
+
+        Returns
+        -------
+        JumpPlan
+            The plan.
         """
         depth, upwards = _CROUCH * leg, sqrt(2.0 * gravity * height)  # (J1)
         flight, push = 2.0 * upwards / gravity, 2.0 * depth / upwards  # (J2)
@@ -109,7 +114,15 @@ class JumpPlan:
     def com_offset(self, t: float) -> tuple[Array, Array, Array]:
         """Return the planned motion of the centre of mass before take-off, relative to standing.
 
-        Position [m], velocity [m/s] and acceleration [m/s²], each (2,): forwards and upwards.
+        Parameters
+        ----------
+        t : float
+            Time, until the take-off [s].
+
+        Returns
+        -------
+        position, velocity, acceleration : ndarray, shape (2,)
+            Forwards and upwards [m, m/s, m/s²].
         """
         if t < self.push:
             u = (t - self.crouch) / (self.push - self.crouch)

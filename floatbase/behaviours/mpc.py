@@ -69,6 +69,8 @@ class MPC(Walk):
         Time between two solutions, at most `dt` [s]. A change of stance also needs a new solution.
     state_weights : array_like, shape (12,), optional
         Weights of `HorizonQP`.
+    ramp : float, optional
+        Acceleration time, as for `Walk` [s].
     **options : object
         Options of `Walk`. Here `ramp` is 0 by default, because the horizon loads the feet.
 

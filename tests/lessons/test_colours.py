@@ -40,6 +40,8 @@ BOWL = fb.Quadratic.from_residual([[2.0, 0.0], [0.0, 1.0]], [2.0, 1.0])
 def sources() -> Iterator[tuple[str, str]]:
     """Name and text of all code of the lessons, modules and cells."""
     for path in sorted(LESSONS.rglob("*.py")):
+        if path.name == "lecture.py":  # slides: white pages of text
+            continue
         yield path.name, path.read_text(encoding="utf-8")
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
         yield from (

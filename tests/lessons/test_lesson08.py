@@ -91,5 +91,5 @@ def test_panels_tell_loads_and_distances() -> None:
     finally:
         view.close()
     numbers = [float(text) for text in re.findall(r"(-?[\d.]+) (?:N|mm)", loads)]
-    assert np.isclose(sum(numbers[:3]), robot.weight, atol=1.5) and numbers[2:] == [-8.0, -12.5]
+    assert np.isclose(sum(numbers[:3]), robot.weight, atol=1.5) and numbers[2:] == [-8.0, 12.5]
     assert [float(text) for text in re.findall(r"(-?[\d.]+) mm", far)] == [61.0, 54.0, 38.0]
