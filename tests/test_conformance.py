@@ -206,7 +206,7 @@ RESULTS = """
 LEFT_OUT = {
     "made by `slider_panel`": ("SliderPanel",),
     "judges whatever a learner may give": (
-        "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in",
+        "Exercise", "NumericJudge", "ShapeJudge", "check", "compare", "hand_in", "import_answers",
         "array_or_verdict", "predict", "recall", "reveal", "review",
     ),
     "the page's server, with tests of its own": ("Window",),

@@ -32,12 +32,12 @@ Phase: TypeAlias = Literal["stand", "crouch", "push", "flight", "landing"]
 # fractions of the height of the centre of mass above the feet
 _CROUCH, _TUCK = 0.3, 0.15
 _MIN_HEIGHT, _MAX_SIZE = 0.02, 10.0  # m: a larger number must be in another unit
-_CROUCH_TIME = 0.4  # s
+_CROUCH_TIME = 0.4  # s, slow enough to keep the feet on the ground
 _BODY_WEIGHT = 1e2  # of the tasks on the body
 _SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
 _TOUCH_HEIGHT = 2e-3  # m above the ground, below which a foot has landed
 _EARLIEST_LANDING = 0.5  # fraction of the flight
-_DRY_RUN_STEP = 2e-3  # s
+_DRY_RUN_STEP = 2e-3  # s, the usual control period
 _MIN_FRACTION = 0.95  # of the take-off velocity that a dry run must reach
 
 
@@ -179,7 +179,7 @@ class Jump:
     >>> robot = fb.load("go2")
     >>> jump = Jump(robot, fb.Contacts.feet(robot), height=0.2)
     >>> round(float(jump.plan.velocity[1]), 2)
-    1.9
+    1.98
     """
 
     __setattr__ = refuse_new_attributes
