@@ -118,10 +118,12 @@ def add_robot(notebook: Any, number: str) -> None:
     robot = LESSON_ROBOTS[number]
     if robot.panel_call:
         (cell,) = (cell for cell in notebook.cells if robot.panel_call in cell.source)
-        (shown,) = (output.data for output in cell.outputs if "text/html" in output.get("data", {}))
-        element = robot_element(robot, shown["text/html"])
-        shown["text/html"] = f"{robot_script('../_static/')}\n{element}\n<p>{robot.text}</p>"
-        return
+        pages = [data for each in cell.outputs if "text/html" in (data := each.get("data", {}))]
+        if pages:  # stored outputs have no pictures
+            element = robot_element(robot, pages[0]["text/html"])
+            script = robot_script("../_static/")
+            pages[0]["text/html"] = f"{script}\n{element}\n<p>{robot.text}</p>"
+            return
     raw = f"{robot_script('../_static/')}\n{robot_element(robot)}"
     text = (
         f"## Live: push {robot.name}\n\n{robot.text}\n\n```{{raw}} html\n{raw}\n```\n\n"
