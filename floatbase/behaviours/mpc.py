@@ -70,9 +70,9 @@ class MPC(Walk):
     state_weights : array_like, shape (12,), optional
         Weights of `HorizonQP`.
     ramp : float, optional
-        Acceleration time, as for `Walk` [s].
+        As for `Walk` [s]; 0 by default, because the horizon loads the feet.
     **options : object
-        Options of `Walk`. Here `ramp` is 0 by default, because the horizon loads the feet.
+        Options of `Walk`.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
     """
     given = names if isinstance(names, tuple) else ()
     labels = tuple(name for name in given if isinstance(name, ConstraintLabel))
-    if not labels or len(labels) < len(given):  # labels of another QP need no check
+    if not labels or len(labels) < len(given):  # not labels of another QP, which are checked
         labels = tuple(
             name if isinstance(name, ConstraintLabel) else ConstraintLabel(name)
             for name in as_strings(f"{kind}_names", names)
