@@ -3,6 +3,7 @@ import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {setParameter} from "../src/engine/tick.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
+import {largest} from "../src/engine/recovery.js";
 import {deal, mapText, outline} from "../src/live/recovery_map.js";
 import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
 
@@ -111,6 +112,18 @@ test("directions are dealt to all workers, each once", () => {
   const hands = deal(16, 3);
   assert.equal(new Set(hands.flat()).size, 16);
   assert.ok(hands.every((hand) => hand.length >= 5));
+});
+
+test("a search finds the largest number that passes, wherever it begins", () => {
+  for (const answer of [0, 1, 7, 38, 39, 200]) {
+    for (const [first, step] of [[30, 30], [1, 1], [38, 1], [60, 1]]) {
+      let tried = 0;
+      const passes = (count) => { tried++; return count <= answer; };
+      assert.equal(largest(passes, first, step, 1e4), answer);
+      assert.ok(tried <= 2 + 2 * Math.log2(2 + Math.abs(answer - first)), `${tried} tries`);
+    }
+  }
+  assert.ok(largest(() => true, 30, 30, 100) > 100);
 });
 
 test("a map grows around its centre and closes when it is complete", () => {

@@ -1,5 +1,5 @@
-// The largest push that the robot survives in each direction, by the same bisection as
-// `fb.push_recovery`: all pushes are multiples of the resolution.
+// The largest push that the robot survives in each direction, as by `fb.push_recovery`: all pushes
+// are multiples of the resolution. Each search begins at the result of the direction before it.
 
 import {STEP, createEngine} from "./engine.js";
 
@@ -11,12 +11,16 @@ const MOST = 100; // times the weight: a larger push shows that it does not act
 // Yields {direction, push} for each of them, rad and N.
 export async function* pushRecovery({mj, module, robot, settings, directions, duration,
   resolution}) {
-  const engine = createEngine(mj, module, robot);
+  const engine = createEngine(mj, module, robot), weight = robot.weight / resolution;
+  let first = Math.ceil(weight), step = first;
   try {
     for (const direction of directions) {
-      yield {direction, push: resolution * largest(engine, robot, settings, {
-        direction, duration, resolution,
-      })};
+      const isSurvived = (count) => survives(engine, settings, {
+        direction, duration, size: count * resolution,
+      });
+      const found = largest(isSurvived, first, step, MOST * weight);
+      yield {direction, push: resolution * found};
+      [first, step] = [Math.max(1, found), 1];
       await new Promise((go) => { setTimeout(go); }); // messages, such as one to stop
     }
   } finally {
@@ -24,24 +28,24 @@ export async function* pushRecovery({mj, module, robot, settings, directions, du
   }
 }
 
-function largest(engine, robot, settings, given) {
-  let survived = 0, fatal = Math.ceil(robot.weight / given.resolution);
-  while (survives(engine, settings, given, fatal)) {
-    [survived, fatal] = [fatal, 2 * fatal];
-    if (fatal * given.resolution > MOST * robot.weight) break;
+// The largest number that passes, if all smaller ones do: from `first` on with steps that double,
+// then by bisection.
+export function largest(passes, first, step, most) {
+  let passed = 0, failed = Infinity;
+  for (let count = first; failed - passed > 1;) {
+    if (passes(count)) passed = count;
+    else failed = count;
+    if (passed > most) break;
+    count = failed === Infinity ? passed + step
+      : Math.max(Math.floor((passed + failed) / 2), failed - step);
+    step *= 2;
   }
-  while (fatal - survived > 1) {
-    const middle = Math.floor((survived + fatal) / 2);
-    if (survives(engine, settings, given, middle)) survived = middle;
-    else fatal = middle;
-  }
-  return survived;
+  return passed;
 }
 
-function survives(engine, settings, {direction, duration, resolution}, count) {
+function survives(engine, settings, {direction, duration, size}) {
   engine.set(settings);
   engine.reset();
-  const size = count * resolution;
   const force = [size * Math.cos(direction), size * Math.sin(direction), 0];
   engine.push({force, start: START, duration});
   const steps = Math.ceil((START + duration + OBSERVED) / STEP - 1e-9);

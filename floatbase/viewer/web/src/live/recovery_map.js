@@ -5,14 +5,17 @@
 import {three} from "../meshcat.js";
 
 const DIRECTIONS = 16, DURATION = 0.1, RESOLUTION = 5; // -, s, N: those of `fb.push_recovery`
-const MOST_WORKERS = 4;
+const FEWEST_WORKERS = 2, MOST_WORKERS = 4;
 const HEIGHT = 0.004; // m above the ground
 const NOW = 0x0072b2, BEFORE = 0x888888;
 
-// Angles of the directions, rad, dealt to workers like cards: {worker: [direction, …], …}.
+// Angles of the directions, rad, an arc for each worker, which begins each search at the result of
+// its neighbour: [[direction, …], …].
 export function deal(count, workers) {
   const hands = Array.from({length: workers}, () => []);
-  for (let i = 0; i < count; i++) hands[i % workers].push(2 * Math.PI * i / count);
+  for (let i = 0; i < count; i++) {
+    hands[Math.floor(i * workers / count)].push(2 * Math.PI * i / count);
+  }
   return hands;
 }
 
@@ -67,7 +70,8 @@ export function createRecoveryMap(viewer, {scale, name, say}) {
     before?.material.color.setHex(BEFORE);
     shown = line(NOW);
     const {Vector3} = three(), found = [], begun = performance.now(), mine = shown;
-    const count = Math.max(1, Math.min(MOST_WORKERS, (navigator.hardwareConcurrency || 2) - 1));
+    const free = (navigator.hardwareConcurrency || 2) - 1; // one core draws
+    const count = Math.max(FEWEST_WORKERS, Math.min(MOST_WORKERS, free));
     say(mapText(found, 0));
     workers = deal(DIRECTIONS, count).map((directions) => {
       const worker = new Worker("engine.js", {type: "module"});
