@@ -2,7 +2,7 @@
 
     python benchmarks/mpc.py               -> benchmarks/mpc.md
     python benchmarks/mpc.py pushes jumps  measure only these sections again
-    python benchmarks/mpc.py --pushes 30   more pushes
+    python benchmarks/mpc.py --pushes 12   fewer pushes
 
 All robots and speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.
 The control period is 2 ms. Times are processor times of the thread.
@@ -284,7 +284,7 @@ def main() -> None:
     }
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sections", nargs="*", choices=[*sections, []], help="all by default")
-    parser.add_argument("--pushes", type=int, default=12)
+    parser.add_argument("--pushes", type=int, default=30)
     arguments = parser.parse_args()
     path = Path(__file__).with_suffix(".md")
     parts = dict.fromkeys(sections, "")

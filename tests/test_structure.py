@@ -43,7 +43,7 @@ LAYERS = (
     ("__main__",),
 )
 LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
-MAX_LINES = 420  # of a module, without docstrings
+MAX_LINES = 400  # of a module, without docstrings
 MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
 ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}

@@ -14,10 +14,11 @@ from floatbase.behaviours.mpc import MPC
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
 from floatbase.behaviours.plan import StepPlan
+from floatbase.behaviours.raibert import raibert_foothold
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing, SwingPath
 from floatbase.behaviours.terrain import Terrain
-from floatbase.behaviours.walk import Walk, raibert_foothold
+from floatbase.behaviours.walk import Walk
 
 __all__ = [
     "LIPM",

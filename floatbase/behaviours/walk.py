@@ -25,9 +25,7 @@ from floatbase._validation import (
     as_number,
     refuse_new_attributes,
 )
-from floatbase.behaviours._level_place import foot_outline, level_place
 from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.footholds import neutral_point
 from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
 from floatbase.behaviours.gait_clock import GaitClock
 from floatbase.behaviours.lipm import CoMPlan
@@ -48,6 +46,7 @@ from floatbase.behaviours.plan import (
     weight_shift,
 )
 from floatbase.behaviours.posture import WalkingPosture
+from floatbase.behaviours.raibert import raibert_foothold
 from floatbase.behaviours.speed import slow_message, speed_fractions
 from floatbase.behaviours.stance_controllers import StanceControllers
 from floatbase.behaviours.sway import check_friction
@@ -63,7 +62,6 @@ from floatbase.robots import Robot, State
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
-_EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
@@ -391,21 +389,22 @@ class Walk:
         return self.path_at(t).point(self._posture.nominal_feet[foot][:2])
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """Compute the command of one control step.
+        """Follow the plan for one control step, after a new plan if the stance changes.
 
         Parameters
         ----------
         q : array_like, shape (nq,)
-            Configuration.
+            Measured configuration.
         v : array_like, shape (nv,)
-            Velocity.
+            Measured velocity.
         t : float, optional
             The time [s].
 
         Returns
         -------
         Command
-            Joint torques, with the planned accelerations and contact forces.
+            Joint torques of the present stance's controller, with the planned accelerations and
+            contact forces.
         """
         robot, t, active = self._robot, as_number("t", t, "s"), self._active
         q, v = as_vector("q", q, robot.nq), as_vector("v", v, robot.nv)
@@ -601,42 +600,3 @@ class Walk:
             f"{type(self).__name__}({self.robot.name}, {len(self.gait.feet)} feet, "
             f"{forwards:g} and {left:g} m/s)"
         )
-
-
-def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
-    """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
-
-    Where the body turns, the velocity is that of the foot's nominal position. The foothold also
-    lies farther outside by a / ω², with the centripetal acceleration a: the centre of mass of a
-    pendulum runs on a smaller circle than its zero-moment point.
-
-    Parameters
-    ----------
-    foot : str
-        Name of the foot.
-    touchdown : float
-        Time at which the foot lands [s].
-    walk : Walk
-        The walk.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        Foothold in the world frame [m].
-
-    Notes
-    -----
-    The rule is from [Raibert1986]_.
-    """
-    gait, path = walk.gait, walk.path_at(touchdown)
-    velocity = path.point_velocity(np.zeros(2))
-    nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
-    arm = nominal - path.position
-    turning = yaw_rate * np.array([-arm[1], arm[0]])
-    centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
-    point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
-    foothold: Array = point - centripetal / walk.omega**2
-    if walk.options.ground is None:
-        return foothold
-    around = foot_outline(walk.robot.foot(foot), path.yaw)
-    return level_place(walk.options.ground, foothold, around, _EDGE_REACH)
