@@ -24,9 +24,10 @@ RECALLED = (
     "07.g", "08.a", "08.b", "08.f", "08.g", "08.i", "09.c", "09.f", "09.i", "09.j",
     "A.c", "A.d", "A.e", "C.a", "C.b", "C.c",
 )  # fmt: skip
-_FIRST, _GROWTH = timedelta(days=2), 2  # pause after a right answer, and how it grows
-_MISSED, _SURE_AND_MISSED = timedelta(days=1), timedelta(hours=12)  # pause after a wrong answer
-_OLD = timedelta(days=30)  # age of an answer without a time
+FIRST_PAUSE, GROWTH = timedelta(days=2), 2  # after a right answer, and how the pause grows
+MISSED_PAUSE = timedelta(days=1)  # after a wrong answer
+SURE_AND_MISSED_PAUSE = timedelta(hours=12)
+OLD = timedelta(days=30)  # age of an answer without a time
 
 
 def recall(name: str = "", *answer: Any) -> None:
@@ -93,7 +94,7 @@ def due_questions(now: datetime | None = None) -> list[Question]:
     history = progress.history()
     overdue = {}
     for name, (question, result) in _settled().items():
-        pause, last = _MISSED, now - _OLD
+        pause, last = MISSED_PAUSE, now - OLD
         for event in history.get(name, []):
             pause = _next_pause(event, pause, question, result)
             last = _time_of(event) or last
@@ -117,8 +118,8 @@ def _next_pause(
     else:
         return pause
     if knew:
-        return max(_FIRST, _GROWTH * pause)
-    return _SURE_AND_MISSED if event.get("sure") else _MISSED
+        return max(FIRST_PAUSE, GROWTH * pause)
+    return SURE_AND_MISSED_PAUSE if event.get("sure") else MISSED_PAUSE
 
 
 def _time_of(event: dict[str, Any]) -> datetime | None:
@@ -140,13 +141,13 @@ def _settled() -> dict[str, tuple[Question, Any]]:
 
 def question_text(question: Question) -> str:
     """Write a question as plain text, wrapped for a terminal."""
-    parts = [f"{question.name}, {question.topic}", question.context, _capitalized(question.text)]
+    parts = [f"{question.name}, {question.topic}", question.context, capitalized(question.text)]
     plain = [re.sub(r"[*$`]|\[([^\]]*)\]\([^)]*\)", r"\1", part) for part in parts if part]
     lines = [textwrap.fill(part, 88) for part in [*plain, f"({question.form})"]]
     return "\n".join(lines)
 
 
-def _capitalized(text: str) -> str:
+def capitalized(text: str) -> str:
     """Begin a question with a capital letter, unless it begins with the name of a robot."""
     return text if text.startswith(("go2", "solo8")) else text[:1].upper() + text[1:]
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import floatbase as fb
 from floatbase._files import write_whole
@@ -127,11 +129,21 @@ def import_answers(path: str | Path) -> None:
         for name, entry in found[kind].items()
         if name not in known and isinstance(entry, dict)
     }
-    for name, entry in new.items():
+    entries = [*new.items(), *_recalled_in(found)]
+    for name, entry in entries:
         if problem := progress.append(name, entry):
             print(problem)
             return
-    print(f"{len(new)} answers and predictions were added.")
+    print(f"{len(entries)} answers and predictions were added.")
+
+
+def _recalled_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the answers to `recall` in a file of a page that are not known yet."""
+    recalled, known = found.get("recalled"), progress.history()
+    for name, entries in recalled.items() if isinstance(recalled, dict) else ():
+        for entry in entries if isinstance(entries, list) else ():
+            if isinstance(entry, dict) and entry not in known.get(name, []):
+                yield name, entry
 
 
 def _is_of(name: str, lesson: str) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
@@ -15,9 +17,12 @@ import floatbase.__main__
 from floatbase.errors import InputError
 from floatbase.lessons import compare, predict, progress, recall
 from floatbase.lessons.predictions import is_right
+from floatbase.lessons.publish import NOTEBOOKS, site
+from floatbase.lessons.publish.site.recall import recall_data
 from floatbase.lessons.questions import all_questions
 from floatbase.lessons.recalling import PER_DAY, RECALLED, ask, due_questions, question_text
 
+DUE_SCRIPT = Path(site.__file__).parent / "static" / "due.js"
 START = datetime(2026, 3, 2, 9, tzinfo=UTC)
 WEEKS = {0: "00", 1: "01", 7: "02", 9: "03", 14: "04", 21: "05"}  # day -> lesson of that day
 
@@ -116,6 +121,18 @@ def test_what_was_missed_comes_first_and_lessons_are_mixed(home: Path) -> None:
     assert asked == ["03.h", "01.a", "02.d"]
 
 
+def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home: Path) -> None:
+    """Lesson A needs lessons 01 and 02 only, so a learner may open it right after these."""
+    known = all_questions()
+    entries = [settled(name, 0, False) for name in known if known[name].lesson in ("01", "02")]
+    unseen = {"said": 1.0, "time": START.isoformat()}  # predicted, result not seen yet
+    write(home, [*entries, *({name: unseen} for name in known if known[name].lesson == "A")])
+    now = START + timedelta(days=30)
+    asked = due_questions(now)
+    assert len(asked) == PER_DAY
+    assert {question.lesson for question in asked} == {"01", "02"}
+
+
 def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recall()
     assert "nothing to recall" in capsys.readouterr().out
@@ -153,6 +170,68 @@ def test_the_command_asks_what_is_due(
     }  # fmt: skip
     assert progress.history()["01.d"][-1]["knew"] is True
     ask(lambda prompt: (_ for _ in ()).throw(EOFError))
+
+
+def random_history(random: np.random.Generator, names: list[str]) -> list[dict[str, Any]]:
+    """Lines about some of these questions, with predictions, results and answers to recall()."""
+    questions = recall_data([])["questions"]
+    entries = []
+    for name in names:
+        result, unit = questions[name]["result"], questions[name]["unit"]
+        wrong = "none of them" if isinstance(result, str) else 3.25
+        day = random.uniform(-60, 0)
+        said = result if random.random() < 0.5 else wrong
+        entry = {"said": said, "unit": unit, "time": time_of(day)}
+        entry |= {"sure": bool(random.random() < 0.5)} if random.random() < 0.5 else {}
+        entries.append({name: entry})
+        if random.random() < 0.9:
+            entries.append({name: {"is": result, "time": time_of(day + 0.01)}})
+        for _ in range(random.integers(0, 4)):
+            day += random.uniform(0, 20)
+            knew = bool(random.random() < 0.6)
+            time = time_of(day) if random.random() < 0.9 else random.choice(["", "soon"])
+            entries.append({name: {"recalled": said, "knew": knew, "time": str(time)}})
+    return entries
+
+
+def time_of(day: float) -> str:
+    return (START + timedelta(days=day)).isoformat(timespec="seconds")
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+def test_the_site_asks_what_recall_asks(home: Path) -> None:
+    """due.js and `due_questions` on the same forty histories."""
+    random = np.random.default_rng(2)
+    data = recall_data([])
+    cases, expected = [], []
+    for count in [*range(10), *[20, 46] * 15]:
+        names = [str(name) for name in random.choice(RECALLED, count, replace=False)]
+        write(home, random_history(random, names))
+        expected.append([question.name for question in due_questions(START)])
+        cases.append(progress.history())
+    assert {len(names) for names in expected} == {0, 1, 2, 3}
+    program = """
+        require(process.argv[1]);
+        const {rule, questions, cases, now} = JSON.parse(require("fs").readFileSync(0));
+        const due = (history) => floatbaseRules.due(rule, questions, history, now);
+        console.log(JSON.stringify(cases.map(due)));
+    """
+    given = data | {"cases": cases, "now": START.timestamp() * 1000}
+    ran = subprocess.run(
+        ["node", "-e", program, str(DUE_SCRIPT)],
+        input=json.dumps(given), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert json.loads(ran.stdout) == expected
+
+
+def test_the_page_knows_every_question_and_its_result() -> None:
+    data = recall_data([NOTEBOOKS / "02_equations_of_motion.ipynb"])
+    assert list(data["questions"]) == list(RECALLED)
+    for name, question in data["questions"].items():
+        assert is_right(question["result"], question["result"], question["unit"])
+        assert not set("*$`") & set(question["text"] + question["topic"]), name
+        in_02 = "lessons/02_equations_of_motion.html" if name.startswith("02") else None
+        assert question["address"] == in_02
 
 
 def test_damaged_times_and_answers_do_no_harm(home: Path) -> None:

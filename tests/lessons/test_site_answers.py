@@ -16,10 +16,17 @@ import floatbase.lessons.publish.site as site
 from floatbase.errors import InputError
 from floatbase.lessons import all_exercises, import_answers, progress, review
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook
+from floatbase.lessons.publish.site import recall
 from floatbase.lessons.questions import all_questions
+from floatbase.lessons.recalling import due_questions
+from floatbase.lessons.submission import FILE_FORMAT
 
 browser = browser_of_a_file
-SCRIPT = Path(site.__file__).parent / "static" / "answers.js"
+OLD_TIME = "2026-01-01T00:00:00Z"
+STATIC = Path(site.__file__).parent / "static"
+SCRIPTS = "".join(
+    f"<script>{(STATIC / name).read_text()}</script>" for name in ("due.js", "answers.js")
+)
 
 
 class NoPictures:
@@ -32,6 +39,7 @@ def elements(lesson: str) -> list[str]:
     path = next(NOTEBOOKS.glob(f"{lesson}_*.ipynb"))
     prepared = site.prepare_lesson(read_notebook(path), NoPictures(), {})
     cells = [cell.source for cell in prepared.cells if "data-answers" in cell.source]
+    cells = [cell for cell in cells if "answers-recall" not in cell]
     return [cell.removeprefix("```{raw} html\n").removesuffix("\n```") for cell in cells]
 
 
@@ -81,9 +89,7 @@ def page(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any
     """A page with the forms of lessons 00 and 03."""
     folder = tmp_path_factory.mktemp("answers")
     forms = "\n".join(elements("03") + [e for e in elements("00") if "-exercise" in e])
-    (folder / "page.html").write_text(
-        f"<!doctype html><meta charset=utf-8>{forms}<script>{SCRIPT.read_text()}</script>"
-    )
+    (folder / "page.html").write_text(f"<!doctype html><meta charset=utf-8>{forms}{SCRIPTS}")
     with served(folder) as address:
         opened = browser.new_context(accept_downloads=True).new_page()
         faults: list[str] = []
@@ -164,6 +170,70 @@ def test_a_reader_answers_lesson_03_reloads_and_hands_in(
     _, *table, calibration = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in table][: len(sure)] == sure
     assert f"of {len(names[::3])}" in calibration
+
+
+@pytest.fixture(scope="module")
+def recalling(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any]:
+    """A page that asks what is due."""
+    folder = tmp_path_factory.mktemp("recall")
+    recall.write_script([NOTEBOOKS / "02_equations_of_motion.ipynb"], folder)
+    (folder / "page.html").write_text(
+        f"<!doctype html><meta charset=utf-8>{recall.recall_box('')}{SCRIPTS}"
+    )
+    with served(folder) as address:
+        opened = browser.new_page()
+        opened.goto(f"{address}/page.html")
+        yield opened
+
+
+@pytest.mark.front_end
+def test_a_reader_recalls_with_the_keyboard(
+    recalling: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, box = recalling, recalling.locator(".answers-recall")
+    assert "some days after" in box.inner_text()
+    said = {"01.d": [1, 2], "01.e": "true", "02.c": "they stay", "02.d": 43.1}
+    predictions = {
+        name: {"said": answer, "unit": "", "sure": False, "is": 0, "time": OLD_TIME}
+        for name, answer in said.items()
+    }
+    keep = "kept => localStorage.setItem('floatbase-answers', JSON.stringify(kept))"
+    page.evaluate(keep, {"predictions": predictions})
+    page.reload()
+    names = [text.split(",")[0] for text in box.locator("form p").all_inner_texts()]
+    assert names == ["01.d", "02.c", "01.e"]  # missed ones first, of different lessons
+    page.keyboard.press("Tab")
+    page.keyboard.type("18 12")
+    page.keyboard.press("Enter")
+    first, second, _ = box.locator("form").all()
+    assert "Right: " in first.locator("output").inner_text()
+    page.keyboard.press("Enter")  # counts once
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Answer"  # focus is kept
+    page.keyboard.press("Tab")
+    page.keyboard.type("they s")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    said_of_it = second.locator("output")
+    assert "they fly up" in said_of_it.inner_text() and "Not yet" in said_of_it.inner_text()
+    assert second.get_by_role("link", name="lesson 02").get_attribute("href").startswith("http")
+    assert second.get_by_role("combobox", name="02.c").count() == 1
+    assert second.get_by_role("status").count() == 1  # is read out
+
+    kept = json.loads(page.evaluate("localStorage.getItem('floatbase-answers')"))
+    knew = {name: [one["knew"] for one in said] for name, said in kept["recalled"].items()}
+    assert knew == {"01.d": [True], "02.c": [False]}
+    page.reload()
+    names = [text.split(",")[0] for text in box.locator("form p").all_inner_texts()]
+    assert names == ["01.e", "02.d"]
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    written = {"form": FILE_FORMAT, "exercises": {}} | kept
+    (tmp_path / "a.json").write_text(json.dumps(written))
+    for _ in range(2):
+        import_answers(tmp_path / "a.json")
+        history = progress.history()
+        assert [event.get("knew") for event in history["02.c"]] == [None, False]
+    assert [question.name for question in due_questions()] == ["01.e", "02.d"]
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"form": "answers to the floatbase course"}'])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,19 +49,40 @@ def prediction_form(source: str, results: dict[str, str]) -> Any | None:
         The results of the lesson, from `printed_results`.
     """
     name, given = predict_call(source)
-    choices, unit, count = given.get("choices", []), given.get("unit", ""), given.get("count", 1)
-    printed = results.get(name, "")
+    data = answer_data(name, results.get(name, ""), **given)
+    text = f"{name}, your prediction. You can make it in {_LINK}."
+    return element("prediction", data, text) if data else None
+
+
+def answer_data(
+    name: str, printed: str, choices: Sequence[str] = (), unit: str = "", count: int = 1
+) -> dict[str, Any] | None:
+    """Return what a page needs to ask for a prediction and to judge it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the prediction.
+    printed : str
+        The result that the lesson prints.
+    choices, unit, count
+        As for `predict`.
+
+    Returns
+    -------
+    dict or None
+        The data, or None if the result cannot be read.
+    """
     result = _read_result(printed, choices, unit, count)
     if result is None:
         return None
-    data = {
-        "name": name, "unit": unit, "count": count, "choices": choices, "result": result,
+    return {
+        "name": name, "unit": unit, "count": count, "choices": list(choices), "result": result,
         "right": accepted(result, unit), "shown": printed,
     }  # fmt: skip
-    return _element("prediction", data, f"{name}, your prediction. You can make it in {_LINK}.")
 
 
-def _read_result(printed: str, choices: list[str], unit: str, count: int) -> Any:
+def _read_result(printed: str, choices: Sequence[str], unit: str, count: int) -> Any:
     """Return the result that a lesson prints, or None if it cannot be read."""
     if choices:
         return printed if printed in choices else None
@@ -100,7 +121,7 @@ def exercise_form(exercise: Exercise) -> Any | None:
         "name": exercise.name, "unit": "", "count": right.size, "choices": [], "cases": cases,
         "otherwise": general_hint("unknown_count" if judge.is_count else "unknown"),
     }  # fmt: skip
-    return _element("exercise", data, f"{exercise.name}: you can check your answer in {_LINK}.")
+    return element("exercise", data, f"{exercise.name}: you can check your answer in {_LINK}.")
 
 
 def _interval(value: Any, tolerance: float) -> list[tuple[float, float]]:
@@ -116,11 +137,20 @@ def review_element(source: str) -> Any | None:
     if not found:
         return None
     data = {"lesson": lesson_name(found[1] or ""), "form": FILE_FORMAT}
-    return _element("review", data, f"Your predictions appear here, and in {_LINK}.")
+    return element("review", data, f"Your predictions appear here, and in {_LINK}.")
 
 
-def _element(kind: str, data: dict[str, Any], text: str) -> Any:
+def element(kind: str, data: dict[str, Any], text: str) -> Any:
     """Return an element that the page's script fills, as a cell; without a script it is a text."""
+    return new_markdown_cell(as_markdown(element_html(kind, data, text)))
+
+
+def element_html(kind: str, data: dict[str, Any], text: str) -> str:
+    """Return an element that the page's script fills; see `element`."""
     written = html.escape(json.dumps(data, ensure_ascii=False))
-    raw = f'<div class="live answers-{kind}" data-answers="{written}"><p>{text}</p></div>'
-    return new_markdown_cell(f"```{{raw}} html\n{raw}\n```")
+    return f'<div class="live answers-{kind}" data-answers="{written}"><p>{text}</p></div>'
+
+
+def as_markdown(raw: str) -> str:
+    """Return HTML as a part of a Markdown page."""
+    return f"```{{raw}} html\n{raw}\n```"

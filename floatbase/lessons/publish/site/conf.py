@@ -62,6 +62,7 @@ html_css_files = ["site.css", "pictures.css"]
 html_js_files = [
     ("pictures.js", {"defer": "defer"}),
     ("search.js", {"defer": "defer"}),
+    ("due.js", {"defer": "defer"}),
     ("answers.js", {"defer": "defer"}),
 ]
 html_show_sphinx = False

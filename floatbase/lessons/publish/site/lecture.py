@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 from functools import cache
 from pathlib import Path
@@ -12,10 +11,11 @@ from floatbase._files import write_whole
 from floatbase.lessons.publish.contents import title_of
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.site.answers import printed_results
+from floatbase.lessons.publish.site.inline import inline_html
 from floatbase.lessons.publish.site.live_robots import LESSON_ROBOTS
-from floatbase.lessons.publish.site.mathml import mathml
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 from floatbase.lessons.questions import Question, all_questions
+from floatbase.lessons.recalling import capitalized
 
 SLIDES = "lecture.html"  # in the site's static files
 # four predictions of each lesson that a class can vote on without the lesson's pictures
@@ -25,7 +25,6 @@ LECTURE = {
     "C": "abce", "P": "fghi", "X": "bceg",
 }  # fmt: skip
 _WHY = re.compile(r"\*\*Why\??\*\*:? *")
-_CODE = re.compile(r"`([^`]+)`|\$([^$]+)\$")
 
 
 class LectureQuestion(NamedTuple):
@@ -110,8 +109,7 @@ def page() -> str:
 
 
 def _question(question: Question) -> str:
-    text = question.text.replace("**", "")
-    return text if text.startswith(("go2", "solo8")) else text[:1].upper() + text[1:]
+    return capitalized(question.text.replace("**", ""))
 
 
 def slides(in_site: bool = False) -> str:
@@ -119,21 +117,23 @@ def slides(in_site: bool = False) -> str:
     made = []
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
         lesson = path.name.split("_")[0]
-        made.append(f"<section><h1>{_html(title_of(path))}</h1></section>")
+        made.append(f"<section><h1>{inline_html(title_of(path))}</h1></section>")
         for question, result, reason in lecture_questions()[lesson]:
-            options = "".join(f"<li>{_html(choice)}</li>" for choice in question.choices)
+            options = "".join(f"<li>{inline_html(choice)}</li>" for choice in question.choices)
             options = (
-                f"<ol type=A>{options}</ol>" if options else f"<p>({_html(question.form)})</p>"
+                f"<ol type=A>{options}</ol>"
+                if options
+                else f"<p>({inline_html(question.form)})</p>"
             )
             live = ""
             if lesson in LESSON_ROBOTS and in_site:
                 address = f"../lessons/{path.stem}.html"
                 live = f"<p>Try it: <a href='{address}'>the live robot</a> of this lesson.</p>"
             made.append(
-                f"<section><p class=context>{_html(question.context)}</p>"
-                f"<h2>{_html(_question(question))}</h2>{options}"
-                f"<div class=answer><p><strong>{_html(result)}</strong></p>"
-                f"<p>{_html(reason)}</p>{live}</div>"
+                f"<section><p class=context>{inline_html(question.context)}</p>"
+                f"<h2>{inline_html(_question(question))}</h2>{options}"
+                f"<div class=answer><p><strong>{inline_html(result)}</strong></p>"
+                f"<p>{inline_html(reason)}</p>{live}</div>"
                 f"<footer>{question.name}</footer></section>"
             )
     return _PAGE.replace("SECTIONS", "\n".join(made))
@@ -142,25 +142,6 @@ def slides(in_site: bool = False) -> str:
 def write_slides(path: Path, in_site: bool = False) -> None:
     """Write the slides to a file; see `slides`."""
     write_whole(path, slides(in_site).encode())
-
-
-def _html(text: str) -> str:
-    """Convert a paragraph of Markdown with formulas to HTML."""
-    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
-    parts = []
-    last = 0
-    for match in _CODE.finditer(text):
-        parts.append(_emphasis(text[last : match.start()]))
-        code, formula = match.groups()
-        parts.append(mathml(formula) if formula else f"<code>{html.escape(code)}</code>")
-        last = match.end()
-    return "".join([*parts, _emphasis(text[last:])])
-
-
-def _emphasis(text: str) -> str:
-    text = re.sub(r"</?\w+[^>]*>", "", text)  # the few tags in a lesson, such as <br>
-    text = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", html.escape(text, quote=False))
-    return re.sub(r"\*(.+?)\*", r"<em>\1</em>", text)
 
 
 _PAGE = """<!doctype html>

@@ -17,11 +17,13 @@ import floatbase
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
 from floatbase.lessons.publish.site.answers import (
+    as_markdown,
     exercise_form,
     prediction_form,
     printed_results,
     review_element,
 )
+from floatbase.lessons.publish.site.recall import recall_box
 from floatbase.lessons.publish.site.references import add_links
 from floatbase.lessons.questions import predict_call
 
@@ -144,9 +146,7 @@ def _prepare_code_cell(
             return form
         return new_markdown_cell(_live_lesson_note("Checks and hints are in the live lesson"))
     if cell.source.startswith("recall("):
-        return new_markdown_cell(
-            _live_lesson_note("Questions of earlier lessons come back here in the live lesson")
-        )
+        return new_markdown_cell(as_markdown(recall_box("../_static/")))
     if form := review_element(cell.source):
         return form
     if _LEARNER_CALLS.search(cell.source):

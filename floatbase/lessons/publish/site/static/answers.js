@@ -4,19 +4,24 @@
 {
   const KEY = "floatbase-answers";
   const LARGEST = 1e15;
+  const SITE = new URL("..", document.currentScript.src || location.href); // script: in a folder of it
+  const {due, isRight, within} = globalThis.floatbaseRules;
 
+  // predictions and exercises: name -> entry; recalled: name -> list of answers
   const load = () => {
+    let found = null;
     try {
-      const found = JSON.parse(localStorage.getItem(KEY)) ?? {};
-      return {predictions: found.predictions ?? {}, exercises: found.exercises ?? {}};
+      found = JSON.parse(localStorage.getItem(KEY));
     } catch {
-      return {predictions: {}, exercises: {}};
+      // damaged, or not allowed
     }
+    const kinds = ["predictions", "exercises", "recalled"];
+    return Object.fromEntries(kinds.map((kind) => [kind, found?.[kind] ?? {}]));
   };
 
   const store = (kind, name, entry) => {
     const kept = load();
-    kept[kind][name] = entry;
+    kept[kind][name] = kind === "recalled" ? [...kept.recalled[name] ?? [], entry] : entry;
     try {
       localStorage.setItem(KEY, JSON.stringify(kept));
       return true;
@@ -39,17 +44,11 @@
     return text.trim() && fits && numbers.length === count ? numbers : null;
   };
 
-  const within = (numbers, intervals) =>
-    numbers.every((x, i) => x >= intervals[i][0] - 1e-6 && x <= intervals[i][1] + 1e-6);
-
-  const isRight = (said, right) =>
-    typeof right === "string" ? said === right : within([said].flat(), right);
-
   const wanted = ({unit, count}) =>
     `${count === 1 ? "a number" : `${count} numbers`}${unit ? `, in ${unit}` : ""}`;
 
   const field = (data) => data.choices.length
-    ? make("select", {name: "answer"}, make("option", {value: "", textContent: "choose …"}),
+    ? make("select", {name: "answer", ariaLabel: `${data.name}: choose an answer`}, make("option", {value: "", textContent: "choose …"}),
       ...data.choices.map((choice) => make("option", {value: choice, textContent: choice})))
     : make("input", {name: "answer", inputMode: "decimal", autocomplete: "off", size: 12,
       ariaLabel: `${data.name}: ${wanted(data)}`});
@@ -186,7 +185,58 @@
     show();
   };
 
-  const KINDS = {prediction, exercise, review};
+  // the events of each question in the order of their times
+  const histories = ({predictions, recalled}) => Object.fromEntries(
+    Object.entries(predictions).map(([name, entry]) => [name, [entry, ...recalled[name] ?? []]
+      .sort((a, b) => Date.parse(a.time) - Date.parse(b.time))]));
+
+  const recallForm = (data) => {
+    const message = make("output");
+    const question = make("p", {id: `recall-${data.name}`});
+    question.innerHTML = `<strong>${data.name}</strong>, ${data.topic}. ${data.context}
+      <strong>${data.text}</strong>`;
+    const answerField = field(data);
+    answerField.setAttribute("aria-describedby", question.id);
+    const button = make("button", {textContent: "Answer"});
+    const label = data.choices.length ? "" : ` (${wanted(data)})`;
+    const form = make("form", {}, question, `Your answer${label}: `, answerField, " ", button,
+      message);
+    let isAnswered = false;
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      if (isAnswered) return; // the result is shown
+      const recalled = answerIn(form, data, (text) => { message.textContent = ` ${text}`; });
+      if (recalled === null) return;
+      const knew = isRight(recalled, data.right);
+      isAnswered = true;
+      button.ariaDisabled = "true"; // and it keeps the focus
+      const result = make("strong", {textContent: data.shown});
+      message.replaceChildren(knew ? " Right: " : " Not yet. The result is ", result, ".");
+      if (!knew) {
+        const lesson = `lesson ${data.lesson}`;
+        const link = data.address
+          ? make("a", {href: new URL(data.address, SITE).href, textContent: lesson}) : lesson;
+        message.append(" Look it up in ", link, ".");
+      }
+      const entry = {recalled, knew, time: new Date().toISOString()};
+      if (!store("recalled", data.name, entry)) message.append(" This browser does not keep it.");
+    });
+    return form;
+  };
+
+  const recall = (element) => {
+    const {rule, questions} = globalThis.floatbaseRecall;
+    const known = histories(load());
+    const names = due(rule, questions, known, Date.now());
+    const some = Object.keys(questions).some((name) => name in known);
+    const text = names.length ? "From earlier lessons:"
+      : some ? "There is nothing to recall today."
+        : "Questions of earlier lessons come back here, some days after you have predicted the result.";
+    element.replaceChildren(make("p", {textContent: text}),
+      ...names.map((name) => recallForm(questions[name])));
+  };
+
+  const KINDS = {prediction, exercise, review, recall};
   for (const [kind, fill] of Object.entries(KINDS)) {
     for (const element of document.querySelectorAll(`.answers-${kind}`)) {
       fill(element, JSON.parse(element.dataset.answers));

@@ -1,0 +1,96 @@
+"""Questions of earlier lessons in the pages of the site, asked again after days.
+
+Their texts and results are one script, which the pages load. Which of them are due is decided in
+the reader's browser by the rule of `floatbase.lessons.recalling`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+from floatbase._files import write_whole
+from floatbase.lessons import recalling
+from floatbase.lessons.publish.notebooks import read_notebook
+from floatbase.lessons.publish.site.answers import answer_data, element_html, printed_results
+from floatbase.lessons.publish.site.inline import inline_html
+from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.questions import Question, all_questions
+
+SCRIPT = "recall-questions.js"  # in the site's static files
+_NOTE = "Questions of earlier lessons come back here, and in the live lesson."
+
+
+def recall_data(lessons: Iterable[Path]) -> dict[str, Any]:
+    """Return the questions that may be asked again, and the rule that decides when.
+
+    Parameters
+    ----------
+    lessons : iterable of Path
+        The lessons of the site.
+
+    Returns
+    -------
+    dict
+        "rule" with pauses in hours, and "questions" by name. A question has texts in HTML, the
+        answers that count as right, and the address of its lesson, if it is on the site.
+    """
+    addresses = {path.name.split("_")[0]: f"lessons/{path.stem}.html" for path in lessons}
+    printed: dict[str, str] = {}
+    for path in NOTEBOOKS.glob("*.ipynb"):
+        cells = read_notebook(path).cells
+        printed |= printed_results(cell for cell in cells if cell.cell_type == "code")
+    questions = {}
+    for name in recalling.RECALLED:
+        question = all_questions()[name]
+        data = answer_data(
+            name, printed[name], question.choices, question.unit, question.count
+        )  # fmt: skip
+        if data:
+            questions[name] = data | _texts(question) | {"address": addresses.get(question.lesson)}
+    return {"rule": rule(), "questions": questions}
+
+
+def rule() -> dict[str, float]:
+    """Return the numbers of the rule that decides which questions are due; pauses in hours."""
+    hour = timedelta(hours=1)
+    return {
+        "perDay": recalling.PER_DAY,
+        "first": recalling.FIRST_PAUSE / hour,
+        "growth": recalling.GROWTH,
+        "missed": recalling.MISSED_PAUSE / hour,
+        "sureAndMissed": recalling.SURE_AND_MISSED_PAUSE / hour,
+        "old": recalling.OLD / hour,
+    }
+
+
+def _texts(question: Question) -> dict[str, str]:
+    return {
+        "lesson": question.lesson,
+        "topic": inline_html(question.topic),
+        "context": inline_html(question.context),
+        "text": inline_html(recalling.capitalized(question.text)),
+    }
+
+
+def recall_box(static: str) -> str:
+    """Return the box that asks the questions that are due, as HTML.
+
+    Parameters
+    ----------
+    static : str
+        Address of the site's static files, as seen from the page.
+    """
+    return f'<script src="{static}{SCRIPT}"></script>\n{element_html("recall", {}, _NOTE)}'
+
+
+def write_script(lessons: Iterable[Path], folder: Path) -> list[str]:
+    """Write the script with the questions, and return their texts, which may have formulas."""
+    data = recall_data(lessons)
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+    write_whole(folder / SCRIPT, f"globalThis.floatbaseRecall = {text};\n".encode())
+    kinds = ("topic", "context", "text")
+    return [one[kind] for one in data["questions"].values() for kind in kinds]
