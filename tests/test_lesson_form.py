@@ -213,6 +213,13 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
     assert reviewed[0] > max(i for i, _ in named(path, "compare"))
 
 
+@LESSONS
+def test_a_lesson_with_lessons_before_it_begins_with_recall(path: Path) -> None:
+    code = [cell.source for cell in cells(path) if cell.cell_type == "code"]
+    recalls = [i for i, source in enumerate(code) if source.startswith("recall()")]
+    assert recalls == ([] if path.stem.startswith(("00", "01")) else [1])  # after the imports
+
+
 @cache
 def the_map() -> str:
     return equations.table()

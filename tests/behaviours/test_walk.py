@@ -480,6 +480,24 @@ def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing() -
     assert record.measured[:, 2::3].max() < walk.robot.weight
 
 
+def test_the_zmp_does_not_jump_when_a_trot_stops() -> None:
+    """The planned ZMP jumped at that time, and rounding chose the value before or after it."""
+    plans: list[fb.behaviours.StepPlan] = []
+    walk = walk_of(
+        "go2", Gait.trot, (0.3, 0.0), modify_plan=lambda plan, state: plans.append(plan) or plan
+    )
+    sim = fb.Simulation(walk.robot)
+    for _ in range(3):
+        fb.rollout(sim, walk, 1.7, control_period=PERIOD)
+        walk.gait = Gait.trot(walk.robot, start=sim.time + 0.8)  # it stands until then
+        fb.rollout(sim, walk, 0.8, control_period=PERIOD)
+    stops = [(a, b) for a, b in itertools.pairwise(plans) if len(a.stance) < len(b.stance) == 4]
+    assert len(stops) == 3
+    for before, after in stops:
+        zmps = [before.plan.zmp(after.time - 1e-6), after.plan.zmp(after.time)]
+        np.testing.assert_allclose(zmps[1], zmps[0], atol=1e-5)
+
+
 def test_another_gait_takes_over_when_all_feet_stand() -> None:
     walk = walk_of("go2", Gait.trot, (0.05, 0.0))
     sim = fb.Simulation(walk.robot)

@@ -120,6 +120,18 @@ def test_what_was_missed_comes_first_and_lessons_are_mixed(home: Path) -> None:
     assert asked == ["03.h", "01.a", "02.d"]
 
 
+def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home: Path) -> None:
+    """Lesson A needs lessons 01 and 02 only, so a learner may open it right after these."""
+    known = all_questions()
+    entries = [settled(name, 0, False) for name in known if known[name].lesson in ("01", "02")]
+    unseen = {"said": 1.0, "time": START.isoformat()}  # predicted, result not seen yet
+    write(home, [*entries, *({name: unseen} for name in known if known[name].lesson == "A")])
+    now = START + timedelta(days=30)
+    asked = due_questions(now)
+    assert len(asked) == PER_DAY
+    assert {question.lesson for question in asked} == {"01", "02"}
+
+
 def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recall()
     assert "nothing to recall" in capsys.readouterr().out

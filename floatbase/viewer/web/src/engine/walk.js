@@ -221,7 +221,8 @@ export function createWalk(robot, tick, gravity) {
         if (Math.abs(times[1] - phase.end) < 2 * constants.timeTolerance) feet[foot] = planned;
       }
     }
-    const zmp = plan === null ? centres[0] : zmpAt(plan.pieces, t);
+    // at a jump of the planned ZMP, the value up to now
+    const zmp = plan === null ? centres[0] : zmpAt(plan.pieces, t - constants.timeTolerance);
     const pieces = pendulum(zmpSegments(phases, centres, zmp), measured.com, omega, math);
     const swings = names.flatMap((foot) => {
       if (inAir.has(foot)) return [inAir.get(foot)];
