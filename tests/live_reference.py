@@ -16,6 +16,7 @@ from floatbase.behaviours import Walk
 from floatbase.behaviours._page import controllers
 from floatbase.control.tick import tick
 from floatbase.lessons.publish.live import robots
+from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
 
 STATES_PER_ROBOT = 200
 RUN_TIME = 1.5  # s
@@ -25,7 +26,7 @@ PUSH_TIME = 0.2  # s, when a push begins
 SETTINGS = ((0.7, 1.0, 4), (0.7, 1.0, 16), (0.12, 1.0, 4), (0.3, 0.6, 8), (0.5, 0.35, 4),
             (0.05, 0.01, 4))  # fmt: skip
 # robot, settings of the page, force of the push on the base [N] and its duration [s]
-RUNS: tuple[tuple[str, dict[str, float], tuple[float, float, float], float], ...] = (
+RUNS: tuple[tuple[str, dict[str, Any], tuple[float, float, float], float], ...] = (
     ("go2", {}, (0.0, 0.0, 0.0), 0.1),
     ("go2", {}, (0.0, 30.0, 0.0), 0.1),
     ("go2", {}, (60.0, 0.0, 0.0), 0.1),
@@ -37,6 +38,11 @@ RUNS: tuple[tuple[str, dict[str, float], tuple[float, float, float], float], ...
     ("go2", {}, (0.0, 300.0, 0.0), 0.2),
     ("talos", {}, (0.0, 60.0, 0.0), 0.1),
     ("solo12", {"payload": 0.5, "actualPayload": 0.5}, (5.0, 0.0, 0.0), 0.1),
+    ("go2", {"hasGravity": False}, (0.0, 30.0, 0.0), 0.1),
+    ("go2", {"actualHasGravity": False}, (0.0, 30.0, 0.0), 0.1),
+    ("go2", {"hasCoriolis": False}, (0.0, 170.0, 0.0), 0.1),
+    ("go2", {"actualHasCoriolis": False}, (0.0, 170.0, 0.0), 0.1),
+    ("go2", {"missing": ["FL_foot"]}, (0.0, 0.0, 0.0), 0.1),
 )
 # robot, friction coefficient, and for each time [s] the page's settings from then on: gait, speed
 # [m/s], yaw rate [rad/s]; a push in between
@@ -102,16 +108,27 @@ def _answer(made: fb.WholeBodyController, q: Any, v: Any) -> tuple[int, list[Any
     return count, [q, v, *matrices, result[compiled.tau], active]
 
 
-def _run(name: str, given: dict[str, float], force: Any, duration: float) -> dict[str, Any]:
+def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[str, Any]:
     robot = fb.load(name)
     standing = robot.standing()
-    sim = fb.Simulation(robot, given.get("actualMu", robots.MU))
+    perturbation = Perturbation(
+        gravity=given.get("actualHasGravity", True),
+        velocity_forces=given.get("actualHasCoriolis", True),
+        disabled_contacts=given.get("missing", ()),
+    )
+    mismatch = ModelMismatch(
+        gravity=given.get("hasGravity", True), velocity_forces=given.get("hasCoriolis", True)
+    )
+    mu = given.get("actualMu", robots.MU)
+    sim = PerturbedSimulation(robot, mu, perturbation=perturbation)
     if "actualPayload" in given:
         sim.model.body_mass[1] += given["actualPayload"]
         mujoco.mj_setConst(sim.model, mujoco.MjData(sim.model))
     sim.reset(standing)
     assumed = _with_payload(robot, given.get("payload", 0.0))
-    made = robots.controller(assumed, given.get("mu", robots.MU))
+    made = robots.controller(
+        assumed, given.get("mu", robots.MU), mismatch=None if mismatch.is_exact else mismatch
+    )
     made = made.replace(tasks=fb.standing_tasks(standing))
     push = fb.Push(force, PUSH_TIME, duration)
     # the simulation is of the robot without its payload

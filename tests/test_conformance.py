@@ -24,11 +24,11 @@ import judges
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from values import UP, controller, record, values
+from values import UP, controller, horizon_arguments, record, values
 
 import floatbase as fb
 from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
-from floatbase.behaviours import Gait, Stand, Walk
+from floatbase.behaviours import MPC, Gait, Jump, Stand, Walk
 from floatbase.control import AnalyticController
 from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
@@ -120,6 +120,9 @@ def right() -> dict[str, Any]:
     walk = Walk(robot, contacts, gait)
     walk(state.q, state.v)  # so that it has a plan
     view, qp = fb.Viewer(robot), values()["QP"]
+    mpc = MPC(robot, contacts, gait)
+    mpc(state.q, state.v)
+    x, reference, feet, stance = horizon_arguments()
     forces = 30.0 * np.tile(UP, 4)
     perturbed, session = PerturbedSimulation(robot), Session(robot)
     return values() | {
@@ -132,7 +135,10 @@ def right() -> dict[str, Any]:
         "AnalyticController": AnalyticController(robot, contacts, state),
         "Delay": Delay(robot, 0.01), "Walk": walk,
         "FirstOrderLag": FirstOrderLag(robot, 10.0), "Stand": Stand(robot, fb.Contacts.feet(robot)),
-        "Gait": gait,
+        "Gait": gait, "MPC": mpc, "Jump": Jump(robot, fb.Contacts.feet(robot), 0.1),
+        "Jump.height": 0.1, "JumpPlan.of.height": 0.1,
+        **{f"HorizonQP.{name}.state": x for name in ("qp", "solve")},
+        "HorizonQP.reference": reference, "HorizonQP.feet": feet, "HorizonQP.stance": stance,
         "Affine": fb.Affine(np.eye(12), ZERO, {"tau": slice(0, 3)}),
         "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
         "ConstantTorques": ConstantTorques(ZERO), "Controller": controller(),
@@ -255,9 +261,6 @@ LEFT_OUT = {
     "moves a control that is there, with tests of its own": ("Viewer.set_control_value",),
     "ends what other calls need": ("Viewer.close", "LiveSimulation.close"),
     "starts processes, with tests of its own": ("sweep", "read_sweep", "push_recovery"),
-    "plans of jumps and horizons, with tests of their own": (
-        "HorizonMotion", "HorizonQP", "Jump", "JumpPlan", "MPC",
-    ),
     "starts a thread": (
         "LiveSimulation.push", "LiveSimulation.call_soon", "LiveSimulation.start",
         "LiveSimulation.reset",

@@ -205,6 +205,8 @@ SEARCHES = {
     "push recovery": "Push recovery and parameter sweeps",
     "mp4": "Viewer in notebooks, pages and films",
     "dark mode": "Viewer in notebooks, pages and films",
+    "contact forces": "Simulation and rollouts",
+    "equations": "Equations",
     "numba cache": "Installation and troubleshooting",
     "cite": "References",
 }

@@ -42,7 +42,6 @@ NO_VALUES = {
     "a text": "ConstraintLabel",
     "memory of a thread or a window": "LiveSimulation SliderPanel Viewer",
     "an answer that rollout copies": "TorqueCommand",
-    "plans of numbers, with tests of their own": "HorizonMotion HorizonQP JumpPlan",
     "with a memory of what they do": "Jump Latency MPC Observed Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
     "shapes of a picture": "Item PictureOptions View",

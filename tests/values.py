@@ -10,7 +10,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators
-from floatbase.behaviours import LIPM, Gains, Gait, Swing
+from floatbase.behaviours import LIPM, Gains, Gait, HorizonQP, JumpPlan, Swing
 from floatbase.control import AnalyticController, JointLimits, LinearInequality
 from floatbase.dynamics import (
     RollingWheel,
@@ -45,6 +45,12 @@ def record() -> fb.Rollout:
     return fb.rollout(fb.Simulation(judges.load("go2")), controller(), 0.005)
 
 
+def horizon_arguments() -> tuple[Any, ...]:
+    """Arguments of `HorizonQP.solve`: two intervals on four feet."""
+    feet = np.tile([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)], (2, 1, 1))
+    return np.zeros(12), np.zeros((2, 12)), feet, np.ones((2, 4), dtype=bool)
+
+
 @cache
 def values() -> dict[str, Any]:
     """The values, by the names of their classes."""
@@ -54,7 +60,11 @@ def values() -> dict[str, Any]:
     hydraulic, run = HydraulicActuators(robot), active_set(table_top())
     pose = hydraulic.cylinders.geometry(state.q[7:])
     plan = LIPM([(0.0, 1.0, np.zeros(2), np.full(2, 0.1))], np.zeros(2), 5.0)
+    horizon = HorizonQP(10.0, 0.1 * np.eye(3))
+    motion = horizon.solve(*horizon_arguments())
     return {
+        "HorizonQP": horizon, "HorizonMotion": motion,
+        "JumpPlan": JumpPlan.of(0.1, 0.2, 0.5, 0.3, 9.81),
         "Robot": robot, "Foot": talos.feet[0], "State": state, "Contacts": contacts,
         "PointContact": contacts["FL_foot"],
         "FlatFootContact": next(iter(judges.stance(talos))),

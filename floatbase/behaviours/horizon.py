@@ -33,12 +33,21 @@ flight, and forces before it and after it decide how the robot takes off and lan
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._geometry import rotation_z
-from floatbase._validation import Array, Value, as_array, as_positive, checked, read_only
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_positive,
+    checked,
+    read_only,
+    short_repr,
+)
 from floatbase.errors import InputError, SolverError
 from floatbase.qp import QP
 
@@ -64,8 +73,8 @@ class HorizonMotion(Value):
         State (Θ, p, ω, ṗ) at the end of each interval [rad, m, rad/s, m/s].
     """
 
-    forces: Array
-    states: Array
+    forces: Array = field(metadata=checked(as_array, (None, None, 3), "N"))
+    states: Array = field(metadata=checked(as_array, (None, 12)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +212,10 @@ class HorizonQP(Value):
         """Return S and s of (M5), the stance, and s minus the reference."""
         x, reference = as_array("state", state, (12,)), as_array("reference", reference, (None, 12))
         n, dt, m = len(reference), self.dt, self.mass
+        if n == 0:
+            raise InputError("reference must have at least one row, one for each interval.")
         feet = as_array("feet", feet, (n, None, 3), "m")
-        stands = np.asarray(stance)
-        if stands.dtype != bool or stands.shape != feet.shape[:2]:
-            raise InputError(
-                f"stance must be an array of bool of shape {feet.shape[:2]}, like feet, not of "
-                f"{stands.dtype} and shape {stands.shape}."
-            )
+        stands = _as_stance(stance, feet.shape[:2])
         S, s = np.zeros((n, 12, 3 * int(stands.sum()))), np.zeros((n, 12))
         X, column = np.zeros(S.shape[1:]), 0
         fall = np.zeros(12)
@@ -228,6 +234,20 @@ class HorizonQP(Value):
                 column += 3
             S[k], s[k] = X, x
         return S.reshape(12 * n, -1), s.ravel(), stands, (s - reference).ravel()
+
+
+def _as_stance(stance: Any, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
+    """Return which feet stand in each interval, (n, m), checked."""
+    try:
+        stands = np.asarray(stance)
+    except ValueError:  # rows of different lengths
+        stands = np.empty(0)
+    if stands.dtype != bool or stands.shape != shape:
+        raise InputError(
+            f"stance must be an array of bool of shape {shape}, like feet, not "
+            f"{short_repr(stance)}."
+        )
+    return stands
 
 
 def _cross_matrix(r: Array) -> Array:

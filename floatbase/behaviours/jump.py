@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import cos, e, pi, sqrt
 from typing import Any, Literal, TypeAlias
@@ -14,14 +14,19 @@ import pinocchio as pin
 from floatbase._geometry import minimum_jerk
 from floatbase._validation import (
     Array,
+    Value,
+    as_array,
     as_instance,
     as_number,
     as_positive,
+    checked,
     refuse_new_attributes,
 )
+from floatbase.behaviours._level_place import foot_outline
 from floatbase.behaviours.options import as_vector, check_options, flat_foot_names
 from floatbase.behaviours.speed import leg_joints
-from floatbase.control import Command, JointLimits, WholeBodyController
+from floatbase.behaviours.terrain import Terrain, as_terrain
+from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask, OrientationTask, PostureTask, Task
@@ -35,20 +40,24 @@ _MIN_HEIGHT, _MAX_SIZE = 0.02, 10.0  # m: a larger number must be in another uni
 _CROUCH_TIME = 0.4  # s, slow enough to keep the feet on the ground
 _BODY_WEIGHT = 1e2  # of the tasks on the body
 _SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
-_TOUCH_HEIGHT = 2e-3  # m above the ground, below which a foot has landed
-_EARLIEST_LANDING = 0.5  # fraction of the flight
+_TOUCH_HEIGHT = 2e-3  # m above a known ground, below which a foot has landed
+# m/s: if the centre of mass departs by more from its free fall, something touches the robot
+_TOUCH_SPEED = 0.1
+_MAX_UNEVENNESS = 0.02  # m between the heights of the ground where the feet land
 _DRY_RUN_STEP = 2e-3  # s, the usual control period
 _MIN_FRACTION = 0.95  # of the take-off velocity that a dry run must reach
 
 
-@dataclass(frozen=True)
-class JumpPlan:
+@dataclass(frozen=True, eq=False)
+class JumpPlan(Value):
     """Times and velocities of a jump.
 
     Parameters
     ----------
     crouch, push, take_off, touchdown : float
         Times at which the phases begin, and at which the feet are planned to land [s].
+    apex : float
+        Time at which the centre of mass is highest [s].
     depth : float
         How far the centre of mass is below its standing height before the push [m]. At take-off, it
         is at its standing height.
@@ -60,23 +69,26 @@ class JumpPlan:
         How far the feet land in front of the centre of mass, so that it comes to rest [m].
     """
 
-    crouch: float
-    push: float
-    take_off: float
-    touchdown: float
-    depth: float
-    velocity: Array
-    acceleration: Array
-    lead: float
+    crouch: float = field(metadata=checked(as_number, "s"))
+    push: float = field(metadata=checked(as_number, "s"))
+    take_off: float = field(metadata=checked(as_number, "s"))
+    apex: float = field(metadata=checked(as_number, "s"))
+    touchdown: float = field(metadata=checked(as_number, "s"))
+    depth: float = field(metadata=checked(as_positive, "m"))
+    velocity: Array = field(metadata=checked(as_array, (2,), "m/s"))
+    acceleration: Array = field(metadata=checked(as_array, (2,), "m/s²"))
+    lead: float = field(metadata=checked(as_number, "m"))
 
     @staticmethod
-    def of(height: float, distance: float, start: float, leg: float, gravity: float) -> JumpPlan:
+    def of(
+        height: float, distance: float, start: float, leg: float, gravity: float, rise: float = 0.0
+    ) -> JumpPlan:
         """Plan a jump in closed form.
 
         With the take-off velocity (v_x, v_z) and the depth d of the crouch, from which the robot
         pushes off at constant acceleration,
 
-            (J1)  v_z = √(2 g height),  flight T = 2 v_z / g
+            (J1)  v_z = √(2 g height),  flight T = v_z / g + √(2 (height - rise) / g)
             (J2)  push t = 2 d / v_z,     a = (v_x, v_z) / t
             (J3)  distance = v_x (t / 2 + T + 1 / ω),  lead = v_x / ω
 
@@ -94,21 +106,39 @@ class JumpPlan:
             Height of the centre of mass above the feet [m].
         gravity : float
             Gravitational acceleration [m/s²].
+        rise : float, optional
+            Height of the ground at the landing place above that at the start, less than `height`
+            [m].
 
         Returns
         -------
         JumpPlan
             The plan.
+
+        Raises
+        ------
+        InputError
+            If an argument is out of range.
         """
+        height = as_number("height", height, "m", _MIN_HEIGHT, _MAX_SIZE)
+        distance = as_number("distance", distance, "m", -_MAX_SIZE, _MAX_SIZE)
+        start = as_positive("start", start, "s", allow_zero=True)
+        leg, gravity = as_positive("leg", leg, "m"), as_positive("gravity", gravity, "m/s²")
+        if height - as_number("rise", rise, "m") < _MIN_HEIGHT:
+            raise InputError(
+                f"height is {height:g} m, but the ground at the landing place is {rise:.3g} m "
+                f"higher than at the start. The height must be at least {_MIN_HEIGHT:g} m larger."
+            )
         depth, upwards = _CROUCH * leg, sqrt(2.0 * gravity * height)  # (J1)
-        flight, push = 2.0 * upwards / gravity, 2.0 * depth / upwards  # (J2)
+        ascent, push = upwards / gravity, 2.0 * depth / upwards  # (J2)
+        flight = ascent + sqrt(2.0 * (height - rise) / gravity)
         lead_time = sqrt(leg / gravity)  # 1 / ω
         forwards = distance / (push / 2.0 + flight + lead_time)  # (J3)
         velocity = np.array([forwards, upwards])
         begin = start + _CROUCH_TIME
         return JumpPlan(
-            start, begin, begin + push, begin + push + flight, depth, velocity, velocity / push,
-            forwards * lead_time,
+            start, begin, begin + push, begin + push + ascent, begin + push + flight, depth,
+            velocity, velocity / push, forwards * lead_time,
         )  # fmt: skip
 
     def com_offset(self, t: float) -> tuple[Array, Array, Array]:
@@ -123,7 +153,13 @@ class JumpPlan:
         -------
         position, velocity, acceleration : ndarray, shape (2,)
             Forwards and upwards [m, m/s, m/s²].
+
+        Raises
+        ------
+        InputError
+            If t is not a number.
         """
+        t = as_number("t", t, "s")
         if t < self.push:
             u = (t - self.crouch) / (self.push - self.crouch)
             down = np.array([0.0, -self.depth])
@@ -145,6 +181,10 @@ class Jump:
     contacts, and the feet move relative to the centre of mass to the place where they land. After
     the landing, the contacts are soft, because the feet do not land at the same time.
 
+    The robot jumps in the direction of x from its standing posture at the origin. Its feet have
+    landed if they are near a known `ground`, or if the centre of mass departs from its free fall.
+    Thus it also lands on ground that is higher or lower than expected.
+
     Before it accepts a jump, the controller integrates the push with the equations of motion,
     without a simulator and without torque limits. It refuses a jump for which a motor is too weak
     or too slow.
@@ -163,14 +203,18 @@ class Jump:
         Distance of the landing place from the start, forwards [m].
     start : float, optional
         Time at which the robot begins to crouch [s].
+    ground : Terrain, optional
+        The ground, if the controller knows it, such as `fb.Ground`. The jump then ends at the
+        height of the ground where the feet land. Without it, the ground is assumed to be level.
     **options : object
         Further options of `fb.WholeBodyController`, such as `facets`.
 
     Raises
     ------
     InputError
-        If an argument is out of range, if the friction is too low for the distance, or if a motor
-        is too weak or too slow for the jump. The message gives the number and the limit.
+        If an argument is out of range, if the feet would land at different heights, if the
+        friction is too low for the distance, or if a motor is too weak or too slow for the jump.
+        The message gives the number and the limit.
 
     Examples
     --------
@@ -197,30 +241,32 @@ class Jump:
         distance: float = 0.0,
         *,
         start: float = 0.5,
+        ground: Terrain | None = None,
         **options: Any,
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
         check_options(type(self).__name__, options)
+        if not contacts.names:
+            raise InputError("contacts must have at least one foot, because a jump pushes off.")
         self._standing = standing = robot.standing()
+        self._ground, self._options = as_terrain("ground", ground), options
+        self._distance = as_number("distance", distance, "m", -_MAX_SIZE, _MAX_SIZE)
         centre = contacts.positions(standing).mean(axis=0)
         leg = float(standing.com[2] - centre[2])
-        height = as_number("height", height, "m", _MIN_HEIGHT, _MAX_SIZE)
-        distance = as_number("distance", distance, "m", -_MAX_SIZE, _MAX_SIZE)
-        start = as_positive("start", start, "s", allow_zero=True)
-        self._plan = JumpPlan.of(height, distance, start, leg, robot.gravity)
+        self._plan = JumpPlan.of(height, distance, start, leg, robot.gravity, self._rise())
         self._leg, self._com_offset = leg, standing.com - [*centre[:2], 0.0]
-        self._height, self._distance, self._options = height, distance, options
+        self._height = float(height)
         model = robot.model
         legs = [j for foot in contacts.names for j in leg_joints(robot, foot)]
         self._legs = np.array(model.idx_qs)[legs], np.array(model.idx_vs)[legs]
         self._posture = np.array(standing.q), np.zeros(robot.d), np.zeros(robot.d)
         self._restart()
+        self._stand = self._controller(contacts, **{"on_infeasible": "soften", **options})
+        self._fly = self._controller(contacts.only(), **options)
+        self._land = self._controller(contacts, **{"contact_weight": _SOFT_CONTACTS, **options})
         self._dry_run()
         self._restart()
-        self._stand = self._controller(contacts, on_infeasible="soften")
-        self._fly = self._controller(contacts.only())
-        self._land = self._controller(contacts, contact_weight=_SOFT_CONTACTS)
 
     @property
     def robot(self) -> Robot:
@@ -243,21 +289,22 @@ class Jump:
         return self._all_contacts.only() if self._phase == "flight" else self._all_contacts
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """Compute the command of one control step.
+        """Change the phase if it is time, and compute the torques of the present phase.
 
         Parameters
         ----------
         q : array_like, shape (nq,)
-            Configuration.
+            Measured configuration.
         v : array_like, shape (nv,)
-            Velocity.
+            Measured velocity.
         t : float, optional
-            The time [s].
+            The time [s]. A time before that of the last call starts the jump again.
 
         Returns
         -------
         Command
-            Joint torques, with the planned accelerations and contact forces.
+            Joint torques, with the planned accelerations and the contact forces, of which there are
+            none in flight.
         """
         t = as_number("t", t, "s")
         if t < self._time:
@@ -277,6 +324,7 @@ class Jump:
         self._time, self._acceleration = -np.inf, np.zeros(self._robot.nv)
         self._com = self._com_velocity = np.zeros(3)
         self._since, self._goal = 0.0, self._standing.com
+        self._apex: tuple[float, Array] | None = None  # time and velocity of the centre of mass
 
     def _observe(self, q: Array, v: Array) -> None:
         """Let the posture task follow the measured legs, so that it does not brake them.
@@ -291,22 +339,61 @@ class Jump:
 
     def _update(self, q: Array, v: Array, t: float) -> None:
         """Change the phase if it is time to do so."""
-        plan, standing = self._plan, self._standing
+        plan = self._plan
         if self._phase in ("stand", "crouch", "push"):
             if t >= plan.take_off:
                 self._begin("flight", State(self._robot, q, v), t)
             elif t >= plan.crouch:
                 self._phase = "push" if t >= plan.push else "crouch"
-        elif self._phase == "flight":
-            flown = (t - plan.take_off) / (plan.touchdown - plan.take_off)
-            if flown < _EARLIEST_LANDING:
-                return
+        elif self._phase == "flight" and t >= plan.apex:
             state = State(self._robot, q, v)
-            heights = [state.point(f)[2] - standing.point(f)[2] for f in self._all_contacts.names]
-            if min(heights) < _TOUCH_HEIGHT:
+            if self._apex is None:
+                self._apex = t, state.com_velocity
+            level = self._touched(state, t)
+            if level is not None:
                 self._begin("landing", state, t)
                 feet = self._all_contacts.positions(state).mean(axis=0)
-                self._goal = np.array([*feet[:2], 0.0]) + self._com_offset
+                self._goal = np.array([*feet[:2], level]) + self._com_offset
+
+    def _touched(self, state: State, t: float) -> float | None:
+        """Return the height of the ground above that at the start if a foot has landed [m]."""
+        names = self._all_contacts.names
+        feet = np.array([state.point(foot) for foot in names])
+        levels = feet[:, 2] - [self._standing.point(foot)[2] for foot in names]
+        if self._ground is not None:
+            grounds = [self._ground_level(foot[:2]) for foot in feet]
+            lowest = int(np.argmin(levels - grounds))
+            if levels[lowest] - grounds[lowest] < _TOUCH_HEIGHT:
+                return grounds[lowest]
+        assert self._apex is not None
+        since, velocity = self._apex
+        fall = np.array([0.0, 0.0, self._robot.gravity * (t - since)])
+        if np.linalg.norm(state.com_velocity - velocity + fall) > _TOUCH_SPEED:
+            return float(levels.min())
+        return None
+
+    def _ground_level(self, xy: Array) -> float:
+        """Return the height of a known ground above that below the standing robot [m]."""
+        assert self._ground is not None
+        start = self._all_contacts.positions(self._standing)[:, :2].mean(axis=0)
+        return float(self._ground.height(xy)) - float(self._ground.height(start))
+
+    def _rise(self) -> float:
+        """Return the height of the ground where the feet land above that at the start [m]."""
+        if self._ground is None:
+            return 0.0
+        levels = [
+            self._ground_level(self._standing.point(name)[:2] + [self._distance, 0.0] + around)
+            for name in self._all_contacts.names
+            for around in foot_outline(self._robot.foot(name), 0.0)
+        ]
+        if max(levels) - min(levels) > _MAX_UNEVENNESS:
+            raise InputError(
+                f"With a distance of {self._distance:g} m, the feet would land on ground of "
+                f"different heights, {min(levels):.3g} to {max(levels):.3g} m above that at the "
+                f"start. Use another distance."
+            )
+        return float(np.mean(levels))
 
     def _begin(self, phase: Phase, state: State, t: float) -> None:
         """Begin a phase in a measured state."""
@@ -368,16 +455,15 @@ class Jump:
                 tasks.append(FrameTask(foot, partial(self._foot_target, foot), kp=600.0))
             for foot in sorted(flat_foot_names(self._all_contacts)):
                 tasks.append(OrientationTask(foot, standing.frame_pose(foot).rotation, kp=600.0))
-        return WholeBodyController(self._robot, contacts, tasks, **{**options, **self._options})
+        return WholeBodyController(self._robot, contacts, tasks, **options)
 
     def _dry_run(self) -> None:
         """Raise `InputError` if a motor or the friction is not sufficient for the push."""
         robot, plan, gravity = self._robot, self._plan, self._robot.gravity
         what = f"A jump of {robot.name} with a height of {self._height:g} m"
         what += f" and a distance of {self._distance:g} m" if self._distance else ""
-        controller = self._controller(
-            self._all_contacts, on_infeasible="soften", torque_limits=np.inf, joint_limits=None
-        )
+        unlimited = {"on_infeasible": "soften", "torque_limits": np.inf, "joint_limits": None}
+        controller = self._controller(self._all_contacts, **{**self._options, **unlimited})
         facets = controller.limits.facets
         scale = cos(pi / facets) if controller.limits.inner_approximation else 1.0
         mu = scale * min(contact.mu for contact in self._all_contacts.friction_contacts)
@@ -389,13 +475,11 @@ class Jump:
             )
         q, h = np.array(self._standing.q), _DRY_RUN_STEP
         v: Array = np.zeros(robot.nv)
-        joints, limits = slice(robot.nv - robot.d, None), JointLimits.of(robot)
-        motor_limits = self._options.get("torque_limits")
-        torque_limits = robot.torque_limits if motor_limits is None else motor_limits
-        needed, largest = (
-            np.zeros((2, robot.d)),
-            np.array([np.broadcast_to(torque_limits, robot.d), limits.velocity]),
-        )
+        joints, limits = slice(robot.nv - robot.d, None), self._stand.limits
+        speeds = np.full(robot.d, np.inf)
+        if limits.joint_limits is not None:
+            speeds = limits.joint_limits.velocity
+        needed, largest = np.zeros((2, robot.d)), np.array([limits.torque_limits, speeds])
         for t in np.arange(plan.crouch, plan.take_off, h):
             self._observe(q, v)
             command = controller(q, v, t)

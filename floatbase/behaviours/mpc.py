@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import cos, inf, pi, remainder
+from math import inf, pi, remainder
 from typing import Any
 
 import numpy as np
@@ -24,18 +24,21 @@ from floatbase.behaviours.horizon import (
     HorizonQP,
 )
 from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import flat_foot_names
+from floatbase.behaviours.options import Gains, flat_foot_names
 from floatbase.behaviours.plan import StepPlan
 from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import com_target
 from floatbase.behaviours.walk import Entries, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
+from floatbase.friction import FrictionPolyhedron
 from floatbase.robots import Robot, State
 
 # of a force beside the acceleration that it gives the centre of mass: the horizon's forces decide
 # how the feet share the load, but its accelerations matter more
 _FORCE_FRACTION = 0.02
+_UP = np.array([0.0, 0.0, 1.0])
+_CORNERS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]])
 _GAIT_PHASES = 20  # in which a gait with flight has at least two flights
 _PATH_STEP, _PATH_STEPS = 0.1, 20  # s, of the path that the pendulum follows
 
@@ -128,7 +131,9 @@ class MPC(Walk):
         self._dt = as_positive("dt", dt, "s", maximum=1.0)
         self._solve_period = as_positive("solve_period", solve_period, "s", maximum=self._dt)
         self._state_weights = as_array("state_weights", state_weights, (12,))
-        self._force_weight = _FORCE_FRACTION * 10.0 / robot.mass**2
+        gains = options.get("gains")
+        gains = Gains() if gains is None else as_instance("gains", gains, Gains)
+        self._force_weight = _FORCE_FRACTION * gains.com[1] / robot.mass**2
         super().__init__(robot, contacts, gait, velocity, yaw_rate, ramp=ramp, **options)
 
     @property
@@ -146,8 +151,10 @@ class MPC(Walk):
         robot, posture, limits = self.robot, self._posture, self._controllers.limits
         data = robot.model.createData()
         pin.ccrba(robot.model, data, posture.state.q, np.zeros(robot.nv))
-        inner = cos(pi / limits.facets) if limits.inner_approximation else 1.0
-        mu = inner * min(contact.mu for contact in posture.contacts.friction_contacts)
+        mu = min(
+            _square_pyramid_mu(FrictionPolyhedron(_UP, contact.mu, *limits.polyhedron_options))
+            for contact in posture.contacts.friction_contacts
+        )
         self._horizon = HorizonQP(
             robot.mass,
             np.array(data.Ig.inertia),
@@ -288,3 +295,12 @@ class MPC(Walk):
             return np.array(swing.end)
         foothold = np.asarray(self._options.foothold(foot, touchdown, self), float)
         return np.array([*foothold[:2], before[2]])
+
+
+def _square_pyramid_mu(polyhedron: FrictionPolyhedron) -> float:
+    """Return the friction coefficient of the largest pyramid (M7) inside a friction polyhedron.
+
+    The forces at the edges of the pyramid must be inside, too, so that they do not slip.
+    """
+    directions = polyhedron.face_matrix + polyhedron.mu_facet * polyhedron.normal
+    return float(polyhedron.mu_facet / (directions @ _CORNERS.T).max())

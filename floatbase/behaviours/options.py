@@ -23,7 +23,7 @@ from floatbase._validation import (
 )
 from floatbase.behaviours.gait import Gait
 from floatbase.behaviours.swing import Swing, SwingPath
-from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.terrain import Terrain, as_terrain
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
@@ -153,11 +153,6 @@ class WalkOptions:
             as_callable("adjustment", adjustment, example)
         if modify_plan is not None:
             as_callable("modify_plan", modify_plan, "modify_plan(plan, state)")
-        if ground is not None and not isinstance(ground, Terrain):
-            raise InputError(
-                f"ground must have the methods height(xy) and normal(xy), as fb.Ground has, but "
-                f"{short_repr(ground)} lacks at least one of them."
-            )
         if not isinstance(tasks, list | tuple):
             raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
         example = "swing(start, end, lift_off, touchdown, clearance)"
@@ -169,7 +164,7 @@ class WalkOptions:
             adjustment,
             modify_plan,
             Swing if swing is None else as_callable("swing", swing, example),
-            ground,
+            as_terrain("ground", ground),
             tuple(tasks),
             np.array([forwards, forwards, turning]),
             Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains),

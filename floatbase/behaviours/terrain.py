@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from floatbase._validation import Array
+from floatbase._validation import Array, short_repr
+from floatbase.errors import InputError
 
 _RANK_TOLERANCE = 1e-3  # fraction of the feet's extent: no slope is fitted along a smaller extent
 
@@ -21,6 +22,16 @@ class Terrain(Protocol):
 
     def normal(self, xy: Array) -> Array:
         """Return the upward unit normal at a horizontal position, shape (3,), world frame."""
+
+
+def as_terrain(name: str, value: Any) -> Terrain | None:
+    """Return `value` after checking that it is a terrain, or None."""
+    if value is None or isinstance(value, Terrain):
+        return value
+    raise InputError(
+        f"{name} must have the methods height(xy) and normal(xy), as fb.Ground has, but "
+        f"{short_repr(value)} lacks at least one of them."
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import judges
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.behaviours import Jump
+from floatbase.behaviours import Jump, JumpPlan
 from floatbase.errors import InputError
 from floatbase.simulation import Rollout
 
@@ -90,3 +91,58 @@ def test_a_jump_that_motors_or_friction_cannot_do_is_refused(
     robot = judges.load(name)
     with raises(InputError, *words):
         Jump(robot, fb.Contacts.feet(robot, mu=0.6), height, distance)
+
+
+def test_a_jump_needs_a_foot() -> None:
+    robot = judges.load("go2")
+    with raises(InputError, "contacts"):
+        Jump(robot, fb.Contacts.feet(robot).only(), 0.1)
+
+
+@pytest.mark.parametrize("rise", [0.1, 0.05, -0.1, -0.2])
+@pytest.mark.parametrize("known", [True, False])
+def test_a_jump_lands_on_ground_of_another_height(rise: float, known: bool) -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot, mu=0.6)
+    edge = contacts.positions(robot.standing())[:, 0].max() + 0.03
+    ground = fb.Ground.stairs(1, rise, start=edge)
+    jump = Jump(robot, contacts, 0.2, 0.5, start=0.05, ground=ground if known else None)
+    run = fb.rollout(fb.Simulation(robot, ground), jump, 2.2, control_period=PERIOD)
+    assert run.outcome == "completed"
+    assert jump.phase == "landing"
+    feet = run.foot_positions
+    assert feet[-1, :, 2] - feet[0, :, 2] == pytest.approx(rise, abs=0.005)
+    assert run.com[-1, 2] - run.com[0, 2] == pytest.approx(rise, abs=0.01)
+    distance = (feet[-1] - feet[0])[:, 0].mean()
+    # a jump that does not know the ground lands earlier or later than planned
+    assert distance == pytest.approx(0.5, abs=0.02 if known else 0.08)
+    tilt = np.arccos(1.0 - 2.0 * (run.q[-1, 3] ** 2 + run.q[-1, 4] ** 2))
+    assert np.rad2deg(tilt) < 1.0
+
+
+def test_a_jump_plans_the_flight_to_the_height_of_the_ground() -> None:
+    plan = JumpPlan.of(0.2, 0.5, 0.1, 0.3, 9.81, rise=0.1)
+    t = plan.touchdown - plan.take_off
+    assert plan.velocity[1] * t - 9.81 * t**2 / 2.0 == pytest.approx(0.1)
+    assert plan.velocity[1] * (plan.apex - plan.take_off) / 2.0 == pytest.approx(0.2)
+    with raises(InputError, "height", 0.2, 0.19):
+        JumpPlan.of(0.2, 0.5, 0.1, 0.3, 9.81, rise=0.19)
+
+
+def test_a_jump_refuses_to_land_in_a_gap() -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot, mu=0.6)
+    gap = fb.Ground.gap(0.3, start=0.25)
+    with raises(InputError, "distance", 0.4, -0.5):
+        Jump(robot, contacts, 0.15, 0.4, ground=gap)
+    with raises(InputError, "ground", "height"):
+        Jump(robot, contacts, 0.15, ground=0.3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limits", [12.0, np.full(12, 12.0)])
+def test_a_dry_run_compares_with_the_given_torque_limits(limits: Any) -> None:
+    robot = judges.load("go2")
+    contacts = fb.Contacts.feet(robot, mu=0.6)
+    with raises(InputError, "torque", 12, 19):  # it needs 19 N·m, and go2 has 35 N·m in a knee
+        Jump(robot, contacts, 0.15, 0.1, torque_limits=limits)
+    Jump(robot, contacts, 0.15, 0.1, torque_limits=20.0)

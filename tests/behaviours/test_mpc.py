@@ -14,9 +14,10 @@ from messages import raises
 from scipy.linalg import expm
 
 import floatbase as fb
-from floatbase.behaviours import MPC, Gait, HorizonMotion, HorizonQP, Walk
+from floatbase.behaviours import MPC, Gains, Gait, HorizonMotion, HorizonQP, Walk
 from floatbase.control import Command
 from floatbase.errors import InputError
+from floatbase.friction import FrictionPolyhedron
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -104,8 +105,12 @@ def test_a_horizon_checks_the_stance() -> None:
     horizon, (x, reference, feet, stance) = random_problem(0)
     with raises(InputError, "stance", "bool"):
         horizon.solve(x, reference, feet, stance.astype(float))
+    with raises(InputError, "stance", "bool"):
+        horizon.solve(x, reference, feet, [[True], [True, False]])
     with raises(InputError, "feet"):
         horizon.solve(x, reference, feet[:-1], stance)
+    with raises(InputError, "reference"):
+        horizon.solve(x, reference[:0], feet[:0], stance[:0])
 
 
 class Observed:
@@ -196,6 +201,45 @@ def test_other_robots_pronk_with_the_same_numbers(name: str) -> None:
     assert max(np.rad2deg(np.arccos(1 - 2 * (run.q[:, 3:5] ** 2).sum(axis=1)))) < 10.0
     feet = run.foot_positions[:, :, 2]
     assert (feet - feet[0]).min(axis=1).max() > 0.01  # m, of the lowest foot
+
+
+@pytest.mark.parametrize("facets", [3, 4, 6, 8, 16])
+@pytest.mark.parametrize("rotation", [0.0, 0.3])
+def test_the_corners_of_the_horizons_pyramid_are_inside_the_controllers_polyhedron(
+    facets: int, rotation: float
+) -> None:
+    robot = judges.load("go2")
+    walk = MPC(
+        robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot), facets=facets,
+        facet_rotation=rotation,
+    )  # fmt: skip
+    mu = walk.horizon.mu
+    polyhedron = FrictionPolyhedron([0.0, 0.0, 1.0], 0.6, facets, facet_rotation=rotation)
+    corners = [[x * mu, y * mu, 1.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+    margins = [polyhedron.margin(corner) for corner in corners]
+    assert min(margins) == pytest.approx(0.0, abs=1e-12)  # as large as possible
+    assert np.hypot(mu, mu) <= 0.6 + 1e-12  # inside the cone
+
+
+def test_forces_of_the_horizon_are_inside_the_cone_with_eight_facets() -> None:
+    gait = Gait.trot(judges.load("go2"), swing=0.15, start=0.1)
+    _, observed = walked("go2", gait, 1.5, 1.2, facets=8)
+    forces = np.concatenate([motion.forces.reshape(-1, 3) for motion in observed.motions.values()])
+    assert np.all(np.hypot(*forces.T[:2]) <= 0.6 * forces[:, 2] + 1e-6)
+
+
+def test_the_force_task_follows_the_gains() -> None:
+    robot = judges.load("go2")
+    contacts, gait = fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.1)
+    ratios = []
+    for gains in (None, Gains(com=(100.0, 30.0))):
+        walk = MPC(robot, contacts, gait, gains=gains)
+        tasks = {type(task): task for task in walk._controllers[contacts.names].problem.tasks}
+        ratios.append(tasks[fb.ForceTask].weight / tasks[fb.CoMTask].weight)
+    assert ratios[0] == pytest.approx(0.02 / robot.mass**2)
+    assert ratios[1] == pytest.approx(ratios[0])
+    with raises(InputError, "gains"):
+        MPC(robot, contacts, gait, gains=3.0)
 
 
 def test_copies_and_restarts_walk_alike() -> None:

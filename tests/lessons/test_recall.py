@@ -18,7 +18,6 @@ from floatbase.errors import InputError
 from floatbase.lessons import compare, predict, progress, recall
 from floatbase.lessons.predictions import is_right
 from floatbase.lessons.publish import NOTEBOOKS, site
-from floatbase.lessons.publish.site.recall import recall_data
 from floatbase.lessons.questions import all_questions
 from floatbase.lessons.recalling import PER_DAY, RECALLED, ask, due_questions, question_text
 
@@ -174,7 +173,7 @@ def test_the_command_asks_what_is_due(
 
 def random_history(random: np.random.Generator, names: list[str]) -> list[dict[str, Any]]:
     """Lines about some of these questions, with predictions, results and answers to recall()."""
-    questions = recall_data([])["questions"]
+    questions = site.recall.recall_data([])["questions"]
     entries = []
     for name in names:
         result, unit = questions[name]["result"], questions[name]["unit"]
@@ -202,7 +201,7 @@ def time_of(day: float) -> str:
 def test_the_site_asks_what_recall_asks(home: Path) -> None:
     """due.js and `due_questions` on the same forty histories."""
     random = np.random.default_rng(2)
-    data = recall_data([])
+    data = site.recall.recall_data([])
     cases, expected = [], []
     for count in [*range(10), *[20, 46] * 15]:
         names = [str(name) for name in random.choice(RECALLED, count, replace=False)]
@@ -225,7 +224,7 @@ def test_the_site_asks_what_recall_asks(home: Path) -> None:
 
 
 def test_the_page_knows_every_question_and_its_result() -> None:
-    data = recall_data([NOTEBOOKS / "02_equations_of_motion.ipynb"])
+    data = site.recall.recall_data([NOTEBOOKS / "02_equations_of_motion.ipynb"])
     assert list(data["questions"]) == list(RECALLED)
     for name, question in data["questions"].items():
         assert is_right(question["result"], question["result"], question["unit"])

@@ -16,7 +16,6 @@ import floatbase.lessons.publish.site as site
 from floatbase.errors import InputError
 from floatbase.lessons import all_exercises, import_answers, progress, review
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook
-from floatbase.lessons.publish.site import recall
 from floatbase.lessons.questions import all_questions
 from floatbase.lessons.recalling import due_questions
 from floatbase.lessons.submission import FILE_FORMAT
@@ -176,9 +175,9 @@ def test_a_reader_answers_lesson_03_reloads_and_hands_in(
 def recalling(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any]:
     """A page that asks what is due."""
     folder = tmp_path_factory.mktemp("recall")
-    recall.write_script([NOTEBOOKS / "02_equations_of_motion.ipynb"], folder)
+    site.recall.write_script([NOTEBOOKS / "02_equations_of_motion.ipynb"], folder)
     (folder / "page.html").write_text(
-        f"<!doctype html><meta charset=utf-8>{recall.recall_box('')}{SCRIPTS}"
+        f"<!doctype html><meta charset=utf-8>{site.recall.recall_box('')}{SCRIPTS}"
     )
     with served(folder) as address:
         opened = browser.new_page()

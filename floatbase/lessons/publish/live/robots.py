@@ -26,6 +26,7 @@ from floatbase.control.tick import tick
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.objectives import CoMTask, FrameTask
+from floatbase.playground import ModelMismatch
 from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
 from floatbase.simulation._page import (
@@ -146,6 +147,7 @@ def controller(
     lifted: str | None = None,
     facets: int = FACETS[0],
     torque_fraction: float = 1.0,
+    mismatch: ModelMismatch | None = None,
 ) -> WholeBodyController:
     """Make the controller that the page runs, in Python.
 
@@ -161,6 +163,8 @@ def controller(
         Number of facets of the friction polyhedra.
     torque_fraction : float, optional
         Fraction of the torque limits that is used [-].
+    mismatch : ModelMismatch, optional
+        Difference between the assumed and the exact eq. (7). By default, there is none.
 
     Returns
     -------
@@ -179,6 +183,7 @@ def controller(
         facets=facets,
         torque_limits=torque_fraction * robot.torque_limits,
         joint_limits=JointLimits.of(robot),  # the page does not change how hard joints may brake
+        modify_qp=mismatch,
     )
 
 

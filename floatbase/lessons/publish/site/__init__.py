@@ -5,7 +5,7 @@ lessons, `reference` writes the API reference, and `mathml` draws formulas. `con
 Sphinx. The text of the pages is in the folder `docs`. Building the site needs the extra `site`.
 """
 
-from floatbase.lessons.publish.site import lecture, mathml
+from floatbase.lessons.publish.site import lecture, mathml, recall
 from floatbase.lessons.publish.site.addresses import PACKAGES, exported
 from floatbase.lessons.publish.site.answers import (
     exercise_form,
@@ -28,6 +28,7 @@ __all__ = [
     "prediction_form",
     "prepare_lesson",
     "printed_results",
+    "recall",
     "replace_site",
     "run_lessons",
 ]

@@ -63,6 +63,13 @@ LESSON_ROBOTS = {
         "Talos stands on two flat feet, with four forces at each. Push it, and see which corners "
         "of its feet lose their force first.",
     ),
+    "P": LessonRobot(
+        "go2",
+        {"panel": "1"},
+        "Open *terms of eq. (7)*, and switch off gravity in the model: the controller no longer "
+        "holds the weight. Stand the robot up, and switch gravity off in reality instead. The page "
+        "has those switches of the playground for which the controller's QP keeps its form.",
+    ),
 }  # fmt: skip
 
 

@@ -1,7 +1,9 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
+import {defaults} from "../src/engine/engine.js";
 import {setParameter} from "../src/engine/tick.js";
+import {controlsOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
 import {deal, mapText, outline} from "../src/live/recovery_map.js";
@@ -99,6 +101,26 @@ test("a sentence stays long enough to be read, and a more important one waits fo
   tell({rank: 6, text: "nothing"}, 500);
   tell({rank: 6, text: "nothing"}, 700);
   assert.deepEqual(said, ["nothing", "friction"]);
+});
+
+test("controls begin at the settings of the engine and change what they name", () => {
+  const data = {weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {}, lifted: []};
+  const settings = defaults(data), push = {force: 30, towards: 90, duration: 0.1};
+  const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
+  const made = Object.fromEntries(controlsOf({...data, points}, settings, push, {
+    names: ["go2"], name: "go2", open() {}, walk() {},
+  }).map((control) => [control.command.name, control]));
+  for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
+    "actualHasGravity"], ["Coriolis model", "hasCoriolis"], ["Coriolis reality",
+    "actualHasCoriolis"]]) {
+    assert.equal(made[name].command.value, settings[key]);
+    assert.deepEqual(made[name].change(false), {set: {[key]: false}});
+  }
+  assert.deepEqual(made["payload [kg] reality"].change(2), {set: {actualPayload: 2}});
+  assert.deepEqual(made["torque limits [%]"].change(50), {set: {torque: 0.5}});
+  const missing = made["foot without contact force"];
+  assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
+  assert.deepEqual(missing.change(0), {set: {missing: []}});
 });
 
 test("the largest multipliers come first", () => {

@@ -1,9 +1,20 @@
+// Order of search results: a page or a section whose whole title is the query comes first.
 // Excerpts of search results: whole sentences, starting at the first one with the keywords, without
 // code, tables and lists of contents.
 
 if (typeof Search !== "undefined") {
   const LENGTH = 240; // characters, approximately
   const OMITTED = "nav, table, details, .toc, .contents, div.cell";
+
+  const EXACT_TITLE = 10; // points; a word in a title has 15
+
+  Scorer.score = ([, title, , , score, , kind]) => {
+    const query = new URLSearchParams(location.search).get("q") ?? "";
+    const last = title.split(" > ").at(-1);
+    const isExact = kind === SearchResultKind.title
+      && last.toLowerCase() === query.trim().toLowerCase();
+    return score + (isExact ? EXACT_TITLE : 0);
+  };
 
   Search.makeSearchSummary = (html, keywords, anchor) => {
     const page = new DOMParser().parseFromString(html, "text/html");

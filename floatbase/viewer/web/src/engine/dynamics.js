@@ -3,8 +3,19 @@
 
 const SLIDE = 2; // MuJoCo's type of a prismatic joint
 
+// Write MuJoCo's bias forces of the state in `data` into `result`, with or without those that
+// depend on the velocity. The positions in `data` are up to date.
+export function biasForces(mj, model, data, result, hasCoriolis) {
+  const velocity = hasCoriolis ? null : data.qvel.slice();
+  if (velocity) data.qvel.fill(0);
+  mj.mj_comVel(model, data);
+  mj.mj_rne(model, data, 0, result);
+  if (velocity) data.qvel.set(velocity);
+}
+
 // mj: MuJoCo. model, data: those of the controller. robot: its data. views: those of the tick.
-// Returns a function that fills the views for the state in `data`.
+// Returns a function that fills the views for the state in `data`; hasCoriolis: whether h contains
+// the forces that depend on the velocity.
 export function createDynamics(mj, model, data, robot, views) {
   const {nq, nv, d, qposOfQ, qvelOfV, bodies, joints} = robot;
   const M = new mj.DoubleBuffer(nv * nv), C = new mj.DoubleBuffer(3 * nv);
@@ -13,18 +24,17 @@ export function createDynamics(mj, model, data, robot, views) {
   const isSlide = joints.map((joint) => model.jnt_type[joint] === SLIDE);
   const base = bodies[1];
 
-  return function update() {
+  return function update(hasCoriolis = true) {
     mj.mj_kinematics(model, data);
     mj.mj_comPos(model, data);
     mj.mj_makeM(model, data);
-    mj.mj_comVel(model, data);
-    mj.mj_rne(model, data, 0, h);
+    biasForces(mj, model, data, h, hasCoriolis);
     mj.mj_fullM(model, data, M);
     mj.mj_jacSubtreeCom(model, data, C, base);
     const qpos = data.qpos, qvel = data.qvel, xpos = data.xpos, xmat = data.xmat;
     const R = xmat.subarray(9 * base, 9 * base + 9); // row by row
     state(qpos, qvel, R);
-    inertia(M.GetView(), h.GetView(), R);
+    inertia(M.GetView(), h.GetView(), R, hasCoriolis);
     momentum(C.GetView(), R, model.body_subtreemass[base]);
     poses(xpos, xmat);
     jacobian(xpos, data.xaxis, data.xanchor, R);
@@ -39,10 +49,10 @@ export function createDynamics(mj, model, data, robot, views) {
     }
   }
   // M and h. The base's velocity turns with the base, which adds M (ω × v) to h.
-  function inertia(m, h0, R) {
-    const {v} = views;
-    const x = v[4] * v[2] - v[5] * v[1], y = v[5] * v[0] - v[3] * v[2];
-    const z = v[3] * v[1] - v[4] * v[0];
+  function inertia(m, h0, R, hasCoriolis) {
+    const {v} = views, on = Number(hasCoriolis);
+    const x = on * (v[4] * v[2] - v[5] * v[1]), y = on * (v[5] * v[0] - v[3] * v[2]);
+    const z = on * (v[3] * v[1] - v[4] * v[0]);
     const a0 = R[0] * x + R[1] * y + R[2] * z, a1 = R[3] * x + R[4] * y + R[5] * z;
     const a2 = R[6] * x + R[7] * y + R[8] * z;
     for (let r = 0; r < nv; r++) {

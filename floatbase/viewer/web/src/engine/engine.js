@@ -13,13 +13,16 @@ const SHIFT_TIME = 2; // s, at most, until the centre of mass is over three feet
 const SHIFTED = 0.01; // m: near enough to its target to lift a foot
 const LOWER_SPEED = 0.05; // m/s of a foot that is set down
 const LOWER_TIME = 2; // s, at most
+const AIRBORNE = 2; // times the height of the base at the beginning
 
-// Settings before anything is changed. Friction, payload: the controller assumes one value, the
-// other is actual.
+// Settings before anything is changed. Of friction, payload and terms of eq. (7), the controller
+// assumes one value, and the other is actual.
 export const defaults = (robot) => ({
   mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
   height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
   gait: null, speed: 0, turn: 0, // m/s and rad/s
+  hasGravity: true, actualHasGravity: true, hasCoriolis: true, actualHasCoriolis: true,
+  missing: [], // contact points that pass through the ground
 });
 
 // mj: MuJoCo. module: the control step's WebAssembly module. robot: its data.
@@ -55,8 +58,11 @@ export function createEngine(mj, module, robot) {
     }
   }
   function apply() {
-    assumed.change(settings);
-    actual.change({payload: settings.actualPayload, gravity: settings.gravity});
+    const {gravity, payload, actualPayload, hasGravity, actualHasGravity} = settings;
+    assumed.change({payload, gravity: hasGravity ? gravity : 0});
+    actual.change({payload: actualPayload, gravity: actualHasGravity ? gravity : 0});
+    actual.setMissing(settings.missing);
+    if (settings.actualHasCoriolis) actual.data.qfrc_applied.fill(0);
     actual.setFriction(settings.actualMu);
     actual.setTorque(settings.torque);
     select();
@@ -162,7 +168,7 @@ export function createEngine(mj, module, robot) {
     if (walk === null && (moveFeet() | moveTargets())) placeTargets();
     assumed.data.qpos.set(qpos);
     assumed.data.qvel.set(qvel);
-    updateDynamics();
+    updateDynamics(settings.hasCoriolis);
     if (walk !== null) moveWalk(time);
     active = tick.run();
     if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
@@ -195,6 +201,7 @@ export function createEngine(mj, module, robot) {
     }
     pushes = pushes.filter(({start, duration}) => start + duration > time);
   }
+  const isAirborne = () => actual.data.xpos[3 * base + 2] > AIRBORNE * startHeight;
   function isFallen() {
     const {xpos, xmat} = actual.data;
     const axis = [2, 5, 8].reduce((sum, at, i) => sum + xmat[9 * base + at] * startAxis[i], 0);
@@ -211,7 +218,8 @@ export function createEngine(mj, module, robot) {
     reset,
     get settings() { return settings; },
     get time() { return steps * STEP; },
-    // "" while the controller runs, then why it does not: "fell", "infeasible", "no answer"
+    // "" while the controller runs, then why it does not: "fell", "left the ground",
+    // "infeasible", "no answer"
     get outcome() { return outcome; },
     get pushes() { return pushes; },
     get walk() { return walk; },
@@ -232,8 +240,12 @@ export function createEngine(mj, module, robot) {
       if (outcome === "") command();
       else damp();
       applyPushes();
+      if (!settings.actualHasCoriolis) {
+        actual.data.qfrc_applied.set(actual.coriolisCompensation());
+      }
       mj.mj_step(actual.model, actual.data);
       steps++;
+      if (outcome === "" && isAirborne()) stop("left the ground");
       if (outcome === "" && isFallen()) stop("fell");
       return outcome;
     },

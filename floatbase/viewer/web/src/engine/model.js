@@ -1,13 +1,34 @@
 // MuJoCo's models of a robot: one for the physics, one for what the controller assumes.
 
+import {biasForces} from "./dynamics.js";
+
 // Make a model and its data, with all digits. mj: MuJoCo. robot: its data.
 export function makeModel(mj, robot) {
   const model = mj.MjModel.from_xml_string(robot.xml);
   for (const [name, values] of Object.entries(robot.overrides)) model[name]?.set(values);
   const base = robot.bodies[1], baseMass = model.body_mass[base];
   const data = new mj.MjData(model), scratch = new mj.MjData(model);
+  const [moving, resting, turning] = [0, 1, 2].map(() => new mj.DoubleBuffer(robot.nv));
   return {
     model, data, baseMass,
+    // Forces that cancel the Coriolis and centrifugal forces of eq. (7), in MuJoCo's coordinates.
+    // In (7), the base's velocity is expressed along the axes of the base, which adds M (ω × v).
+    coriolisCompensation() {
+      scratch.qpos.set(data.qpos);
+      scratch.qvel.set(data.qvel);
+      mj.mj_kinematics(model, scratch);
+      mj.mj_comPos(model, scratch);
+      mj.mj_makeM(model, scratch);
+      biasForces(mj, model, scratch, moving, true);
+      biasForces(mj, model, scratch, resting, false);
+      const R = scratch.xmat.subarray(9 * base, 9 * base + 9), v = data.qvel;
+      const [x, y, z] = [0, 3, 6].map((r) => R[r] * v[3] + R[r + 1] * v[4] + R[r + 2] * v[5]);
+      const acceleration = new Float64Array(robot.nv);
+      acceleration.set([y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]]);
+      mj.mj_mulM(model, scratch, turning, acceleration);
+      const [h, atRest, frame] = [moving, resting, turning].map((buffer) => buffer.GetView());
+      return h.map((force, i) => force - atRest[i] + frame[i]);
+    },
     // payload: kg at the base's centre of mass. gravity: m/s², downwards.
     change({payload, gravity}) {
       model.opt.gravity[2] = -gravity;
@@ -27,13 +48,19 @@ export function makeModel(mj, robot) {
         range[2 * motor + 1] = fraction * robot.torqueLimits[i];
       });
     },
+    // Contact points, by their names, that pass through the ground.
+    setMissing(names) {
+      for (const {name, geom} of robot.points) {
+        model.geom_conaffinity[geom] = Number(!names.includes(name));
+      }
+    },
     // Switch collisions between the ground and the links' hulls on or off.
     setHulls(isOn) {
       for (const geom of robot.hulls) model.geom_conaffinity[geom] = Number(isOn);
       for (const body of robot.hullBodies) model.body_conaffinity[body] = Number(isOn);
     },
     free() {
-      for (const one of [scratch, data, model]) one.delete();
+      for (const one of [moving, resting, turning, scratch, data, model]) one.delete();
     },
   };
 }

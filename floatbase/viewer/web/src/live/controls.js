@@ -9,13 +9,29 @@ const slider = (value, min, max, step, more = {}) => ({value, min, max, step, ..
 // worker: {set}, {timeScale} and others. push: {force, towards, duration}, changed in place. open:
 // called with another robot's name. walk: called with the name of a gait, or null to stand.
 export function controlsOf(robot, settings, push, {names, name, open, walk}) {
-  const set = (key, factor = 1) => (value) => ({set: {[key]: value * factor}});
+  const set = (key, factor = null) => (value) => (
+    {set: {[key]: factor === null ? value : value * factor}});
   const {weight} = robot, heaviest = Math.max(1, Math.round(weight / 9.81 * 0.4));
   const most = 5 * Math.ceil(2.5 * weight / 5);
   const choices = Object.keys(robot.gaits);
   const gaits = choices.length ? {gait: [{
     value: choices.indexOf(settings.gait) + 1, choices: ["stand", ...choices],
   }, (value) => walk(choices[value - 1] ?? null)]} : {};
+  const term = (key, value, column) => [
+    {value, ...pair("terms of eq. (7)", column)}, set(key),
+  ];
+  const feet = [...new Set(robot.points.map(footName))];
+  const terms = {
+    "gravity model": term("hasGravity", settings.hasGravity, "model"),
+    "gravity reality": term("actualHasGravity", settings.actualHasGravity, "reality"),
+    "Coriolis model": term("hasCoriolis", settings.hasCoriolis, "model"),
+    "Coriolis reality": term("actualHasCoriolis", settings.actualHasCoriolis, "reality"),
+    "foot without contact force": [{
+      value: 0, choices: ["none", ...feet], section: "terms of eq. (7)",
+    }, (value) => ({set: {
+      missing: robot.points.filter((name) => footName(name) === feet[value - 1]),
+    }})],
+  };
   const all = {
     "push [N]": [slider(push.force, 0, most, 5), (value) => { push.force = value; }],
     "towards [°]": [slider(push.towards, -180, 180, 15), (value) => { push.towards = value; }],
@@ -36,6 +52,7 @@ export function controlsOf(robot, settings, push, {names, name, open, walk}) {
       pair("ground and load", "reality")), set("actualPayload")],
     "gravity [m/s²]": [slider(settings.gravity, 0.5, 20, 0.1, {section: "gravity and motors"}),
       set("gravity")],
+    ...terms,
     "torque limits [%]": [slider(100, 10, 100, 1, {section: "gravity and motors"}),
       set("torque", 0.01)],
     "higher [cm]": [slider(0, -8, 3, 0.5, {section: "where it stands"}), set("height", 0.01)],

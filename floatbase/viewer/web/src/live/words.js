@@ -44,6 +44,7 @@ export function slippingFeet({measured, planned, settings}, {points, weight}) {
 
 const STOPPED = {
   fell: "The robot fell. It is put on its feet again in a moment.",
+  "left the ground": "The robot left the ground. It is put on its feet again in a moment.",
   infeasible: "No torques satisfy all the constraints, so the controller stopped. The Python " +
     "library names the constraints that are in conflict. The robot is put on its feet again in a " +
     "moment.",
