@@ -66,8 +66,8 @@ LESSON_ROBOTS = {
     "P": LessonRobot(
         "go2",
         {"panel": "1"},
-        "Open *terms of eq. (7)*, and switch off gravity in the model: the controller no longer "
-        "holds the weight. Stand the robot up, and switch gravity off in reality instead. The page "
+        "Open *terms of eq. (7)*, and switch off gravity in the model. The robot sags, because only "
+        "its position error makes the controller push up. Stand the robot up, and switch gravity off in reality instead. The page "
         "has those switches of the playground for which the controller's QP keeps its form.",
     ),
 }  # fmt: skip
