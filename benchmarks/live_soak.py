@@ -3,7 +3,8 @@
 A program drags the robot and the view, moves sliders, presses buttons, walks and opens other robots
 for ten minutes, in Chromium or Firefox. The table shows exceptions, pictures per second, falls, and
 the memory of the browser. `--throttle 4` stops the browser's processes for three quarters of the
-time, `--rest` presses nothing. The exit code is 1 after an exception.
+time, `--rest` presses nothing, `--map` computes a push-recovery map instead. The exit code is 1
+after an exception.
 """
 
 from __future__ import annotations
@@ -109,6 +110,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--browser", choices=COMMANDS, default="chromium")
     parser.add_argument("--throttle", type=float, default=1.0, metavar="TIMES")
     parser.add_argument("--rest", action="store_true", help="only watch a standing robot")
+    parser.add_argument("--map", action="store_true", help="only compute a push-recovery map")
     given = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as temporary:
         place, profile = Path(temporary) / "live", Path(temporary) / "profile"
@@ -119,13 +121,13 @@ def main(arguments: list[str] | None = None) -> int:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = (
             f"http://127.0.0.1:{server.server_port}/live_soak.html"
-            f"?minutes={given.minutes:g}&seed={given.seed}&rest={int(given.rest)}"
+            f"?minutes={given.minutes:g}&seed={given.seed}&rest={int(given.rest)}&map={int(given.map)}"
         )
         own = {"chromium": [f"--user-data-dir={profile}"], "firefox": ["--profile", str(profile)]}
         command = [*COMMANDS[given.browser], *own[given.browser], address]
         found, samples = use(command, given.minutes, given.throttle)
         server.shutdown()
-    for key in ("errors", "counts", "outcomes", "pictures"):
+    for key in ("errors", "counts", "outcomes", "pictures", "map"):
         print(f"{key:22} {found.get(key)}")
     rates = found.get("rates") or [0]
     print(f"{'pictures per second':22} median {np.median(rates):.0f}, least {min(rates)}")

@@ -132,7 +132,7 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
         )
     except (ModuleNotFoundError, AttributeError) as error:
         raise InputError(
-            f"Lesson {short_repr(lesson)} has no controller to push. Lessons 05 to 09 have one."
+            f"Lesson {short_repr(lesson)} has no controller to push. Lessons 05 to 10 have one."
         ) from error
     return make
 

@@ -1,12 +1,29 @@
-"""Lesson 10: loads and angular momentum of a record."""
+"""Lesson 10: controllers to push, and loads and angular momentum of a record."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
 
+import floatbase as fb
 from floatbase._validation import Array
+from floatbase.behaviours import MPC, Gait, Walk
+from floatbase.lessons.lesson08.helpers import MU
 from floatbase.simulation import Rollout
+
+PUSH_RECOVERY_WATCH_TIME = 4.0  # s: a robot that steps may fall late
+
+
+def make_controller() -> MPC:
+    """Return the controller of the lesson's push-recovery map: go2 trots on the spot by `MPC`."""
+    robot = fb.load("go2")
+    return MPC(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
+
+
+def make_walking_controller() -> Walk:
+    """Return the controller of the second map: the same trot on the spot by `Walk`."""
+    robot = fb.load("go2")
+    return Walk(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
 
 
 def angular_momentum(record: Rollout, i: int) -> Array:
