@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any
 
 from floatbase.lessons.publish import NOTEBOOKS
+from floatbase.lessons.question_texts import CONTEXTS, TEXTS
 
 _BOLD = re.compile(r"\*\*Predict (\w+\.\w+)\*\*: ?")
 
@@ -27,7 +28,7 @@ class Question:
     context : str
         The paragraph before the question, in Markdown, or "".
     text : str
-        The question, in Markdown.
+        The question, in Markdown. Both differ from the lesson's if those need the lesson.
     choices : tuple of str
         Strings to choose from; without choices, the answer is numbers.
     unit : str
@@ -53,7 +54,7 @@ class Question:
     def form(self) -> str:
         """What to answer, in words."""
         if self.choices:
-            return " or ".join(self.choices)
+            return " / ".join(self.choices)
         many = "a number" if self.count == 1 else f"{self.count} numbers"
         return many + (f", in {self.unit}" if self.unit else "")
 
@@ -90,6 +91,7 @@ def all_questions() -> dict[str, Question]:
                 name, given = predict_call(source)
                 given["choices"] = tuple(given.get("choices", ()))
                 context, text = _question_in(above)
+                context, text = CONTEXTS.get(name, context), TEXTS.get(name, text)
                 found[name] = Question(name, topic, context, text, **given)
     return found
 

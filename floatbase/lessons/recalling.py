@@ -29,6 +29,14 @@ MISSED_PAUSE = timedelta(days=1)  # after a wrong answer
 SURE_AND_MISSED_PAUSE = timedelta(hours=12)
 OLD = timedelta(days=30)  # age of an answer without a time
 
+# a word without digits and indices; a single letter other than a is a symbol
+_FIRST_WORD = re.compile(r"\**([a-z]{2,}|a)(?=[\s,.:;'-])")
+_SYMBOLS = {
+    "tau": "τ", "lambda": "λ", "xi": "ξ", "omega": "ω", "theta": "θ", "mu": "μ", "psi": "ψ",
+    "Delta": "Δ", "times": "×", "cdot": "·", "le": "≤", "ge": "≥", "to": "→",
+}  # fmt: skip
+_FUNCTIONS = ("cosh", "sinh", "tanh", "arctan")
+
 
 def recall(name: str = "", *answer: Any) -> None:
     """Ask three questions of earlier lessons again, or answer one of them.
@@ -142,14 +150,32 @@ def _settled() -> dict[str, tuple[Question, Any]]:
 def question_text(question: Question) -> str:
     """Write a question as plain text, wrapped for a terminal."""
     parts = [f"{question.name}, {question.topic}", question.context, capitalized(question.text)]
-    plain = [re.sub(r"[*$`]|\[([^\]]*)\]\([^)]*\)", r"\1", part) for part in parts if part]
+    plain = [_plain(part) for part in parts if part]
     lines = [textwrap.fill(part, 88) for part in [*plain, f"({question.form})"]]
     return "\n".join(lines)
 
 
+def _plain(text: str) -> str:
+    """Remove Markdown and LaTeX from a text."""
+    text = re.sub(r"\$([^$]+)\$", lambda formula: _plain_formula(formula[1]), text)
+    return re.sub(r"[*`]|\[([^\]]*)\]\([^)]*\)", r"\1", text)
+
+
+def _plain_formula(latex: str) -> str:
+    for command, accent in (("dot", "\u0307"), ("ddot", "\u0308"), ("tilde", "\u0303")):
+        latex = re.sub(rf"\\{command} *(\\?[A-Za-z]+)", rf"\1{accent}", latex)
+    latex = re.sub(r"\\[,;: ]|\\(?:left|right|quad)\b", " ", latex)
+    latex = latex.replace("\\tfrac12", "½")
+    latex = re.sub(r"\\([A-Za-z]+)", lambda name: _SYMBOLS.get(name[1], name[1]), latex)
+    return re.sub(r" +", " ", re.sub(r"[{}]", "", latex)).strip()
+
+
 def capitalized(text: str) -> str:
-    """Begin a question with a capital letter, unless it begins with the name of a robot."""
-    return text if text.startswith(("go2", "solo8")) else text[:1].upper() + text[1:]
+    """Begin a text with a capital letter, unless it begins with a symbol or the name of a robot."""
+    first = _FIRST_WORD.match(text)
+    if first is None or first[1] in _FUNCTIONS:
+        return text
+    return text[: first.start(1)] + first[1].capitalize() + text[first.end(1) :]
 
 
 def ask(read: Callable[[str], str] | None = None) -> None:

@@ -256,7 +256,7 @@ def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
             ("Week 1 (4711)", "SIS User ID") if kind == "canvas" else ("Week 1", "ID number")
         )
         points = {row[key]: row[column] for row in rows}
-        wanted = {s: "" if p is None else str(p) for s, (_, p) in expected.items()}
+        wanted = {s: str(p) for s, (_, p) in expected.items() if p is not None}
         assert points == wanted
     forged = [p for kind, p in expected.values() if kind == "forged"]
     full = max(p for _, p in expected.values() if p is not None)
@@ -279,11 +279,40 @@ def test_files_without_an_id_are_matched_by_name_and_others_are_reported(learner
         policy=gradebook.Policy(("00",)),
     )
     assert len(messages) == 1 and "e9 matches nobody" in messages[0]
-    assert [row[-1] for row in csv.reader(table.open())] == ["=Week", "0", ""]
+    assert [row[-1] for row in csv.reader(table.open())] == ["=Week", "0"]
     with pytest.raises(InputError, match="ID number"):
         gradebook.write_gradebook(
             "moodle", [], table, table, column="Week", policy=gradebook.Policy()
         )
+
+
+@pytest.mark.parametrize(
+    ("kind", "roster"),
+    [
+        ("canvas", "LastName;FirstName;ID;SIS Login ID;Section;Week\n    Points Possible;;;;;5\n"
+         ";;;;;Manual Posting\nCurie;Marie;1;m1;A;\nNoether;Emmy;2;e2;A;4\n"),
+        ("moodle", "First name\tLast name\tEmail address\tWeek\n"
+         "Marie\tCurie\tm1\t-\nEmmy\tNoether\te2\t4\n"),
+    ],
+)  # fmt: skip
+def test_other_forms_of_rosters_are_read_and_grades_without_a_file_stay(
+    learner: Path, kind: str, roster: str
+) -> None:
+    """Importers delete a grade whose cell is empty, so a student without a file has no row."""
+    (learner / "roster.csv").write_text(roster)
+    check("00.1", MASS * 11.81)
+    for one in (hand_in("Marie Curie"), hand_in("Marie", id="m1")):
+        table = learner / "points.csv"
+        policy = gradebook.Policy(("00",))
+        graded = [grades.grade_file(one)]
+        args = (kind, graded, learner / "roster.csv", table)
+        assert gradebook.write_gradebook(*args, column="Week", policy=policy) == []
+        header, *rows = [*csv.reader(table.open())]
+        assert header == [
+            name.strip() for name in roster.splitlines()[0].replace("\t", ";").split(";")
+        ]
+        assert [(row[0].strip(), row[-1]) for row in rows if row[-1] != "1"] == []
+        assert len(rows) == (2 if kind == "canvas" else 1)
 
 
 def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:

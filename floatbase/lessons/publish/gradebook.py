@@ -28,7 +28,7 @@ from floatbase.lessons.publish.grades import (
 _DAY = timedelta(days=1)
 # for each gradebook: columns that identify a student, and those of them that hold an id
 _COLUMNS = {
-    "canvas": ("Student", "ID", "SIS User ID", "SIS Login ID", "Section"),
+    "canvas": ("Student", "LastName", "FirstName", "ID", "SIS User ID", "SIS Login ID", "Section"),
     "moodle": ("First name", "Last name", "ID number", "Username", "Email address"),
 }
 _IDS = {
@@ -111,7 +111,8 @@ def write_gradebook(
     """Write a CSV file that Canvas or Moodle imports.
 
     A row of the roster gets the points of the student's last file that is not too late. Students
-    without such a file get an empty cell, which both gradebooks leave as it is.
+    without such a file are left out, so that their grades stay as they are. An empty cell would
+    delete a grade, and Moodle reads it as 0 in a new column.
 
     Parameters
     ----------
@@ -159,15 +160,15 @@ def write_gradebook(
     total = max((len(policy.results(one)) for one in submissions), default=0)
     written, number = [], 0
     for row in rows:
-        points: object = ""
-        if _is_points_row(row):
-            points = total
-        else:
-            if number in chosen:
-                points = policy.points(chosen[number])
-                if days := policy.days_late(time_of(chosen[number].time)):
-                    messages.append(f"{chosen[number].file}: late days used: {days}.")
+        points = total
+        if not _is_points_row(row):
             number += 1
+            if number - 1 not in chosen:
+                continue
+            one = chosen[number - 1]
+            points = policy.points(one)
+            if days := policy.days_late(time_of(one.time)):
+                messages.append(f"{one.file}: late days used: {days}.")
         written.append([*(row[name] for name in kept), points])
     text = io.StringIO(newline="")
     writer = csv.writer(text)
@@ -190,11 +191,13 @@ def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except UnicodeDecodeError:
         raise InputError(f"{path} is not text in UTF-8. Export the roster as CSV.") from None
-    header, *lines = [*csv.reader(io.StringIO(text))] or [[]]
-    header = [name.strip() for name in header]
-    # older Moodles say Surname
-    header = ["Last name" if name == "Surname" else name for name in header]
-    if not set(_IDS[kind]) & set(header):
+    for separator in ",;\t":
+        header, *lines = [*csv.reader(io.StringIO(text), delimiter=separator)] or [[]]
+        # older Moodles say Surname
+        header = [{"Surname": "Last name"}.get(name.strip(), name.strip()) for name in header]
+        if set(_IDS[kind]) & set(header):
+            break
+    else:
         raise InputError(
             f"{path} has none of the columns {', '.join(_IDS[kind])}. Give the CSV file that "
             f"{kind.capitalize()} exports."
@@ -205,7 +208,7 @@ def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]
 
 def _is_points_row(row: Mapping[str, str]) -> bool:
     """Return whether a row of Canvas tells the points of each column."""
-    return row.get("Student", "").strip() == "Points Possible"
+    return "Points Possible" in row.get("Student", row.get("LastName", ""))
 
 
 def _is_column(name: str, column: str) -> bool:
@@ -222,6 +225,7 @@ def _matches(kind: str, row: Mapping[str, str], submission: Submission) -> bool:
     names = [
         f"{first} {last}",
         f"{row.get('First name', '')} {row.get('Last name', '')}",
+        f"{row.get('FirstName', '')} {row.get('LastName', '')}",
     ]
     return bool(wanted) and wanted in [name.casefold().split() for name in names]
 

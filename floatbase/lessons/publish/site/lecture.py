@@ -13,6 +13,7 @@ from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.site.answers import printed_results
 from floatbase.lessons.publish.site.inline import inline_html
 from floatbase.lessons.publish.site.live_robots import LESSON_ROBOTS
+from floatbase.lessons.publish.site.reasons import REASONS
 from floatbase.lessons.publish.workspace import NOTEBOOKS
 from floatbase.lessons.questions import Question, all_questions
 from floatbase.lessons.recalling import capitalized
@@ -24,6 +25,7 @@ LECTURE = {
     "06": "beij", "07": "abgh", "08": "abfg", "09": "cfij", "10": "abde", "A": "cdeg", "B": "aefh",
     "C": "abce", "P": "fghi", "X": "bceg",
 }  # fmt: skip
+_ANNOUNCEMENT = re.compile(r"(?<=[.!?]) [^.!?]*:$")  # of the cell below
 _WHY = re.compile(r"\*\*Why\??\*\*:? *")
 
 
@@ -63,6 +65,8 @@ def lecture_questions() -> dict[str, list[LectureQuestion]]:
 
 def _reason(cells: list[object], name: str) -> str:
     """Return the paragraph "Why?" below the result of a prediction, or the first paragraph."""
+    if name in REASONS:
+        return REASONS[name]
     paragraphs: list[str] = []
     is_shown = False
     for cell in cells:
@@ -76,7 +80,7 @@ def _reason(cells: list[object], name: str) -> str:
     why = (part for part in paragraphs if _WHY.match(part))
     usable = (part for part in paragraphs if part[:1] not in "#$|<" and not part.endswith(":"))
     reason = _WHY.sub("", next(why, "") or next(usable, ""), count=1)
-    return reason[:1].upper() + reason[1:]
+    return capitalized(_ANNOUNCEMENT.sub("", reason))
 
 
 def page() -> str:
@@ -91,7 +95,7 @@ def page() -> str:
         "",
         f'<a href="_static/{SLIDES}">All questions as slides</a> are one file that needs no '
         "network. The arrow keys turn the pages, and the space bar shows the answer. For lessons "
-        f"{robots}, the live robot at the end of the lesson's page is the best answer: change one "
+        f"{robots}, the live robot on the lesson's page is the best answer: change one "
         "thing, and push.",
     ]
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):

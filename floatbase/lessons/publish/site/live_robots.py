@@ -66,9 +66,10 @@ LESSON_ROBOTS = {
     "P": LessonRobot(
         "go2",
         {"panel": "1"},
-        "Open *terms of eq. (7)*, and switch off gravity in the model: the controller no longer "
-        "holds the weight. Stand the robot up, and switch gravity off in reality instead. The page "
-        "has those switches of the playground for which the controller's QP keeps its form.",
+        "Open *terms of eq. (7)*, and switch off gravity in the model. The robot sags, because "
+        "only its position error makes the controller push up. Stand the robot up, and switch "
+        "gravity off in reality instead. The page has those switches of the playground for which "
+        "the controller's QP keeps its form.",
     ),
 }  # fmt: skip
 

@@ -21,6 +21,11 @@ const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
+const EXPLAINED = { // texts of the panel's sections
+  "ground and load": "model: what the controller assumes. reality: what the robot has.",
+  "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
+    "its term, in the controller's model or in reality.",
+};
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -116,6 +121,9 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       scene.handle({type: "set_control", path: "", name: key});
     }
     for (const {command} of controls) scene.handle(command);
+    for (const [section, content] of Object.entries(EXPLAINED)) {
+      scene.handle({type: "set_text", path: "", name: "explained", text: content, section});
+    }
   }
   else document.body.append(pushButton());
   scene.onMessage(({name: key, value}) => {
@@ -199,6 +207,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     if (now < written + TEXT_PERIOD) return;
     written = now;
     text("active", multiplierText(frame.active));
+    if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
     text("speed", frame.factor < SLOW * slow
       ? `This computer is too slow for real time: ${frame.factor.toFixed(2)} × real time.`

@@ -6,8 +6,9 @@ import {setParameter} from "../src/engine/tick.js";
 import {controlsOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
-import {deal, mapText, outline} from "../src/live/recovery_map.js";
-import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
+import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
+import {createVoice, footName, jointName, limitOf, multiplierText, slippingPoints}
+  from "../src/live/words.js";
 
 test("a clock gives the steps of the time that has passed, in slow motion too", () => {
   const clock = createClock(1e-3);
@@ -66,16 +67,22 @@ test("a force is inside its cone, outside, or nothing", () => {
   assert.equal(coneStatus([0, 0, 0.01], 0.7, 0.1), "idle");
 });
 
-const robot = {points: ["FL_foot", "FR_foot"], weight: 100};
+const robot = {points: ["FL_foot", "FR_foot"], weight: 100, resting: ["gripper_joint"]};
 const frameWith = (more) => ({
-  outcome: "", seen: [], settings: {actualMu: 0.7},
+  outcome: "", seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
   measured: new Float64Array([0, 0, 50, 0, 0, 50]),
   planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
 });
 
 test("the sentence names what limits the robot, the most important first", () => {
   const text = (more) => limitOf(frameWith(more), robot).text;
-  assert.match(text({}), /^No constraint is active/);
+  assert.match(text({}), /^The robot stands/);
+  assert.match(text({settings: {actualMu: 0.7, gait: "trot"}}), /^The robot walks/);
+  assert.match(text({measured: new Float64Array(6)}), /in the air/);
+  const range = (joint) => ["joint limit", joint, 0, 1];
+  assert.match(text({seen: [range("gripper_joint")]}), /^The robot stands/);
+  const calves = ["FL", "FR", "RL", "RR"].map((leg) => range(`${leg}_calf_joint`));
+  assert.match(text({seen: calves}), /front right calf joint and 2 more are near .* ranges/);
   const friction = ["friction", "FL_foot", 2, 0.3];
   assert.match(text({seen: [friction]}), /front left foot is at its friction limit/);
   const torque = ["upper torque limit", "FL_calf_joint", 0, 0.1];
@@ -83,8 +90,13 @@ test("the sentence names what limits the robot, the most important first", () =>
   const both = [friction, ["friction", "FR_foot", 0, 0.3]];
   assert.match(text({seen: both}), /left foot and the front right foot are at their friction/);
   const measured = new Float64Array([0, 0, 50, 0, 34.9, 50]);
-  assert.match(text({seen: both, measured}), /front right foot is slipping/);
-  assert.match(text({outcome: "fell"}), /fell/);
+  const planned = new Float64Array([0, 0, 50, 0, 40, 50]);
+  const points = (more) => slippingPoints(frameWith(more), robot);
+  assert.deepEqual(points({measured, planned}), ["FR_foot"]);
+  assert.deepEqual(points({measured}), []); // the planned force is inside
+  assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
+  assert.match(text({outcome: "fell"}), /^The robot fell/);
+  assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
   assert.match(text({outcome: "infeasible"}), /all the constraints/);
 });
 
@@ -118,7 +130,7 @@ test("controls begin at the settings of the engine and change what they name", (
   }
   assert.deepEqual(made["payload [kg] reality"].change(2), {set: {actualPayload: 2}});
   assert.deepEqual(made["torque limits [%]"].change(50), {set: {torque: 0.5}});
-  const missing = made["foot without contact force"];
+  const missing = made["foot without ground"];
   assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
   assert.deepEqual(missing.change(0), {set: {missing: []}});
 });
@@ -148,11 +160,19 @@ test("a search finds the largest number that passes, wherever it begins", () => 
   assert.ok(largest(() => true, 30, 30, 100) > 100);
 });
 
+test("a direction has the angle of the slider and words", () => {
+  const words = [0, 30, 90, 150, 180, 225, 270, 340]
+    .map((degrees) => directionText(degrees * Math.PI / 180));
+  assert.deepEqual(words, ["0° (forwards)", "30° (forwards left)", "90° (left)",
+    "150° (backwards left)", "180° (backwards)", "-135° (backwards right)", "-90° (right)",
+    "-20° (forwards)"]);
+});
+
 test("a map grows around its centre and closes when it is complete", () => {
   const found = [{direction: Math.PI / 2, push: 20}, {direction: 0, push: 10}];
   const points = outline(found, [1, 1], 0.1, false);
   assert.deepEqual(points[0].slice(0, 2), [2, 1]);
   assert.ok(Math.abs(points[1][1] - 3) < 1e-12);
   assert.equal(outline(found, [1, 1], 0.1, true).length, 3);
-  assert.match(mapText(found, 1), /10 N towards 0°, 20 N towards 90°/);
+  assert.match(mapText(found, 1), /10 N towards 0° \(forwards\), at most 20 N towards 90° \(left/);
 });

@@ -7,11 +7,18 @@
 import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
 import {pushRecovery} from "./recovery.js";
+import {slippingPoints} from "../live/words.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
+let resting = []; // joints that are at the end of their range when the robot stands
+let around = null; // names of the contact points, and the weight
 const clock = createClock(STEP);
-const seen = new Map(); // constraints that were active at any time since the last picture
+// constraints that were active, and contact points that slipped, since the last picture
+const seen = new Map(), slipping = new Set();
+let slipTime = null; // s, when a point slipped for the last time before the controller stopped
+const RECENT = 1; // s before a fall, in which a slip counts as its cause
+const SAMPLE = 16; // steps between two looks at the clock, and at which points slip
 
 async function fetchOk(name) {
   const response = await fetch(name);
@@ -35,19 +42,27 @@ async function start({name, settings}) {
   robot = await data;
   engine?.free();
   engine = createEngine(mj, module, robot);
-  for (let i = 0; i < WARM_UP; i++) engine.step();
+  const standing = new Set();
+  for (let i = 0; i < WARM_UP; i++) {
+    engine.step();
+    for (const [kind, owner] of engine.activeConstraints()) {
+      if (kind.endsWith("joint limit")) standing.add(owner);
+    }
+  }
+  resting = [...standing];
   engine.set(settings);
   engine.reset();
   clock.reset();
-  const {drawing} = robot;
+  const {drawing, weight} = robot;
+  around = {weight, points: robot.points.map(({name}) => name)};
   postMessage({ready: {name, drawing, settings: engine.settings, robot: summary()}});
 }
 
 const summary = () => ({
-  weight: robot.weight, bodies: robot.bodies, points: robot.points.map(({name}) => name),
+  ...around, bodies: robot.bodies,
   facets: robot.facets, lifted: [...new Set(Object.values(robot.problems)
     .map(({lifted}) => lifted).filter(Boolean))],
-  gaits: robot.walking?.gaits ?? {},
+  gaits: robot.walking?.gaits ?? {}, resting,
 });
 
 function frame() {
@@ -55,20 +70,34 @@ function frame() {
   const begin = performance.now();
   let done = 0;
   seen.clear();
+  slipping.clear();
   for (; done < count; done++) {
     if (engine.isAtRest) {
       engine.reset();
+      slipTime = null;
       postMessage({stoodUp: true});
     }
     engine.step();
     for (const one of engine.activeConstraints()) seen.set(one.slice(0, 3).join(), one);
-    if (done % 16 === 15 && performance.now() - begin > clock.budget) {
+    if (done % SAMPLE < SAMPLE - 1) continue;
+    watchSlip();
+    if (performance.now() - begin > clock.budget) {
       done++;
       break;
     }
   }
   clock.done(done, performance.now() - begin);
   postMessage({frame: picture()});
+}
+
+function watchSlip() {
+  if (engine.outcome !== "") return;
+  const forces = {measured: engine.measuredForces(), planned: engine.plannedForces()};
+  for (const name of slippingPoints({...forces, settings: engine.settings}, around)) {
+    slipping.add(name);
+  }
+  if (slipping.size) slipTime = engine.time;
+  else if (engine.time - slipTime > RECENT) slipTime = null;
 }
 
 // What the page draws of the present state.
@@ -87,7 +116,8 @@ function picture() {
   return {
     rotations, positions, contacts, com: engine.com(), time: engine.time,
     measured: engine.measuredForces(), planned: engine.plannedForces(),
-    active: engine.activeConstraints(), seen: [...seen.values()],
+    active: engine.activeConstraints(), seen: [...seen.values()], slipping: [...slipping],
+    hasSlipped: slipTime !== null,
     outcome: engine.outcome, pushes: engine.pushes,
     lifted: engine.lifted, settings: engine.settings, factor: clock.factor,
     stepTime: clock.stepTime,
@@ -98,7 +128,10 @@ const handlers = {
   start: (given) => start(given),
   set: (changes) => engine?.set(changes),
   push: (push) => engine?.push(push),
-  reset: () => engine?.reset(),
+  reset() {
+    engine?.reset();
+    slipTime = null;
+  },
   pause: (isPaused) => clock.pause(isPaused),
   step: () => clock.single(),
   timeScale: (scale) => clock.setScale(scale),

@@ -26,7 +26,7 @@ export function controlsOf(robot, settings, push, {names, name, open, walk}) {
     "gravity reality": term("actualHasGravity", settings.actualHasGravity, "reality"),
     "Coriolis model": term("hasCoriolis", settings.hasCoriolis, "model"),
     "Coriolis reality": term("actualHasCoriolis", settings.actualHasCoriolis, "reality"),
-    "foot without contact force": [{
+    "foot without ground": [{
       value: 0, choices: ["none", ...feet], section: "terms of eq. (7)",
     }, (value) => ({set: {
       missing: robot.points.filter((name) => footName(name) === feet[value - 1]),

@@ -29,6 +29,7 @@ export function motionText(speed, turn) {
 export function createJoystick(most, change) {
   const knob = make("i"), text = make("output");
   const pad = make("div", {className: "pad", tabIndex: 0}, knob);
+  pad.title = "Click the middle to stop.";
   pad.setAttribute("role", "application");
   pad.setAttribute("aria-label",
     "velocity: arrow keys up and down for the speed, left and right to turn, Escape to stop");

@@ -17,6 +17,8 @@ const cross = (a, b) => [
 const unit = (a) => a.map((c) => c / Math.hypot(...a));
 const scaled = ([x, y, z], [sx, sy, sz]) => [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, sz, 0, x, y, z, 1];
 
+const GRID = 1; // m, by multiples of which the lines on the ground follow the robot
+
 // How a force lies in the cone with friction coefficient mu, as the viewer colours it.
 export function coneStatus([x, y, z], mu, least) {
   const across = Math.hypot(x, y);
@@ -83,6 +85,13 @@ export function createPainter(scene, drawing, robot) {
       place(sides, matrix);
     }
   }
+  let middle = [0, 0];
+  function drawGround([x, y]) {
+    const next = [x, y].map((c) => GRID * Math.round(c / GRID));
+    if (next.join() === middle.join()) return;
+    middle = next;
+    place("ground", scaled([...middle, 0], [1, 1, 1]));
+  }
   function drawCom([x, y, z]) {
     const r = drawing.comRadius;
     place("com/ball", scaled([x, y, z], [r, r, r]));
@@ -94,6 +103,7 @@ export function createPainter(scene, drawing, robot) {
       drawLinks(frame);
       points.forEach((_, i) => drawContact(i, frame));
       drawCom(frame.com);
+      drawGround(frame.com);
     },
     // The push of `force`, N, as an arrow that begins where it acts, or none.
     drawPush(at, force) {

@@ -30,16 +30,26 @@ export function outline(found, centre, scale, isComplete) {
   return isComplete ? [...points, points[0]] : points;
 }
 
-const degrees = (angle) => Math.round(angle * 180 / Math.PI);
+const WAYS = ["forwards", "forwards left", "left", "backwards left", "backwards", "backwards right",
+  "right", "forwards right"];
+
+// "45° (forwards left)": an angle between -180 and 180°, as the slider has it, and its direction.
+export function directionText(angle) {
+  const degrees = Math.round(angle * 180 / Math.PI), way = WAYS[Math.round(degrees / 45) % 8];
+  return `${degrees > 180 ? degrees - 360 : degrees}° (${way})`;
+}
 
 export function mapText(found, seconds) {
-  if (!found.length) return "Computing the push-recovery map.";
+  if (!found.length) return "Computing the push-recovery map of the standing robot.";
   const sorted = [...found].sort((a, b) => a.push - b.push), [least, most] = [sorted[0],
     sorted.at(-1)];
   const state = found.length < DIRECTIONS ? `${found.length} of ${DIRECTIONS} directions`
     : `${DIRECTIONS} directions in ${seconds.toFixed(1)} s`;
-  return `Largest push of ${DURATION} s that it survives: ${least.push} N towards ` +
-    `${degrees(least.direction)}°, ${most.push} N towards ${degrees(most.direction)}° (${state}).`;
+  const [weak, strong] = [least, most].map(
+    ({push, direction}) => `${push} N towards ${directionText(direction)}`,
+  );
+  return `Largest push of ${DURATION} s that it survives, standing: at least ${weak}, at most ` +
+    `${strong} (${state}).`;
 }
 
 // viewer: meshcat's. say(text): writes a text into the panel. name: of the robot.

@@ -1,9 +1,10 @@
 // Sentences about the live robot: what limits it now.
 
 const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "hind"};
-const SLIPPING = 0.97; // fraction of the actual friction limit
+const SLIPPING = 0.97, BEYOND = 1.02; // fractions of the actual friction limit
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
-const MISSED = 0.25; // fraction of the weight on one foot: a smaller difference is contact softness
+const UNLOADED = 0.01; // fraction of the weight: feet with less in all do not stand
+const MOST_NAMES = 2; // in a sentence
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
 export function footName(name) {
@@ -22,8 +23,10 @@ export function jointName(name) {
 
 function list(names) {
   const unique = [...new Set(names)];
-  if (unique.length < 2) return unique.join("");
-  return `${unique.slice(0, -1).join(", ")} and ${unique.at(-1)}`;
+  if (unique.length > MOST_NAMES) {
+    return `${unique.slice(0, MOST_NAMES).join(", ")} and ${unique.length - MOST_NAMES} more`;
+  }
+  return unique.join(" and ");
 }
 
 // "The front left foot is", "The front left foot and the rear left foot are".
@@ -32,22 +35,27 @@ function subject(names) {
   return `${text[0].toUpperCase()}${text.slice(1)} ${unique.length > 1 ? "are" : "is"}`;
 }
 
-// Feet whose measured force is at the actual friction limit, and far from the planned force.
-export function slippingFeet({measured, planned, settings}, {points, weight}) {
+// Contact points whose measured force is at the actual friction limit, while the planned force is
+// beyond it.
+export function slippingPoints({measured, planned, settings: {actualMu}}, {points, weight}) {
+  const least = UNLOADED * weight;
   return points.filter((_, i) => {
     const [x, y, z] = measured.subarray(3 * i, 3 * i + 3);
-    const away = Math.hypot(...[0, 1, 2].map((c) => planned[3 * i + c] - measured[3 * i + c]));
-    return z > 0 && Math.hypot(x, y) > SLIPPING * settings.actualMu * z
-      && away > MISSED * weight / points.length;
-  }).map(footName);
+    const [px, py, pz] = planned.subarray(3 * i, 3 * i + 3);
+    return Math.min(z, pz) > least && Math.hypot(x, y) > SLIPPING * actualMu * z
+      && Math.hypot(px, py) > BEYOND * actualMu * pz;
+  });
 }
+
+const isInAir = ({measured, time}, {weight}) => time > 0
+  && measured.every((force) => Math.abs(force) < UNLOADED * weight);
 
 const STOPPED = {
   fell: "The robot fell. It is put on its feet again in a moment.",
   "left the ground": "The robot left the ground. It is put on its feet again in a moment.",
-  infeasible: "No torques satisfy all the constraints, so the controller stopped. The Python " +
-    "library names the constraints that are in conflict. The robot is put on its feet again in a " +
-    "moment.",
+  infeasible: "Too much: no motor torques can satisfy all the constraints, so the controller " +
+    "stopped. (The Python library names those in conflict.) The robot is put on its feet again " +
+    "in a moment.",
   "no answer": "The controller of this page has no answer in this state. The Python library " +
     "has a slower method for it. The robot is put on its feet again in a moment.",
 };
@@ -55,8 +63,14 @@ const STOPPED = {
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
 // sends. robot: its summary.
 export function limitOf(frame, robot) {
-  if (frame.outcome) return {rank: 0, text: STOPPED[frame.outcome] ?? frame.outcome};
-  const slipping = slippingFeet(frame, robot);
+  if (frame.outcome) {
+    const before = frame.hasSlipped ? "The feet slipped. " : "";
+    return {rank: 0, text: before + (STOPPED[frame.outcome] ?? frame.outcome)};
+  }
+  if (isInAir(frame, robot)) {
+    return {rank: 1, text: "The robot is in the air: the ground exerts no force on its feet."};
+  }
+  const slipping = frame.slipping.map(footName);
   if (slipping.length) {
     return {rank: 1, text: `${subject(slipping)} slipping: the ground gives less friction than ` +
       "the controller plans with."};
@@ -82,9 +96,15 @@ export function limitOf(frame, robot) {
     return {rank: 4, text: `${subject([...unloaded])} unloaded: a foot can push on the ground, ` +
       "but not pull."};
   }
-  const joints = owners("joint limit").map(jointName);
-  if (joints.length) return {rank: 5, text: `${subject(joints)} near the end of its range.`};
-  return {rank: 6, text: "No constraint is active: every force is inside its friction cone."};
+  const joints = owners("joint limit").filter((name) => !robot.resting.includes(name))
+    .map(jointName);
+  if (joints.length) {
+    const many = new Set(joints).size > 1;
+    return {rank: 5, text: `${subject(joints)} near the end of ${many ? "their ranges" :
+      "its range"}.`};
+  }
+  const calm = frame.settings.gait ? "The robot walks" : "The robot stands";
+  return {rank: 6, text: `${calm}: no foot and no motor is at a limit.`};
 }
 
 // Sentences that stay long enough to be read. Of those within one period, the most important one is
@@ -101,15 +121,16 @@ export function createVoice(say, period = 600) {
 }
 
 // The active constraints and their multipliers, the largest first.
-export function multiplierText(active) {
+export function multiplierText(all) {
+  const active = all.filter(([, , , multiplier]) => multiplier > WEAK);
   if (!active.length) return "No active constraints.";
-  const all = active.map(([kind, owner, number, value]) => {
+  const lines = active.map(([kind, owner, number, value]) => {
     const name = kind.includes("torque") || kind.includes("joint") ? jointName(owner)
       : footName(owner);
     const facet = kind === "friction" ? ` (facet ${number + 1})` : "";
     return {value, text: `${kind}${facet}, ${name}: ${value.toPrecision(2)}`};
   });
-  const shown = all.sort((a, b) => b.value - a.value).slice(0, 6).map(({text}) => text);
+  const shown = lines.sort((a, b) => b.value - a.value).slice(0, 6).map(({text}) => text);
   const more = active.length - shown.length;
   const rest = more ? [`and ${more} more`] : [];
   return ["Multipliers of active constraints:", ...shown, ...rest].join("\n");
