@@ -8,7 +8,11 @@ from floatbase.lessons.lesson10.helpers import (
     make_walking_controller,
     mean_load,
 )
-from floatbase.lessons.lesson10.pictures import plot_loads, plot_step
+from floatbase.lessons.lesson10.pictures import (
+    plot_loads,
+    plot_push_recovery_maps,
+    plot_step,
+)
 
 __all__ = [
     "EXERCISES",
@@ -18,6 +22,7 @@ __all__ = [
     "make_walking_controller",
     "mean_load",
     "plot_loads",
+    "plot_push_recovery_maps",
     "plot_step",
     "run_jump",
 ]

@@ -1,4 +1,4 @@
-"""Lesson 10: a pendulum that takes a step, and the loads of a pronk."""
+"""Lesson 10: a pendulum that takes a step, the loads of a pronk, and push-recovery maps."""
 
 from __future__ import annotations
 
@@ -9,10 +9,17 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from floatbase.lessons.push_recovery import measured_push_recovery
 from floatbase.simulation import Rollout
-from floatbase.viewer.scene.colours import GREYS, hex_code
+from floatbase.viewer.scene.colours import GREYS, LIMIT, MEASURED, WARNING, hex_code
 
 _STYLES = ("-", "--", ":", "-.")
+_MAPS = {
+    "07": "07: QP, standing",
+    "08": "08: Stand, steps when pushed",
+    "10 walking": "Walk, trot on the spot",
+    "10": "MPC, trot on the spot",
+}
 
 
 def plot_step(paths: Mapping[str, npt.ArrayLike], reach: float) -> Figure:
@@ -70,5 +77,33 @@ def plot_loads(record: Rollout, begin: float, end: float) -> Figure:
     ax.set(xlabel="time [s]", ylabel="vertical force / weight", ylim=(0, 4))
     ax.grid(alpha=0.3)
     ax.legend()
+    plt.close(figure)
+    return figure
+
+
+def plot_push_recovery_maps() -> Figure:
+    """Plot the push-recovery maps of lessons 07, 08 and 10 together, seen from above.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
+    figure, ax = plt.subplots(figsize=(6, 6), subplot_kw={"projection": "polar"})
+    ax.set_theta_zero_location("N")
+    colours = (LIMIT, LIMIT, WARNING, MEASURED)
+    for (lesson, label), colour, style in zip(
+        _MAPS.items(), colours, (":", "-", "--", "-"), strict=True
+    ):
+        recovery = measured_push_recovery(lesson)
+        angles = np.append(recovery.directions, recovery.directions[0])
+        pushes = np.append(recovery.pushes, recovery.pushes[0])
+        ax.plot(angles, pushes, style, color=hex_code(colour), linewidth=2, label=label)
+    ax.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
+    ax.set_rlim(0.0, 550.0)
+    ax.set_rlabel_position(22.5)
+    ax.grid(alpha=0.35)
+    ax.set_title("go2: largest push of 0.1 s that is survived [N]", pad=14)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), fontsize="small", ncols=2)
     plt.close(figure)
     return figure
