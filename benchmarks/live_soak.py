@@ -1,10 +1,10 @@
 """The live robot used at random: `python benchmarks/live_soak.py`.
 
 A program drags the robot and the view, moves sliders, presses buttons, walks and opens other robots
-for ten minutes, in Chromium or Firefox; in the second half, the robot is go2. The table shows exceptions, pictures per second, falls, and
-the memory of the browser. `--throttle 4` stops the browser's processes for three quarters of the
-time, `--rest` presses nothing, `--map` computes a push-recovery map instead. The exit code is 1
-after an exception.
+for ten minutes, in Chromium or Firefox. In the second half, the robot is go2. The table shows
+exceptions, pictures per second, falls, and the memory of the browser. `--throttle 4` stops the
+browser's processes for three quarters of the time, `--rest` presses nothing, and `--map` computes a
+push-recovery map instead. The exit code is 1 after an exception.
 """
 
 from __future__ import annotations
