@@ -362,7 +362,7 @@ def test_gradescope_gets_a_score_for_each_exercise_and_only_the_teacher_learns_w
     other = results(learner, [learner / "s03.json"], policy=policy, own_numbers=True)
     assert [t["visibility"] for t in other["tests"]] == ["visible"] * len(names) + ["hidden"]
     late = results(learner, [learner / "s00.json"], policy=gradebook.Policy(LESSONS))
-    assert late["score"] == 0
+    assert late["score"] == 0 and "Too late" in late["output"]
     for files in ([], [learner / "s04.json"], [learner / "s00.json", learner / "s01.json"]):
         wrong = results(learner, files, policy=policy)
         assert wrong["score"] == 0 and wrong["output"] and "tests" not in wrong

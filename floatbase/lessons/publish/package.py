@@ -17,11 +17,24 @@ from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import assignment
 from floatbase.lessons.predictions import lesson_name
+from floatbase.lessons.publish.contents import title_of
 from floatbase.lessons.publish.workspace import NOTEBOOKS, write_without_outputs
 
 _ROOT = NOTEBOOKS.parent
 _INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")
 _FOLDERS = ("floatbase", "assets/meshes")
+_HUB = ".binder/jupyterhub_config.py"
+_README = """# floatbase
+
+Lessons of an interactive course on controlling floating-base robots:
+
+{lessons}
+
+You need Python 3.11, 3.12 or 3.13 and make. `make lab` opens the lessons in JupyterLab. The first
+run takes a few minutes. Your copies of the lessons are in `notebooks/my`.
+[Installation and troubleshooting](docs/installation.md) helps when something fails, and
+[How to use the course](notebooks/how_to.md) explains how to hand in your answers.
+"""
 _FIRST_LESSON = "00"  # explains how a lesson works
 # arguments of an Exercise that give its answer away -> what replaces them
 _SECRET = {"solution": '""', "explanation": '""', "examples": "tuple"}
@@ -84,7 +97,8 @@ def write_assignment(
 ) -> None:
     """Write a package for students with some lessons, and without solutions.
 
-    The folder holds the package, these lessons without outputs, lesson 00, and the Makefile.
+    The folder holds the package, these lessons without outputs, lesson 00, the Makefile and the
+    configuration of a JupyterHub.
     Solutions and explanations of all exercises are removed. The checks stay, because students need
     them: a check computes the right value in another way than the solution. The functions with
     which lesson C continues after an unsolved exercise are encoded.
@@ -111,6 +125,11 @@ def write_assignment(
     paths = lesson_paths([_FIRST_LESSON]) | paths
     copy_package(folder)
     shutil.copy(_ROOT / "Makefile", folder)
+    shutil.copy(_ROOT / ".gitignore", folder)
+    (folder / _HUB).parent.mkdir()
+    shutil.copy(_ROOT / _HUB, folder / _HUB)
+    names = "\n".join(f"- {title_of(path)}" for path in paths.values())
+    (folder / "README.md").write_text(_README.format(lessons=names), encoding="utf-8")
     # the texts for teachers and contributors are not part of it
     (folder / "docs").mkdir()
     shutil.copy(_ROOT / "docs" / "installation.md", folder / "docs")
