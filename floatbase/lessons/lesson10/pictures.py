@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from floatbase.lessons.push_recovery import measured_push_recovery
 from floatbase.simulation import Rollout
@@ -89,7 +90,10 @@ def plot_push_recovery_maps() -> Figure:
     Figure
         The figure.
     """
-    figure, ax = plt.subplots(figsize=(6, 6), subplot_kw={"projection": "polar"})
+    figure, ax = plt.subplots(
+        figsize=(6, 6), layout="constrained", subplot_kw={"projection": "polar"}
+    )
+    assert isinstance(ax, PolarAxes)
     ax.set_theta_zero_location("N")
     colours = (LIMIT, LIMIT, WARNING, MEASURED)
     for (lesson, label), colour, style in zip(
