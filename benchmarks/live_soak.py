@@ -1,10 +1,10 @@
 """The live robot used at random: `python benchmarks/live_soak.py`.
 
 A program drags the robot and the view, moves sliders, presses buttons, walks and opens other robots
-for ten minutes, in Chromium or Firefox. The table shows exceptions, pictures per second, falls, and
-the memory of the browser. `--throttle 4` stops the browser's processes for three quarters of the
-time, `--rest` presses nothing, `--map` computes a push-recovery map instead. The exit code is 1
-after an exception.
+for ten minutes, in Chromium or Firefox. In the second half, the robot is go2. The table shows
+exceptions, pictures per second, falls, and the memory of the browser. `--throttle 4` stops the
+browser's processes for three quarters of the time, `--rest` presses nothing, and `--map` computes a
+push-recovery map instead. The exit code is 1 after an exception.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from live import Handler
 from floatbase.lessons.publish.live import folder as live_folder
 
 SAMPLE = 2.0  # s between two samples of the memory
-WARM_UP = 0.2  # fraction of the time after which memory should not grow
+WARM_UP = 0.6  # fraction of the time after which memory should not grow: the robot is go2 then
 SLICE = 0.02  # s, of which a throttled process runs a fraction
 PATIENCE = 60.0  # s beyond the time of the run
 COMMANDS = {

@@ -129,6 +129,7 @@ class Viewer(Controls, Output):
         self.window = Window(port)
         self.renderer = DiffRenderer(self.window)
         self._camera = FollowingCamera(robot, as_bool("follow", follow))
+        self._view = View()  # of the camera, when a first picture or a recording places it
         self._is_playing = False
         self._last: State | None = None
         self._legend_entries: dict[
@@ -218,7 +219,7 @@ class Viewer(Controls, Output):
         picture = self.painter.picture(state, contacts, forces, planned, **options)
         self.draw(picture, title, ghost_name)
         if self._last is None:
-            self.renderer.set(*self._camera.commands(self.painter, View(), state))
+            self.renderer.set(*self._camera.commands(self.painter, self._view, state))
         self._last = state
         return self
 
@@ -475,7 +476,7 @@ class Viewer(Controls, Output):
             times, pictures, speed=speed, paused=paused, title=title, ghost_name=ghost_name
         )
         self._last, self._camera.follows = states[0], follow
-        self.renderer.set(*self._camera.commands(self.painter, View(), states[0], FOLLOWED))
+        self.renderer.set(*self._camera.commands(self.painter, self._view, states[0], FOLLOWED))
         return self
 
     def play_pictures(
@@ -549,6 +550,7 @@ class Viewer(Controls, Output):
         if follow is not None:
             self._camera.follows = as_bool("follow", follow)
         followed = FOLLOWED if self._is_playing else ROBOT
+        self._view = view
         self.renderer.force_set(*self._camera.commands(self.painter, view, self._last, followed))
         return self
 

@@ -6,6 +6,7 @@ import ast
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -58,12 +59,24 @@ def texts_of(path: Path) -> str:
     return text
 
 
+def squeezed(line: str) -> str:
+    return re.sub(r"\s+", "", line)
+
+
 def test_the_package_of_an_assignment_holds_no_solution(assigned: Path) -> None:
     files = [path for path in assigned.rglob("*") if path.is_file()]
     found = {path: texts_of(path) for path in files}
     secret = {(n, t) for n, e in EXERCISES.items() for t in (e.solution, e.explanation) if t}
     assert len(secret) > 60
     assert [(n, p) for n, t in secret for p, text in found.items() if t in text] == []
+    # not even a line of a function or of a calculation, except where the stub has it
+    programs = {p: squeezed(text) for p, text in found.items() if p.suffix == ".py"}
+    for n, e in EXERCISES.items():
+        stub = [squeezed(line) for line in e.stub.splitlines()]
+        for line in map(squeezed, e.solution.splitlines()):
+            is_code = not line.startswith(('"""', "from", "import")) and line not in stub
+            if is_code and len(line) > 25:
+                assert [p for p, text in programs.items() if line in text] == [], (n, line)
     # the search finds them where they are
     ours = texts_of(
         Path(sys.modules["floatbase"].__file__).parent / "lessons/lesson05/exercises.py"
@@ -83,6 +96,10 @@ def test_the_package_of_an_assignment_checks_answers_and_says_who_has_the_soluti
         "for answer in (3.0, 4.0): check('00.1', answer)\n"
         "reveal('00.1')\n"
         "print(len(all_exercises()))\n"
+        "import numpy as np\n"
+        "from floatbase.lessons import lessonC\n"
+        "names = {'longest_step': 'C.2', 'row_to_drop': 'C.3'}\n"
+        "print([all_exercises()[n].judge(getattr(lessonC, f)).right for f, n in names.items()])\n"
     )
     run = subprocess.run(
         [sys.executable, "-c", program],
@@ -91,7 +108,8 @@ def test_the_package_of_an_assignment_checks_answers_and_says_who_has_the_soluti
         text=True,
     )
     assert run.returncode == 0, run.stderr
-    where, known = run.stdout.splitlines()
+    where, known, defaults = run.stdout.splitlines()
+    assert defaults == "[True, True]"  # the lesson continues without the student's functions
     assert "Prof. Curie" in where and "31 May, 18:00" in where and "00.1" in where
     assert int(known) == len(EXERCISES)
 
@@ -344,7 +362,7 @@ def test_gradescope_gets_a_score_for_each_exercise_and_only_the_teacher_learns_w
     other = results(learner, [learner / "s03.json"], policy=policy, own_numbers=True)
     assert [t["visibility"] for t in other["tests"]] == ["visible"] * len(names) + ["hidden"]
     late = results(learner, [learner / "s00.json"], policy=gradebook.Policy(LESSONS))
-    assert late["score"] == 0
+    assert late["score"] == 0 and "Too late" in late["output"]
     for files in ([], [learner / "s04.json"], [learner / "s00.json", learner / "s01.json"]):
         wrong = results(learner, files, policy=policy)
         assert wrong["score"] == 0 and wrong["output"] and "tests" not in wrong

@@ -429,6 +429,17 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     ]
 
 
+def test_a_view_chosen_before_the_first_picture_is_kept(go2: Robot, standing: State) -> None:
+    def eye(view: Viewer) -> list[float]:
+        return list(view.window.scene.commands()["/", "set_camera", ""]["position"])
+
+    view = Viewer(go2).camera("left").show(standing)
+    first = eye(view)
+    assert first == pytest.approx(eye(view.camera("left")), abs=1e-6)
+    assert eye(view.camera("default")) != pytest.approx(first, abs=0.1)
+    view.close()
+
+
 def test_only_a_call_of_camera_moves_the_camera_again(
     viewer: Viewer, go2: Robot, standing: State
 ) -> None:

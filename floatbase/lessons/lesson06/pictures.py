@@ -41,14 +41,16 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
         What (28) says about the force.
     """
     cone, f = FrictionCone(np.array([0.0, 0.0, 1.0]), mu), np.asarray(force, dtype=np.float64)
-    picture = {
-        "cone": shapes.friction_cone(np.zeros(3), cone.normal, mu, CONE_HEIGHT, cone.status(f)),
-        "patch": shapes.contact_patch(np.zeros(3), cone.normal, 0.05),
-    }
+    tip, status = np.zeros(3), cone.status(f)
+    drawn = {"/surface": shapes.friction_cone(tip, cone.normal, mu, CONE_HEIGHT, status)}
+    if status == "outside":
+        polyhedron = FrictionPolyhedron(cone.normal, mu, 4)  # only its normal and friction count
+        drawn["/rim"] = shapes.cone_rim(tip, polyhedron, CONE_HEIGHT, is_round=True)
+    picture = prefixed("cone", drawn)
+    picture["patch"] = shapes.contact_patch(tip, cone.normal, 0.05)
+    view.add_legend_entry("force", MEASURED, "force f")
     if np.any(f):
-        picture["measured"] = shapes.arrow(
-            np.zeros(3), FORCE_SCALE * f, MEASURED, view.painter.size
-        )
+        picture["force"] = shapes.arrow(tip, FORCE_SCALE * f, MEASURED, view.painter.size)
     view.draw(view.painter.ground_only() | picture)
     parts, margin = decompose(f, cone.normal), cone.margin(f)
     sizes = (

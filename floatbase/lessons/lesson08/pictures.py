@@ -183,7 +183,7 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
     """
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
-    aside = np.array([0.0, 0.07, 0.02])  # of the first label; the next one is on the other side
+    aside = np.array([0.0, 0.13, 0.02])  # of the first label; the next one is on the other side
     for name, place in places.items():
         at = np.array([*np.asarray(place, dtype=np.float64)[:2], _PATCH_HEIGHT])
         foot = name in feet

@@ -282,9 +282,12 @@ def write_gradescope_results(
             for result in policy.results(one)
         ]
         days = policy.days_late(time)
+        told = f" Late days used: {days}." if days else ""
+        if late:
+            told = f" Too late: {days} days. Files count up to {policy.late_days} days late."
         found = {
             "score": sum(test["score"] for test in tests if isinstance(test["score"], int)),
-            "output": f"{one.name}. Late days used: {days}." if days else f"{one.name}.",
+            "output": f"{one.name}.{told}",
             "tests": [*tests, *_identity(one, known)],
             "extra_data": {"late_days": days, "predictions": one.predicted},
         }

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import base64
 import json
 import re
 import shutil
+import zlib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,15 +17,30 @@ from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import assignment
 from floatbase.lessons.predictions import lesson_name
+from floatbase.lessons.publish.contents import title_of
 from floatbase.lessons.publish.workspace import NOTEBOOKS, write_without_outputs
 
 _ROOT = NOTEBOOKS.parent
 _INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")
 _FOLDERS = ("floatbase", "assets/meshes")
+_HUB = ".binder/jupyterhub_config.py"
+_README = """# floatbase
+
+Lessons of an interactive course on controlling floating-base robots:
+
+{lessons}
+
+You need Python 3.11, 3.12 or 3.13 and make. `make lab` opens the lessons in JupyterLab. The first
+run takes a few minutes. Your copies of the lessons are in `notebooks/my`.
+[Installation and troubleshooting](docs/installation.md) helps when something fails, and
+[How to use the course](notebooks/how_to.md) explains how to hand in your answers.
+"""
 _FIRST_LESSON = "00"  # explains how a lesson works
 # arguments of an Exercise that give its answer away -> what replaces them
 _SECRET = {"solution": '""', "explanation": '""', "examples": "tuple"}
 _SOLUTION_MODULE = "lessonX/investigation.py"  # whose text is the solution of exercise X.3
+# functions with which a lesson continues if an exercise is not solved
+_DEFAULTS = {"lessonC/helpers.py": ("longest_step", "row_to_drop")}
 _WORD = re.compile(r"\w+")
 _Change: TypeAlias = tuple[ast.stmt | ast.expr, str]  # part of a module, and what replaces it
 
@@ -80,9 +97,11 @@ def write_assignment(
 ) -> None:
     """Write a package for students with some lessons, and without solutions.
 
-    The folder holds the package, these lessons without outputs, lesson 00, and the Makefile.
+    The folder holds the package, these lessons without outputs, lesson 00, the Makefile and the
+    configuration of a JupyterHub.
     Solutions and explanations of all exercises are removed. The checks stay, because students need
-    them: a check computes the right value in another way than the solution.
+    them: a check computes the right value in another way than the solution. The functions with
+    which lesson C continues after an unsolved exercise are encoded.
 
     Parameters
     ----------
@@ -106,6 +125,11 @@ def write_assignment(
     paths = lesson_paths([_FIRST_LESSON]) | paths
     copy_package(folder)
     shutil.copy(_ROOT / "Makefile", folder)
+    shutil.copy(_ROOT / ".gitignore", folder)
+    (folder / _HUB).parent.mkdir()
+    shutil.copy(_ROOT / _HUB, folder / _HUB)
+    names = "\n".join(f"- {title_of(path)}" for path in paths.values())
+    (folder / "README.md").write_text(_README.format(lessons=names), encoding="utf-8")
     # the texts for teachers and contributors are not part of it
     (folder / "docs").mkdir()
     shutil.copy(_ROOT / "docs" / "installation.md", folder / "docs")
@@ -126,6 +150,8 @@ def _remove_solutions(folder: Path) -> None:
     (lessons / _SOLUTION_MODULE).unlink()
     modules = {path: path.read_text(encoding="utf-8") for path in lessons.glob("lesson*/*.py")}
     modules = {path: _without_answers(text) for path, text in modules.items()}
+    for name, functions in _DEFAULTS.items():
+        modules[lessons / name] = _encoded(modules[lessons / name], functions)
     others = [path for path in folder.rglob("*") if path.suffix in (".py", ".ipynb")]
     elsewhere = Counter(
         _WORD.findall(
@@ -160,6 +186,18 @@ def _without_answers(text: str) -> str:
         for node in tree.body
         if isinstance(node, ast.ImportFrom) and module in [alias.name for alias in node.names]
     ]
+    return _replace(text, replaced)
+
+
+def _encoded(text: str, functions: Sequence[str]) -> str:
+    """Encode functions of a module, so that they work and cannot be read by accident."""
+    replaced: list[_Change] = []
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef) and node.name in functions:
+            source = ast.get_source_segment(text, node) or ""
+            data = base64.b64encode(zlib.compress(source.encode())).decode()
+            decode = '__import__("zlib").decompress(__import__("base64").b64decode'
+            replaced.append((node, f'exec({decode}("{data}")))'))
     return _replace(text, replaced)
 
 
