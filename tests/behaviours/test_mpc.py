@@ -15,7 +15,7 @@ from messages import raises
 from scipy.linalg import expm
 
 import floatbase as fb
-from floatbase.behaviours import MPC, Gains, Gait, HorizonMotion, HorizonQP, Walk
+from floatbase.behaviours import MPC, STATE_WEIGHTS, Gains, Gait, HorizonMotion, HorizonQP, Walk
 from floatbase.control import Command
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
@@ -285,6 +285,19 @@ def test_the_force_task_follows_the_gains() -> None:
     assert np.all(one >= 0.02 * 10.0 / robot.mass**2)
     with raises(InputError, "gains"):
         MPC(robot, contacts, gait, gains=3.0)
+
+
+def test_a_bound_with_flight_works_with_small_weights_on_pitch() -> None:
+    offsets = {"FL_foot": 0.0, "FR_foot": 0.0, "RL_foot": 0.5, "RR_foot": 0.5}
+    weights = np.array(STATE_WEIGHTS)
+    weights[[1, 7]] *= 0.1
+    gait = Gait(offsets, period=0.24, swing=0.14, start=0.2)
+    run, _ = walked("go2", gait, 0.5, 3.0, state_weights=weights)
+    assert run.outcome == "completed"
+    flights = [i for i in range(len(run)) if len(run.contacts_at(i)) == 0]
+    assert len(flights) > 0.1 * len(run)
+    tilt = np.arccos(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2))
+    assert np.rad2deg(tilt.max()) < 15.0
 
 
 def test_copies_and_restarts_walk_alike() -> None:

@@ -104,7 +104,7 @@ def plot_push_recovery_maps() -> Figure:
         pushes = np.append(recovery.pushes, recovery.pushes[0])
         ax.plot(angles, pushes, style, color=hex_code(colour), linewidth=2, label=label)
     ax.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
-    ax.set_rlim(0.0, 550.0)
+    ax.set_rlim(0.0, 600.0)
     ax.set_rlabel_position(22.5)
     ax.grid(alpha=0.35)
     ax.set_title("go2: largest push of 0.1 s that is survived [N]", pad=14)
