@@ -12,7 +12,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from floatbase.lessons.push_recovery import measured_push_recovery
 from floatbase.simulation import Rollout
-from floatbase.viewer.scene.colours import GREYS, LIMIT, MEASURED, WARNING, hex_code
+from floatbase.viewer.scene.colours import COM, GREYS, LIMIT, MEASURED, hex_code
 
 _STYLES = ("-", "--", ":", "-.")
 _MAPS = {
@@ -95,7 +95,7 @@ def plot_push_recovery_maps() -> Figure:
     )
     assert isinstance(ax, PolarAxes)
     ax.set_theta_zero_location("N")
-    colours = (LIMIT, LIMIT, WARNING, MEASURED)
+    colours = (LIMIT, LIMIT, COM, MEASURED)
     for (lesson, label), colour, style in zip(
         _MAPS.items(), colours, (":", "-", "--", "-"), strict=True
     ):
