@@ -7,6 +7,11 @@ replaces the question.
 from __future__ import annotations
 
 CONTEXTS = {
+    "06.i": "The **support region** (Bretl and Lall, 2008) holds all positions of the centre "
+    "of mass, seen from above, for which the feet can carry the weight, each within its "
+    "friction cone. On level ground it is the hull of the feet for every μ.",
+    "08.a": "go2 stands on four feet. To lift a foot, a controller removes this foot from the "
+    "contacts, and a task moves the foot up.",
     "00.a": "go2 stands at rest. Its centre of mass is 19 mm ahead of the middle of its four feet.",
     "00.c": "go2 is pushed sideways. On good ground, the contact forces pushed sideways with up "
     "to 30 N. Ice allows only 0.05 of the weight, 8 N. The controller assumes good "

@@ -26,7 +26,13 @@ def jumped(name: str, height: float, distance: float) -> tuple[Rollout, Jump]:
     return fb.rollout(fb.Simulation(robot), jump, 1.6, control_period=PERIOD), jump
 
 
-CASES = [("go2", 0.1, 0.0), ("go2", 0.2, 0.2), ("solo12", 0.1, 0.0), ("anymal_kinova", 0.15, 0.1)]
+CASES = [
+    ("go2", 0.1, 0.0),
+    ("go2", 0.2, 0.2),
+    ("solo12", 0.1, 0.0),
+    ("anymal_kinova", 0.15, 0.1),
+    ("talos", 0.03, 0.0),
+]
 
 
 @pytest.mark.parametrize(("name", "height", "distance"), CASES)

@@ -84,6 +84,9 @@ def test_the_package_of_an_assignment_holds_no_solution(assigned: Path) -> None:
     assert all(e.solution in ours for n, e in EXERCISES.items() if n.startswith("05."))
     names = {path.name for path in (assigned / "notebooks").glob("*.ipynb")}
     assert {name.split("_")[0] for name in names} == {"00", "01", "05"}
+    readme = (assigned / "README.md").read_text()
+    assert "05 · Steering" in readme and "docs/quickstart" not in readme
+    assert (assigned / ".binder/jupyterhub_config.py").is_file()
     assert not any("solved" in path.name or "tests" in path.parts for path in files)
 
 

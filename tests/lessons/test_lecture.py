@@ -11,7 +11,9 @@ from browsers import browser_of_a_file
 
 from floatbase.lessons.publish.__main__ import main
 from floatbase.lessons.publish.site import lecture
+from floatbase.lessons.question_texts import CONTEXTS, TEXTS
 from floatbase.lessons.questions import all_questions
+from floatbase.lessons.recalling import RECALLED
 
 browser = browser_of_a_file
 QUESTIONS = lecture.lecture_questions()
@@ -28,6 +30,15 @@ def test_each_lesson_has_four_questions_with_a_result_and_a_reason() -> None:
                 assert result in question.choices
             else:
                 assert len(re.findall(r"\d+(?:\.\d+)?", result)) == question.count
+
+
+def test_texts_for_use_outside_a_lesson_are_about_known_questions() -> None:
+    asked = {one.question.name for some in QUESTIONS.values() for one in some}
+    assert set(CONTEXTS) | set(TEXTS) <= asked | set(RECALLED)
+    assert {
+        one.reason for some in QUESTIONS.values() for one in some if one.reason[-1] in ":?"
+    } == set()
+    assert QUESTIONS["P"][2].reason.startswith("At rest every foot pushes")
 
 
 def test_page_and_slides_hold_all_questions(tmp_path: Path) -> None:

@@ -8,10 +8,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from floatbase.lessons.push_recovery import measured_push_recovery
 from floatbase.simulation import Rollout
-from floatbase.viewer.scene.colours import GREYS, LIMIT, MEASURED, WARNING, hex_code
+from floatbase.viewer.scene.colours import COM, GREYS, LIMIT, MEASURED, hex_code
 
 _STYLES = ("-", "--", ":", "-.")
 _MAPS = {
@@ -89,9 +90,12 @@ def plot_push_recovery_maps() -> Figure:
     Figure
         The figure.
     """
-    figure, ax = plt.subplots(figsize=(6, 6), subplot_kw={"projection": "polar"})
+    figure, ax = plt.subplots(
+        figsize=(6, 6), layout="constrained", subplot_kw={"projection": "polar"}
+    )
+    assert isinstance(ax, PolarAxes)
     ax.set_theta_zero_location("N")
-    colours = (LIMIT, LIMIT, WARNING, MEASURED)
+    colours = (LIMIT, LIMIT, COM, MEASURED)
     for (lesson, label), colour, style in zip(
         _MAPS.items(), colours, (":", "-", "--", "-"), strict=True
     ):
@@ -100,7 +104,7 @@ def plot_push_recovery_maps() -> Figure:
         pushes = np.append(recovery.pushes, recovery.pushes[0])
         ax.plot(angles, pushes, style, color=hex_code(colour), linewidth=2, label=label)
     ax.set_xticks(np.pi / 4 * np.arange(8), ["x", "45°", "y", "135°", "-x", "225°", "-y", "315°"])
-    ax.set_rlim(0.0, 550.0)
+    ax.set_rlim(0.0, 600.0)
     ax.set_rlabel_position(22.5)
     ax.grid(alpha=0.35)
     ax.set_title("go2: largest push of 0.1 s that is survived [N]", pad=14)

@@ -25,7 +25,7 @@ LECTURE = {
     "06": "beij", "07": "abgh", "08": "abfg", "09": "cfij", "10": "abde", "A": "cdeg", "B": "aefh",
     "C": "abce", "P": "fghi", "X": "bceg",
 }  # fmt: skip
-_ANNOUNCEMENT = re.compile(r"(?<=[.!?]) [^.!?]*:$")  # of the cell below
+_ANNOUNCEMENT = re.compile(r"(?<=[.!?*]) [^.!?]*:$")  # of the cell below
 _WHY = re.compile(r"\*\*Why\??\*\*:? *")
 
 

@@ -36,7 +36,7 @@ REASONS = {
     "was commanded. The integral would remove this offset, but its corner is at 0.05 Hz, "
     "and go2 does not have that much time.",
     "P.h": "At rest every foot pushes, so the wrong model does no harm. During the push, the "
-    "plan needs a foot that pulls on the ground with hundreds of newtons. The real ground "
-    "does not hold this foot, so the moment that was to stop the push is missing, and the "
-    "robot tips over.",
+    "plan needs right feet that pull on the ground. The real ground does not hold them, so the "
+    "robot does not move as planned. The plan asks for larger and larger forces, and within 0.1 s "
+    "the robot is thrown over.",
 }
