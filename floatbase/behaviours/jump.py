@@ -41,7 +41,7 @@ _CROUCH_TIME = 0.4  # s, slow enough to keep the feet on the ground
 _BODY_WEIGHT = 1e2  # of the tasks on the body
 _SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
 _TOUCH_HEIGHT = 2e-3  # m above a known ground, below which a foot has landed
-# m/s: if the centre of mass departs by more from its free fall, something touches the robot
+# m/s: a larger departure of the centre of mass from free fall means that the robot is touched
 _TOUCH_SPEED = 0.1
 _MAX_UNEVENNESS = 0.02  # m between the heights of the ground where the feet land
 _DRY_RUN_STEP = 2e-3  # s, the usual control period
@@ -107,8 +107,8 @@ class JumpPlan(Value):
         gravity : float
             Gravitational acceleration [m/s²].
         rise : float, optional
-            Height of the ground at the landing place above that at the start, less than `height`
-            [m].
+            How much higher the ground is at the landing place than at the start [m]. It must be
+            less than `height`.
 
         Returns
         -------
@@ -127,7 +127,8 @@ class JumpPlan(Value):
         if height - as_number("rise", rise, "m") < _MIN_HEIGHT:
             raise InputError(
                 f"height is {height:g} m, but the ground at the landing place is {rise:.3g} m "
-                f"higher than at the start. The height must be at least {_MIN_HEIGHT:g} m larger."
+                f"higher than at the start. The height must exceed this rise by at least "
+                f"{_MIN_HEIGHT:g} m."
             )
         depth, upwards = _CROUCH * leg, sqrt(2.0 * gravity * height)  # (J1)
         ascent, push = upwards / gravity, 2.0 * depth / upwards  # (J2)
@@ -181,9 +182,9 @@ class Jump:
     contacts, and the feet move relative to the centre of mass to the place where they land. After
     the landing, the contacts are soft, because the feet do not land at the same time.
 
-    The robot jumps in the direction of x from its standing posture at the origin. Its feet have
-    landed if they are near a known `ground`, or if the centre of mass departs from its free fall.
-    Thus it also lands on ground that is higher or lower than expected.
+    The robot jumps in the direction of x from its standing posture at the origin. A foot
+    counts as landed if it is near a known `ground`, or if the centre of mass departs from free
+    fall. So the robot also lands on ground that is higher or lower than expected.
 
     Before it accepts a jump, the controller integrates the push with the equations of motion,
     without a simulator and without torque limits. It refuses a jump for which a motor is too weak
@@ -205,7 +206,7 @@ class Jump:
         Time at which the robot begins to crouch [s].
     ground : Terrain, optional
         The ground, if the controller knows it, such as `fb.Ground`. The jump then ends at the
-        height of the ground where the feet land. Without it, the ground is assumed to be level.
+        height of the ground where the feet land. Without `ground`, level ground is assumed.
     **options : object
         Further options of `fb.WholeBodyController`, such as `facets`.
 
@@ -303,8 +304,8 @@ class Jump:
         Returns
         -------
         Command
-            Joint torques, with the planned accelerations and the contact forces, of which there are
-            none in flight.
+            Joint torques, planned accelerations and contact forces. In flight there are no contact
+            forces.
         """
         t = as_number("t", t, "s")
         if t < self._time:
@@ -356,7 +357,7 @@ class Jump:
                 self._goal = np.array([*feet[:2], level]) + self._com_offset
 
     def _touched(self, state: State, t: float) -> float | None:
-        """Return the height of the ground above that at the start if a foot has landed [m]."""
+        """Return how much higher the ground is than at the start, or None in flight [m]."""
         names = self._all_contacts.names
         feet = np.array([state.point(foot) for foot in names])
         levels = feet[:, 2] - [self._standing.point(foot)[2] for foot in names]
@@ -373,13 +374,13 @@ class Jump:
         return None
 
     def _ground_level(self, xy: Array) -> float:
-        """Return the height of a known ground above that below the standing robot [m]."""
+        """Return the height of a known ground above the ground below the standing robot [m]."""
         assert self._ground is not None
         start = self._all_contacts.positions(self._standing)[:, :2].mean(axis=0)
         return float(self._ground.height(xy)) - float(self._ground.height(start))
 
     def _rise(self) -> float:
-        """Return the height of the ground where the feet land above that at the start [m]."""
+        """Return how much higher the ground is at the landing place than at the start [m]."""
         if self._ground is None:
             return 0.0
         levels = [
@@ -389,9 +390,9 @@ class Jump:
         ]
         if max(levels) - min(levels) > _MAX_UNEVENNESS:
             raise InputError(
-                f"With a distance of {self._distance:g} m, the feet would land on ground of "
-                f"different heights, {min(levels):.3g} to {max(levels):.3g} m above that at the "
-                f"start. Use another distance."
+                f"With a distance of {self._distance:g} m, the feet would land at different "
+                f"heights. The ground there is {min(levels):.3g} to {max(levels):.3g} m higher "
+                f"than at the start. Use another distance."
             )
         return float(np.mean(levels))
 

@@ -300,7 +300,7 @@ class MPC(Walk):
 def _square_pyramid_mu(polyhedron: FrictionPolyhedron) -> float:
     """Return the friction coefficient of the largest pyramid (M7) inside a friction polyhedron.
 
-    The forces at the edges of the pyramid must be inside, too, so that they do not slip.
+    The forces at the edges of the pyramid must be inside, too, so that the feet do not slip.
     """
     directions = polyhedron.face_matrix + polyhedron.mu_facet * polyhedron.normal
     return float(polyhedron.mu_facet / (directions @ _CORNERS.T).max())

@@ -255,7 +255,7 @@ def make_plan(
     ground = Plane.through(np.array([footing.feet[foot] for foot in nominal]) - heights)
     plan_foothold = partial(_foothold, posture, options.ground, ground, foothold)
     centres, footholds = _stance_centres(posture, phases, gait, path.yaw, footing, plan_foothold)
-    # at a jump of the planned ZMP, the value up to now: rounding would choose either side
+    # where the planned ZMP jumps, its value before the jump: rounding would choose either side
     zmp = previous.plan.zmp(t - TIME_TOLERANCE) if previous else centres[0]
     lipm = LIPM(_zmp_segments(phases, centres, zmp, len(gait.feet)), state.com[:2], posture.omega)
     planned: dict[str, PlannedSwing] = {}

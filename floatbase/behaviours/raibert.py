@@ -14,7 +14,7 @@ from floatbase.behaviours.options import WalkOptions
 from floatbase.behaviours.path import Path
 from floatbase.robots import Robot
 
-_EDGE_REACH = 0.15  # m: footholds are moved at most by this much to avoid an edge
+_EDGE_REACH = 0.15  # m: footholds are moved by at most this much to avoid an edge
 
 
 class Walking(Protocol):
@@ -47,8 +47,8 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walking) -> Array:
     """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
 
     Where the body turns, the velocity is that of the foot's nominal position. The foothold also
-    lies farther outside by a / ω², with the centripetal acceleration a: the centre of mass of a
-    pendulum runs on a smaller circle than its zero-moment point.
+    lies farther outside by a / ω², where a is the centripetal acceleration. The reason is that the
+    centre of mass of a pendulum moves on a smaller circle than its zero-moment point.
 
     Parameters
     ----------

@@ -389,7 +389,7 @@ class Walk:
         return self.path_at(t).point(self._posture.nominal_feet[foot][:2])
 
     def __call__(self, q: npt.ArrayLike, v: npt.ArrayLike, t: float = 0.0) -> Command:
-        """Follow the plan for one control step, after a new plan if the stance changes.
+        """Follow the plan for one control step. Plan anew first if the stance changes.
 
         Parameters
         ----------

@@ -75,7 +75,7 @@ CONCEPTS: dict[str, tuple[InventoryQuestion, ...]] = {
            "How large is the sum of the vertical contact forces?", "189 N",
            {"157 N": "00.1:weight_alone", "32 N": "00.1:ma_alone", "125 N": "00.1:downwards"}, 3),
         _Q("A quadruped stands with bent legs, and all motors are switched off. How much of the "
-           "weight do its feet carry at the first instant, while it begins to collapse?",
+           "weight do its feet carry in the first instant, as it begins to collapse?",
            "a part of the weight",
            {"nothing": "03.d:it falls freely", "the whole weight": "03.d:it stands",
             "more than the weight": ""}, 1),
@@ -106,8 +106,8 @@ CONCEPTS: dict[str, tuple[InventoryQuestion, ...]] = {
         _Q("A quadruped stands on level ground. Its front left foot is to carry 10 N less, and the "
            "robot must not move. What do the other feet do?",
            "The rear right foot carries less, the other two carry more.",
-           {"They carry what they carried. The sum decreases by 10 N.": "03.2:weight",
-            "The front right foot carries 10 N more, the rear feet as before.": "03.2:moments",
+           {"They carry the same as before. The sum decreases by 10 N.": "03.2:weight",
+            "The front right foot carries 10 N more, and the rear feet the same.": "03.2:moments",
             "Each of the other three carries a third of the 10 N more.": "03.2:moments"}, 3),
     ),
     "costs": (
@@ -121,8 +121,8 @@ CONCEPTS: dict[str, tuple[InventoryQuestion, ...]] = {
            "of the torques is this cost flat?", "9",
            {"0": "", "3": "", "12": ""}, 2),
         _Q("A cart accelerates in proportion to its motor's torque. One cost asks for 2 m/s². A "
-           "second cost, with a small weight, is the square of the torque. Which acceleration does "
-           "the minimum of the sum have?",
+           "second cost, with a small weight, is the square of the torque. Which acceleration "
+           "minimizes the sum?",
            "a little less than 2 m/s²",
            {"exactly 2 m/s²": "", "a little more than 2 m/s²": "", "0": ""}, 1),
     ),
@@ -166,7 +166,7 @@ CONCEPTS: dict[str, tuple[InventoryQuestion, ...]] = {
            {"+0.3": "07.2:sign", "-3": "07.2:whole_mu", "0": "07.2:zero"}, 1),
         _Q("A solver guesses that an inequality is active, and treats it as an equality. The "
            "multiplier that it finds is negative. What does that mean?",
-           "The cost falls when this constraint is left on its allowed side.",
+           "The cost falls if the point leaves this constraint on its allowed side.",
            {"The minimum with all constraints has been found.": "C.3:pulls",
             "The point violates this constraint, so it must be kept.": "",
             "No point satisfies all the constraints of the problem.": ""}, 0),

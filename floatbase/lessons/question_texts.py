@@ -1,6 +1,6 @@
-"""Texts of questions that can be understood outside their lesson.
+"""Texts for questions that cannot be understood outside their lesson.
 
-Most paragraphs of the lessons can be. A context replaces the paragraph before a question, a text
+Most questions need no other text. A context replaces the paragraph before a question, and a text
 replaces the question.
 """
 
@@ -13,13 +13,13 @@ CONTEXTS = {
     "08.a": "go2 stands on four feet. To lift a foot, a controller removes this foot from the "
     "contacts, and a task moves the foot up.",
     "00.a": "go2 stands at rest. Its centre of mass is 19 mm ahead of the middle of its four feet.",
-    "00.c": "go2 is pushed sideways. On good ground, the contact forces pushed sideways with up "
-    "to 30 N. Ice allows only 0.05 of the weight, 8 N. The controller assumes good "
+    "00.c": "go2 is pushed sideways. On good ground, the contact forces then push sideways with "
+    "up to 30 N. Ice allows only 0.05 of the weight, 8 N. The controller assumes good "
     "ground.",
     "00.d": "On ice, go2 falls after a push of 30 N, because the controller assumes more friction "
-    "than there is: the plan needs over eight times as much as ice has.",
-    "01.a": "An arm presses on a wall. When its shoulder lift turns, the tool moves along x by "
-    "0.51 m per radian. A force f on the tool adds $J_{tool}^T f$ to the right-hand side "
+    "than there is: the plan needs over eight times as much friction as ice has.",
+    "01.a": "An arm presses on a wall. When its shoulder-lift joint turns, the tool moves along "
+    "x by 0.51 m per radian. A force f on the tool adds $J_{tool}^T f$ to the right-hand side "
     "of (1), so at rest $\\tau = h - J_{tool}^T f$.",
     "01.b": "An arm presses on a wall and stands on bolts. The six rows of its base are forces "
     "along x, y and z, then moments about x, y and z. No motor acts in these rows. If the "
@@ -40,8 +40,8 @@ CONTEXTS = {
     "numbers. With n variables there are n - rank H independent directions along which a "
     "cost is flat.",
     "04.d": "One cost of the torques asks for an acceleration of the centre of mass, another that "
-    "the base does not turn. We draw both over the torques of the hips (all alike) and of "
-    "the knees (left against right). Each cost alone is a valley there, and the two "
+    "the base does not turn. We plot both against the torques of the hips (all alike) and "
+    "of the knees (left against right). Each cost alone is a valley there, and the two "
     "valleys have different directions.",
     "04.g": "A cost asks go2's centre of mass to accelerate to the left at 0.5 m/s². A second, "
     "small cost penalizes effort. On MuJoCo, the centre of mass does accelerate at 0.5 "
@@ -71,7 +71,7 @@ CONTEXTS = {
     "09.f": "If the body does not start to turn or to rise, the centre of pressure is at $p = c - "
     "\\ddot c\\, h / g$, as for a pendulum with $\\omega^2 = g / h$. To accelerate "
     "forwards, the ground has to push *behind* $x_c$.",
-    "A.c": "A rod turns at θ̇, and a mass m on it slides outwards at ṙ, both evenly.",
+    "A.c": "A rod turns at a constant θ̇, and a mass m slides outwards on it at a constant ṙ.",
     "A.d": "An arm moves with the joint velocities v. The velocity part of h is h(q, v) - h(q, 0).",
     "A.e": "A floating robot glides and turns. In the base's axes, h is the force for which "
     "$v_{lin}$ and ω stay constant while the axes turn: the robot goes round, in a circle "
@@ -100,7 +100,7 @@ TEXTS = {
     "06.e": "With 16 facets, how large can this force to the *left* be, in percent of the weight? "
     "$x_c$ is 0.316 m above the ground, and the left feet are 0.163 m to its left.",
     "08.i": "What is the largest push to the left by this rule? (m = 16.1 kg, ω = 5.57 1/s.)",
-    "09.f": "Talos is to accelerate forwards at 0.5 m/s², and $x_c$ is 0.88 m high. How far does "
-    "the pendulum say that the centre of pressure moves, in mm? (Minus is backwards.)",
+    "09.f": "Talos is to accelerate forwards at 0.5 m/s², and $x_c$ is 0.88 m high. According "
+    "to the pendulum, how far does the centre of pressure move, in mm? (Minus is backwards.)",
     "C.b": "The lowest point of the bowl lies *exactly* on the table. What is the constraint then?",
 }

@@ -28,7 +28,8 @@ class Question:
     context : str
         The paragraph before the question, in Markdown, or "".
     text : str
-        The question, in Markdown. Both differ from the lesson's if those need the lesson.
+        The question, in Markdown. Context and question differ from the lesson's texts if these
+        cannot be understood outside the lesson.
     choices : tuple of str
         Strings to choose from; without choices, the answer is numbers.
     unit : str

@@ -1,4 +1,4 @@
-"""Recall: bring back questions of earlier lessons after days, first those that were missed."""
+"""Recall: ask questions from earlier lessons again after days, missed questions first."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _FUNCTIONS = ("cosh", "sinh", "tanh", "arctan")
 
 
 def recall(name: str = "", *answer: Any) -> None:
-    """Ask three questions of earlier lessons again, or answer one of them.
+    """Ask three questions from earlier lessons again, or answer one of them.
 
     Only questions whose results you have seen are asked. A question that you missed comes back
     after a day. One that you knew comes back after 2, 4, 8, … days. The questions of a day are

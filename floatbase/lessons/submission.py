@@ -138,7 +138,7 @@ def import_answers(path: str | Path) -> None:
 
 
 def _recalled_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the answers to `recall` in a file of a page that are not known yet."""
+    """Yield those answers to `recall` in a page's file that are not known yet."""
     recalled, known = found.get("recalled"), progress.history()
     for name, entries in recalled.items() if isinstance(recalled, dict) else ():
         for entry in entries if isinstance(entries, list) else ():

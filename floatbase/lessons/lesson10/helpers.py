@@ -15,13 +15,13 @@ PUSH_RECOVERY_WATCH_TIME = 4.0  # s: a robot that steps may fall late
 
 
 def make_controller() -> MPC:
-    """Return the controller of the lesson's push-recovery map: go2 trots on the spot by `MPC`."""
+    """Return the controller of the lesson's push-recovery map: go2 trotting in place, by `MPC`."""
     robot = fb.load("go2")
     return MPC(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot, start=0.0))
 
 
 def make_walking_controller() -> Walk:
-    """Return the controller of the second map: the same trot on the spot by `Walk`."""
+    """Return the controller of the second map: the same trot, by `Walk`."""
     robot = fb.load("go2")
     return Walk(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot, start=0.0))
 

@@ -100,7 +100,7 @@ def write_assignment(
     The folder holds the package, these lessons without outputs, lesson 00, the Makefile and the
     configuration of a JupyterHub.
     Solutions and explanations of all exercises are removed. The checks stay, because students need
-    them: a check computes the right value in another way than the solution. The functions with
+    them: a check computes the right value in a different way from the solution. The functions with
     which lesson C continues after an unsolved exercise are encoded.
 
     Parameters
@@ -190,7 +190,7 @@ def _without_answers(text: str) -> str:
 
 
 def _encoded(text: str, functions: Sequence[str]) -> str:
-    """Encode functions of a module, so that they work and cannot be read by accident."""
+    """Encode functions of a module: they still work, but cannot be read by accident."""
     replaced: list[_Change] = []
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef) and node.name in functions:

@@ -141,7 +141,7 @@ def review_element(source: str) -> Any | None:
 
 
 def element(kind: str, data: dict[str, Any], text: str) -> Any:
-    """Return an element that the page's script fills, as a cell; without a script it is a text."""
+    """Return a cell that the page's script fills. Without a script, the cell shows `text`."""
     return new_markdown_cell(as_markdown(element_html(kind, data, text)))
 
 

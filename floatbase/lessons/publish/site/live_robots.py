@@ -68,8 +68,8 @@ LESSON_ROBOTS = {
         {"panel": "1"},
         "Open *terms of eq. (7)*, and switch off gravity in the model. The robot sags, because "
         "only its position error makes the controller push up. Stand the robot up, and switch "
-        "gravity off in reality instead. The page has those switches of the playground for which "
-        "the controller's QP keeps its form.",
+        "gravity off in reality instead. The page has only those switches of the playground that "
+        "keep the form of the controller's QP.",
     ),
 }  # fmt: skip
 

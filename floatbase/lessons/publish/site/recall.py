@@ -1,7 +1,7 @@
-"""Questions of earlier lessons in the pages of the site, asked again after days.
+"""Ask questions from earlier lessons again in the pages of the site, some days later.
 
-Their texts and results are one script, which the pages load. Which of them are due is decided in
-the reader's browser by the rule of `floatbase.lessons.recalling`.
+The pages load one script with the texts and the results of these questions. The reader's browser
+decides which questions are due, by the rule of `floatbase.lessons.recalling`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from floatbase.lessons.publish.workspace import NOTEBOOKS
 from floatbase.lessons.questions import Question, all_questions
 
 SCRIPT = "recall-questions.js"  # in the site's static files
-_NOTE = "Questions of earlier lessons come back here, and in the live lesson."
+_NOTE = "Questions from earlier lessons come back here and in the live lesson."
 
 
 def recall_data(lessons: Iterable[Path]) -> dict[str, Any]:

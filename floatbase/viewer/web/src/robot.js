@@ -24,7 +24,7 @@ const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
   "ground and load": "model: what the controller assumes. reality: what the robot has.",
   "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
-    "its term, in the controller's model or in reality.",
+    "that term in the controller's model or in reality.",
 };
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 

@@ -231,7 +231,7 @@
     const some = Object.keys(questions).some((name) => name in known);
     const text = names.length ? "From earlier lessons:"
       : some ? "There is nothing to recall today."
-        : "Questions of earlier lessons come back here, some days after you have predicted the result.";
+        : "Questions from earlier lessons come back here, some days after you predicted the result.";
     element.replaceChildren(make("p", {textContent: text}),
       ...names.map((name) => recallForm(questions[name])));
   };

@@ -4,7 +4,7 @@
 const SLIDE = 2; // MuJoCo's type of a prismatic joint
 
 // Write MuJoCo's bias forces of the state in `data` into `result`, with or without those that
-// depend on the velocity. The positions in `data` are up to date.
+// depend on the velocity. The positions in `data` must be up to date.
 export function biasForces(mj, model, data, result, hasCoriolis) {
   const velocity = hasCoriolis ? null : data.qvel.slice();
   if (velocity) data.qvel.fill(0);

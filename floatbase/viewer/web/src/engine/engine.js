@@ -15,8 +15,8 @@ const LOWER_SPEED = 0.05; // m/s of a foot that is set down
 const LOWER_TIME = 2; // s, at most
 const AIRBORNE = 2; // times the height of the base at the beginning
 
-// Settings before anything is changed. Of friction, payload and terms of eq. (7), the controller
-// assumes one value, and the other is actual.
+// Default settings. Friction, payload and each term of eq. (7) have two values: the one that the
+// controller assumes, and the actual one.
 export const defaults = (robot) => ({
   mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
   height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
@@ -218,7 +218,7 @@ export function createEngine(mj, module, robot) {
     reset,
     get settings() { return settings; },
     get time() { return steps * STEP; },
-    // "" while the controller runs, then why it does not: "fell", "left the ground",
+    // "" while the controller runs, then why it stopped: "fell", "left the ground",
     // "infeasible", "no answer"
     get outcome() { return outcome; },
     get pushes() { return pushes; },

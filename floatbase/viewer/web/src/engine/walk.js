@@ -221,7 +221,7 @@ export function createWalk(robot, tick, gravity) {
         if (Math.abs(times[1] - phase.end) < 2 * constants.timeTolerance) feet[foot] = planned;
       }
     }
-    // at a jump of the planned ZMP, the value up to now
+    // where the planned ZMP jumps, its value before the jump
     const zmp = plan === null ? centres[0] : zmpAt(plan.pieces, t - constants.timeTolerance);
     const pieces = pendulum(zmpSegments(phases, centres, zmp), measured.com, omega, math);
     const swings = names.flatMap((foot) => {

@@ -18,7 +18,7 @@ const clock = createClock(STEP);
 const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
 const RECENT = 1; // s before a fall, in which a slip counts as its cause
-const SAMPLE = 16; // steps between two looks at the clock, and at which points slip
+const SAMPLE = 16; // steps between two checks of the clock and of slipping
 
 async function fetchOk(name) {
   const response = await fetch(name);

@@ -17,7 +17,7 @@ const cross = (a, b) => [
 const unit = (a) => a.map((c) => c / Math.hypot(...a));
 const scaled = ([x, y, z], [sx, sy, sz]) => [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, sz, 0, x, y, z, 1];
 
-const GRID = 1; // m, by multiples of which the lines on the ground follow the robot
+const GRID = 1; // m: steps in which the lines on the ground follow the robot
 
 // How a force lies in the cone with friction coefficient mu, as the viewer colours it.
 export function coneStatus([x, y, z], mu, least) {

@@ -48,8 +48,8 @@ export function mapText(found, seconds) {
   const [weak, strong] = [least, most].map(
     ({push, direction}) => `${push} N towards ${directionText(direction)}`,
   );
-  return `Largest push of ${DURATION} s that it survives, standing: at least ${weak}, at most ` +
-    `${strong} (${state}).`;
+  return `Largest push of ${DURATION} s that the standing robot survives: at least ${weak}, ` +
+    `at most ${strong} (${state}).`;
 }
 
 // viewer: meshcat's. say(text): writes a text into the panel. name: of the robot.

@@ -51,13 +51,13 @@ const isInAir = ({measured, time}, {weight}) => time > 0
   && measured.every((force) => Math.abs(force) < UNLOADED * weight);
 
 const STOPPED = {
-  fell: "The robot fell. It is put on its feet again in a moment.",
-  "left the ground": "The robot left the ground. It is put on its feet again in a moment.",
+  fell: "The robot fell. It will be back on its feet in a moment.",
+  "left the ground": "The robot left the ground. It will be back on its feet in a moment.",
   infeasible: "Too much: no motor torques can satisfy all the constraints, so the controller " +
-    "stopped. (The Python library names those in conflict.) The robot is put on its feet again " +
-    "in a moment.",
+    "stopped. (The Python library names the conflicting constraints.) The robot will be back on " +
+    "its feet in a moment.",
   "no answer": "The controller of this page has no answer in this state. The Python library " +
-    "has a slower method for it. The robot is put on its feet again in a moment.",
+    "has a slower method for it. The robot will be back on its feet in a moment.",
 };
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
