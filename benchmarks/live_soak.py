@@ -4,7 +4,8 @@ A program drags the robot and the view, moves sliders, presses buttons, walks an
 for ten minutes, in Chromium or Firefox. In the second half, the robot is go2. The table shows
 exceptions, pictures per second, falls, and the memory of the browser. `--throttle 4` stops the
 browser's processes for three quarters of the time, `--rest` presses nothing, and `--map` computes a
-push-recovery map instead. The exit code is 1 after an exception.
+push-recovery map instead. The exit code is 1 after an exception. Firefox draws in 3-D only with a
+display, such as that of `xvfb-run`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ COMMANDS = {
     "chromium": ["chromium", "--headless", "--no-sandbox", "--use-gl=angle",
                  "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
                  "--no-first-run", "--disable-background-networking", "--window-size=1366,768"],
-    "firefox": ["firefox-esr", "--headless", "--no-remote", "--width=1366", "--height=768"],
+    "firefox": ["firefox-esr", "--no-remote", "--width=1366", "--height=768"],
 }  # fmt: skip
 
 
@@ -117,6 +118,7 @@ def main(arguments: list[str] | None = None) -> int:
         live_folder.write(place)
         shutil.copy(Path(__file__).with_suffix(".html"), place)
         profile.mkdir()
+        (profile / "user.js").write_text('user_pref("webgl.force-enabled", true);\n')
         server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(place)))
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = (
