@@ -74,7 +74,7 @@ CONTEXTS = {
     "A.c": "A rod turns at a constant θ̇, and a mass m slides outwards on it at a constant ṙ.",
     "A.d": "An arm moves with the joint velocities v. The velocity part of h is h(q, v) - h(q, 0).",
     "A.e": "A floating robot glides and turns. In the base's axes, h is the force for which "
-    "$v_{lin}$ and ω stay constant while the axes turn: the robot goes round, in a circle "
+    "$v_{lin}$ and ω stay constant while the axes turn: the robot moves in a circle "
     "or a helix. That takes the force $m\\,\\omega\\times v_{lin}$.",
     "B.f": "go2 is pushed to the left with 30 N for 0.1 s. With perfect torques it sways by 6.6 "
     "mm. With hydraulic motors and a torque loop of 50 Hz it sways by 6.4 mm. Now reduce "
