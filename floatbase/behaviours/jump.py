@@ -54,10 +54,12 @@ class JumpPlan(Value):
 
     Parameters
     ----------
-    crouch, push, take_off, touchdown : float
-        Times at which the phases begin, and at which the feet are planned to land [s].
+    crouch, push, take_off : float
+        Times at which the phases begin [s].
     apex : float
         Time at which the centre of mass is highest [s].
+    touchdown : float
+        Time at which the feet are planned to land [s].
     depth : float
         How far the centre of mass is below its standing height before the push [m]. At take-off, it
         is at its standing height.
