@@ -42,8 +42,11 @@ COMMANDS = {
 
 def processes(browser: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """The browser and its children that are alive."""
-    first = psutil.Process(browser.pid)
-    return [first, *first.children(recursive=True)]
+    try:
+        first = psutil.Process(browser.pid)
+        return [first, *first.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        return []
 
 
 def memory(browser: subprocess.Popen[bytes]) -> float:

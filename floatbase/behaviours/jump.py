@@ -41,7 +41,7 @@ _CROUCH_TIME = 0.4  # s, slow enough to keep the feet on the ground
 _BODY_WEIGHT = 1e2  # of the tasks on the body
 _SOFT_CONTACTS = 1e4  # 1/(m/s²)²: the feet do not land at the same time
 _TOUCH_HEIGHT = 2e-3  # m above a known ground, below which a foot has landed
-# m/s: a larger departure of the centre of mass from free fall means that the robot is touched
+# m/s: if the centre of mass falls more slowly by this much than in free fall, a foot has landed
 _TOUCH_SPEED = 0.1
 _MAX_UNEVENNESS = 0.02  # m between the heights of the ground where the feet land
 _DRY_RUN_STEP = 2e-3  # s, the usual control period
@@ -185,8 +185,9 @@ class Jump:
     the landing, the contacts are soft, because the feet do not land at the same time.
 
     The robot jumps in the direction of x from its standing posture at the origin. A foot
-    counts as landed if it is near a known `ground`, or if the centre of mass departs from free
-    fall. So the robot also lands on ground that is higher or lower than expected.
+    counts as landed if it is near a known `ground`, or if the centre of mass falls more slowly than
+    in free fall. So the robot also lands on ground that is higher or lower than expected. The way
+    to the landing place is not checked: a foot may hit an edge on the way.
 
     Before it accepts a jump, the controller integrates the push with the equations of motion,
     without a simulator and without torque limits. It refuses a jump for which a motor is too weak
@@ -370,10 +371,9 @@ class Jump:
                 return grounds[lowest]
         assert self._apex is not None
         since, velocity = self._apex
-        fall = np.array([0.0, 0.0, self._robot.gravity * (t - since)])
-        if np.linalg.norm(state.com_velocity - velocity + fall) > _TOUCH_SPEED:
-            return float(levels.min())
-        return None
+        # a push from the side is no landing
+        upwards = (state.com_velocity - velocity)[2] + self._robot.gravity * (t - since)
+        return float(levels.min()) if upwards > _TOUCH_SPEED else None
 
     def _ground_level(self, xy: Array) -> float:
         """Return the height of a known ground above the ground below the standing robot [m]."""
@@ -412,7 +412,8 @@ class Jump:
         if self._phase != "landing":
             planned = [np.array([part[0], 0.0, part[1]]) for part in self._plan.com_offset(t)]
             return self._standing.com + planned[0], planned[1], planned[2]
-        # critical damping: the body sinks by v / (e rate), as far as in the crouch
+        # critical damping: after a fall to the same height, the body sinks by v / (e rate), as far
+        # as in the crouch
         rate = max(
             self._plan.velocity[1] / (e * self._plan.depth), sqrt(self._robot.gravity / self._leg)
         )

@@ -110,7 +110,7 @@ def predictions() -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            usable = {"said": _is_answer, "is": _is_answer, "unit": _is_text, "sure": _is_bool}
+            usable = {"said": is_answer, "is": is_answer, "unit": _is_text, "sure": _is_bool}
             kept = {
                 key: entry[key] for key, fits in usable.items() if key in entry and fits(entry[key])
             }
@@ -130,7 +130,7 @@ def history() -> dict[str, list[dict[str, Any]]]:
     found: dict[str, list[dict[str, Any]]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            if any(_is_answer(entry.get(key)) for key in ("said", "is", "recalled")):
+            if any(is_answer(entry.get(key)) for key in ("said", "is", "recalled")):
                 found.setdefault(name, []).append(entry)
     return found
 
@@ -316,7 +316,8 @@ def _try_counts(text: bytes) -> Iterator[tuple[str, int, int]]:
             yield name, tries, right
 
 
-def _is_answer(value: Any) -> bool:
+def is_answer(value: Any) -> bool:
+    """Return whether a value can be an answer: a number, a list of numbers, or a text."""
     numbers = value if isinstance(value, list) else [value]
     return _is_text(value) or (
         bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers)

@@ -6,7 +6,7 @@ import ast
 import re
 import textwrap
 from collections.abc import Callable
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from floatbase._validation import short_repr
@@ -42,8 +42,8 @@ def recall(name: str = "", *answer: Any) -> None:
     """Ask three questions from earlier lessons again, or answer one of them.
 
     Only questions whose results you have seen are asked. A question that you missed comes back
-    after a day. One that you knew comes back after 2, 4, 8, … days. The questions of a day are
-    from different lessons, if there are enough.
+    after a day. One that you knew comes back after 2, 4, 8, … days. Questions that are asked
+    together are from different lessons, if there are enough.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def due_questions(now: datetime | None = None) -> list[Question]:
     overdue = {}
     for name, (question, result) in _settled().items():
         pause, last = MISSED_PAUSE, now - OLD
-        for event in history.get(name, []):
+        for event in _in_order(history.get(name, [])):
             pause = _next_pause(event, pause, question, result)
             last = _time_of(event) or last
         if now - last >= pause:
@@ -113,6 +113,15 @@ def due_questions(now: datetime | None = None) -> list[Question]:
     first = {question.lesson: question for question in reversed(questions)}.values()
     mixed = [question for question in questions if question in first]  # one per lesson
     return [*mixed, *(question for question in questions if question not in first)][:PER_DAY]
+
+
+def _in_order(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Sort events by time. Imported answers may be later in the file than in time."""
+    timed, last = [], datetime.fromtimestamp(0, UTC)
+    for event in events:
+        last = _time_of(event) or last
+        timed.append((last, event))
+    return [event for _, event in sorted(timed, key=lambda pair: pair[0])]
 
 
 def _next_pause(

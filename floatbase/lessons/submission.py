@@ -15,6 +15,7 @@ from floatbase.errors import InputError
 from floatbase.lessons import inventory, progress
 from floatbase.lessons.exercises import all_exercises, student_id
 from floatbase.lessons.predictions import lesson_name
+from floatbase.lessons.questions import all_questions
 
 FILE_FORMAT = "answers to the floatbase course"
 
@@ -122,14 +123,7 @@ def import_answers(path: str | Path) -> None:
     is_ours = isinstance(found, dict) and found.get("form") == FILE_FORMAT
     if not is_ours or not all(isinstance(found.get(kind), dict) for kind in kinds):
         raise InputError(f"{short_repr(str(path))} is not a file of answers.")
-    stored, tried = progress.predictions(), progress.load()
-    new = {
-        name: entry
-        for kind, known in (("predictions", stored), ("exercises", tried))
-        for name, entry in found[kind].items()
-        if name not in known and isinstance(entry, dict)
-    }
-    entries = [*new.items(), *_recalled_in(found)]
+    entries = [*_predictions_in(found), *_tries_in(found), *_recalled_in(found)]
     for name, entry in entries:
         if problem := progress.append(name, entry):
             print(problem)
@@ -137,13 +131,38 @@ def import_answers(path: str | Path) -> None:
     print(f"{len(entries)} answers and predictions were added.")
 
 
+def _predictions_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield predictions in a page's file that are not known, and results of those that are."""
+    known = progress.predictions()
+    for name, entry in found["predictions"].items():
+        if name not in all_questions() or not isinstance(entry, dict):
+            continue
+        if name not in known:
+            yield name, entry
+        elif "is" in entry and "is" not in known[name]:
+            yield name, {"is": entry["is"]}
+
+
+def _tries_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield tries of exercises in a page's file, for exercises that were not tried yet."""
+    tried = progress.load()
+    for name, entry in found["exercises"].items():
+        if name in all_exercises() and name not in tried and isinstance(entry, dict):
+            yield name, entry
+
+
 def _recalled_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield those answers to `recall` in a page's file that are not known yet."""
     recalled, known = found.get("recalled"), progress.history()
     for name, entries in recalled.items() if isinstance(recalled, dict) else ():
-        for entry in entries if isinstance(entries, list) else ():
-            if isinstance(entry, dict) and entry not in known.get(name, []):
-                yield name, entry
+        if name not in all_questions() or not isinstance(entries, list):
+            continue
+        for entry in entries:
+            if not isinstance(entry, dict) or not progress.is_answer(entry.get("recalled")):
+                continue
+            kept = {key: entry[key] for key in ("recalled", "knew", "time") if key in entry}
+            if kept not in known.get(name, []):
+                yield name, kept
 
 
 def _is_of(name: str, lesson: str) -> bool:

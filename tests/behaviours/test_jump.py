@@ -53,6 +53,16 @@ def test_a_jump_reaches_its_height_and_distance(name: str, height: float, distan
     assert np.all(np.abs(run.tau) <= run.robot.torque_limits * (1.0 + 1e-9))
 
 
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+def test_a_push_in_flight_is_no_landing(direction: tuple[float, float, float]) -> None:
+    _, planned = jumped("go2", 0.2, 0.0)
+    robot = planned.robot
+    jump = Jump(robot, fb.Contacts.feet(robot, mu=0.6), 0.2, 0.0, start=0.05)
+    push = fb.Push(60.0 * np.array(direction), start=jump.plan.apex + 0.01, duration=0.04)
+    run = fb.rollout(fb.Simulation(robot), jump, 1.6, [push], PERIOD)
+    assert run.outcome == "completed"
+
+
 def test_in_flight_energy_and_momentum_follow_the_closed_form() -> None:
     run, jump = jumped("go2", 0.2, 0.2)
     robot, data = run.robot, run.robot.model.createData()

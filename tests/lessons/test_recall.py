@@ -190,6 +190,7 @@ def random_history(random: np.random.Generator, names: list[str]) -> list[dict[s
             knew = bool(random.random() < 0.6)
             time = time_of(day) if random.random() < 0.9 else random.choice(["", "soon"])
             entries.append({name: {"recalled": said, "knew": knew, "time": str(time)}})
+    random.shuffle(entries)  # as imported answers are
     return entries
 
 

@@ -235,6 +235,30 @@ def test_a_reader_recalls_with_the_keyboard(
     assert [question.name for question in due_questions()] == ["01.e", "02.d"]
 
 
+def test_only_answers_of_the_course_are_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file may set neither an id nor a solved exercise; a result completes a prediction."""
+    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
+    progress.append("02.d", {"said": 43.1})  # without its result
+    asked = {"recalled": 43.1, "knew": True, "time": OLD_TIME}
+    written = {
+        "form": FILE_FORMAT,
+        "predictions": {"02.d": {"said": 1.0, "is": 43.1}, "student": {"id": "forged"}},
+        "exercises": {"student": {"id": "forged"}, "other": {"tries": 1, "right": 1}},
+        "recalled": {
+            "02.d": [asked | {"is": 7.0}, {"knew": True}],
+            "student": [{"id": "forged"}],
+            "06.1": [{"tries": 5, "right": 5}],
+        },
+    }
+    (tmp_path / "a.json").write_text(json.dumps(written))
+    for _ in range(2):
+        import_answers(tmp_path / "a.json")
+        assert progress.student() == "" and progress.load() == {}
+        assert progress.history() == {"02.d": [{"said": 43.1}, {"is": 43.1}, asked]}
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"form": "answers to the floatbase course"}'])
 def test_another_file_is_not_imported(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.json").write_text(text)

@@ -192,7 +192,10 @@ def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]
     except UnicodeDecodeError:
         raise InputError(f"{path} is not text in UTF-8. Export the roster as CSV.") from None
     for separator in ",;\t":
-        header, *lines = [*csv.reader(io.StringIO(text), delimiter=separator)] or [[]]
+        try:
+            header, *lines = [*csv.reader(io.StringIO(text), delimiter=separator)] or [[]]
+        except csv.Error:  # such as an open quotation mark
+            continue
         # older Moodles say Surname
         header = [{"Surname": "Last name"}.get(name.strip(), name.strip()) for name in header]
         if set(_IDS[kind]) & set(header):
@@ -283,8 +286,13 @@ def write_gradescope_results(
         ]
         days = policy.days_late(time)
         told = f" Late days used: {days}." if days else ""
-        if late:
-            told = f" Too late: {days} days. Files count up to {policy.late_days} days late."
+        if late and time is None:
+            told = " The time of this file cannot be read, so the file does not count."
+        elif late:
+            told = (
+                f" Too late: {days} {'day' if days == 1 else 'days'}. Files count up to "
+                f"{policy.late_days} days late."
+            )
         found = {
             "score": sum(test["score"] for test in tests if isinstance(test["score"], int)),
             "output": f"{one.name}.{told}",

@@ -92,7 +92,7 @@
       const entry = {said, unit: data.unit, sure: sure.checked, is: data.result};
       show(entry);
       if (!store("predictions", data.name, {...entry, time: new Date().toISOString()})) {
-        message.append(" This browser does not keep it.");
+        message.append(" This browser cannot store your answer.");
       }
       document.dispatchEvent(new Event("answers"));
     });
@@ -185,10 +185,9 @@
     show();
   };
 
-  // the events of each question in the order of their times
+  // the events of each question
   const histories = ({predictions, recalled}) => Object.fromEntries(
-    Object.entries(predictions).map(([name, entry]) => [name, [entry, ...recalled[name] ?? []]
-      .sort((a, b) => Date.parse(a.time) - Date.parse(b.time))]));
+    Object.entries(predictions).map(([name, entry]) => [name, [entry, ...recalled[name] ?? []]]));
 
   const recallForm = (data) => {
     const message = make("output");
@@ -219,7 +218,7 @@
         message.append(" Look it up in ", link, ".");
       }
       const entry = {recalled, knew, time: new Date().toISOString()};
-      if (!store("recalled", data.name, entry)) message.append(" This browser does not keep it.");
+      if (!store("recalled", data.name, entry)) message.append(" This browser cannot store your answer.");
     });
     return form;
   };

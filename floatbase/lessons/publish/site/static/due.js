@@ -23,6 +23,19 @@
     return event.sure ? rule.sureAndMissed : rule.missed;
   };
 
+  const timeOf = ({time}) => typeof time === "string" ? Date.parse(time) : NaN;
+
+  // Imported answers may be later in the list than in time.
+  const inOrder = (events) => {
+    let last = 0;
+    const timed = events.map((event) => {
+      const time = timeOf(event);
+      if (Number.isFinite(time)) last = time;
+      return [last, event];
+    });
+    return timed.sort(([a], [b]) => a - b).map(([, event]) => event);
+  };
+
   // names of the questions that are due, the most overdue first, from different lessons if possible
   // questions: name -> {right, …}; history: name -> events; now: in ms
   const due = (rule, questions, history, now) => {
@@ -31,9 +44,9 @@
       const events = history[name] ?? [];
       if (!["said", "is"].every((key) => events.some((event) => key in event))) continue;
       let [pause, last] = [rule.missed, now - rule.old * HOUR];
-      for (const event of events) {
+      for (const event of inOrder(events)) {
         pause = nextPause(event, pause, right, rule);
-        const time = typeof event.time === "string" ? Date.parse(event.time) : NaN;
+        const time = timeOf(event);
         if (Number.isFinite(time)) last = time;
       }
       const ratio = (now - last) / (pause * HOUR);

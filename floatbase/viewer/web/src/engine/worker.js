@@ -52,6 +52,7 @@ async function start({name, settings}) {
   resting = [...standing];
   engine.set(settings);
   engine.reset();
+  slipTime = null;
   clock.reset();
   const {drawing, weight} = robot;
   around = {weight, points: robot.points.map(({name}) => name)};
@@ -86,6 +87,7 @@ function frame() {
       break;
     }
   }
+  if (done % SAMPLE > 0) watchSlip(); // a picture in slow motion has few steps
   clock.done(done, performance.now() - begin);
   postMessage({frame: picture()});
 }
