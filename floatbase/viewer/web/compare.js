@@ -55,6 +55,10 @@ export function measure(given, count = 20000) {
 const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
 const size = (a) => a.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
 
+// The outcome of a run in the words of `Rollout.outcome`.
+const outcomeOf = ({outcome}) => outcome === "infeasible" ? "controller failed"
+  : outcome || "completed";
+
 // Answers to the same inputs, and these inputs from MuJoCo.
 function compareStates() {
   const numbers = files["states.bin"];
@@ -148,7 +152,7 @@ function compareRuns() {
       if (outcome) break;
     }
     return {robot: run.robot, settings: run.settings, force: run.force, python: run.outcome,
-      outcome: engine.outcome || "completed", firstSecond, distance, moved, end,
+      outcome: outcomeOf(engine), firstSecond, distance, moved, end,
       pythonEnd: run.com.length};
   });
 }
@@ -204,7 +208,7 @@ function walkAlone(walk, rows) {
     moved = Math.hypot(com[0] - first[0], com[1] - first[1]);
     if (engine.step()) break;
   }
-  return {outcome: engine.outcome || "completed", distance, moved};
+  return {outcome: outcomeOf(engine), distance, moved};
 }
 
 async function compareRecovery() {
