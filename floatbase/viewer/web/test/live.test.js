@@ -1,14 +1,14 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
+import {slippingPoints} from "../src/engine/contacts.js";
 import {defaults} from "../src/engine/engine.js";
 import {setParameter} from "../src/engine/tick.js";
 import {controlsOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
 import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
-import {createVoice, footName, jointName, limitOf, multiplierText, slippingPoints}
-  from "../src/live/words.js";
+import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
 
 test("a clock gives the steps of the time that has passed, in slow motion too", () => {
   const clock = createClock(1e-3);

@@ -6,8 +6,8 @@
 
 import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
+import {slippingPoints} from "./contacts.js";
 import {pushRecovery} from "./recovery.js";
-import {slippingPoints} from "../live/words.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;

@@ -1,9 +1,9 @@
 // Sentences about the live robot: what limits it now.
 
+import {isInAir} from "../engine/contacts.js";
+
 const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "hind"};
-const SLIPPING = 0.97, BEYOND = 1.02; // fractions of the actual friction limit
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
-const UNLOADED = 0.01; // fraction of the weight: feet with less in all do not stand
 const MOST_NAMES = 2; // in a sentence
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
@@ -34,21 +34,6 @@ function subject(names) {
   const unique = [...new Set(names)].map((name) => `the ${name}`), text = list(unique);
   return `${text[0].toUpperCase()}${text.slice(1)} ${unique.length > 1 ? "are" : "is"}`;
 }
-
-// Contact points whose measured force is at the actual friction limit, while the planned force is
-// beyond it.
-export function slippingPoints({measured, planned, settings: {actualMu}}, {points, weight}) {
-  const least = UNLOADED * weight;
-  return points.filter((_, i) => {
-    const [x, y, z] = measured.subarray(3 * i, 3 * i + 3);
-    const [px, py, pz] = planned.subarray(3 * i, 3 * i + 3);
-    return Math.min(z, pz) > least && Math.hypot(x, y) > SLIPPING * actualMu * z
-      && Math.hypot(px, py) > BEYOND * actualMu * pz;
-  });
-}
-
-const isInAir = ({measured, time}, {weight}) => time > 0
-  && measured.every((force) => Math.abs(force) < UNLOADED * weight);
 
 const STOPPED = {
   fell: "The robot fell. It will be back on its feet in a moment.",
