@@ -21,18 +21,7 @@ _POLL_INTERVAL = 0.05  # s between checks for a connected page: short enough for
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments of the command; those of the process by default.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         prog="floatbase", description="Control of floating-base robots."
     )
@@ -127,15 +116,7 @@ def _restart_message(given: Sequence[str], requested_port: int, port: int) -> st
 
 
 def start_when_connected(page: Playground, ended: threading.Event) -> None:
-    """Start the robot once a page is connected, so that it has not fallen or paused before.
-
-    Parameters
-    ----------
-    page : Playground
-        Playground to start.
-    ended : threading.Event
-        Event that ends the wait.
-    """
+    """Start the robot once a page is connected, so that it has not fallen or paused before."""
     while not (page.view.window.n_pages or ended.wait(_POLL_INTERVAL)):
         pass
     if not ended.is_set():

@@ -19,25 +19,7 @@ _CIRCLE = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4])
 
 
 def level_place(terrain: Terrain, point: Array, around: Array, reach: float) -> Array:
-    """Return the place nearest to a point where a foot does not touch an edge of the terrain.
-
-    Parameters
-    ----------
-    terrain : Terrain
-        The terrain.
-    point : ndarray, shape (2,)
-        Desired place in the world frame [m].
-    around : ndarray, shape (n, 2)
-        Points relative to the place, such as the corners of a sole, at which the terrain must be in
-        the tangent plane of the place [m].
-    reach : float
-        Largest distance of the place from the point [m].
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        The nearest such place on a grid, or the point if there is none [m].
-    """
+    """Return the place nearest to a point where a foot does not touch an edge of the terrain."""
     for displacement in _search_grid(reach):
         if _is_flat(terrain, point + displacement, around):
             return np.asarray(point + displacement)

@@ -33,25 +33,6 @@ class ActivePlan:
 
     The functions of `targets` define what `write` writes. If the plan has the usual form, one
     compiled function writes the same numbers.
-
-    Parameters
-    ----------
-    posture : WalkingPosture
-        The standing posture.
-    plan : StepPlan
-        The plan.
-    desired : DesiredMotion
-        The desired motion of the path.
-    pose : BodyPose
-        Height and pitch of the body.
-    reach : float
-        Largest distance of a foothold from the nominal one [m].
-    entries : mapping of str to slice
-        Entries of each task in the array of all targets, as `WholeBodyController.targets`.
-    adjustment : callable, optional
-        User-defined adjustment of the ends of swings.
-    compiled : bool, optional
-        Whether the compiled function may be used.
     """
 
     def __init__(
@@ -129,17 +110,7 @@ class ActivePlan:
         return other
 
     def write(self, t: float, com: Array, com_velocity: Array, out: Array) -> None:
-        """Move to a time, and write the targets of one control step.
-
-        Parameters
-        ----------
-        t : float
-            The time [s].
-        com, com_velocity : ndarray, shape (3,)
-            Centre of mass [m] and its velocity [m/s] in the world frame.
-        out : ndarray, shape (n,)
-            Array of all targets. The entries of this plan's tasks are overwritten.
-        """
+        """Move to a time, and write the targets of one control step."""
         if self._numbers is not None:
             self._write(t, com, com_velocity, self._body, self._pieces, self._rows, out)
         else:

@@ -9,20 +9,7 @@ from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
 
 
 class GaitClock:
-    """The gait in use: the requested gait without the lift-offs that had passed.
-
-    Parameters
-    ----------
-    requested : Gait
-        The requested gait.
-    t : float
-        Time at which it begins [s].
-
-    Attributes
-    ----------
-    gait : Gait
-        The gait in use.
-    """
+    """The gait in use: the requested gait without the lift-offs that had passed."""
 
     def __init__(self, requested: Gait, t: float):
         self._requested: Gait | None = requested  # None while feet come down before a change
@@ -38,17 +25,6 @@ class GaitClock:
         """Change to a newly requested gait once all feet stand, and return whether it changed.
 
         Feet that are in the air come down as planned.
-
-        Parameters
-        ----------
-        requested : Gait
-            The requested gait.
-        swinging : bool
-            Whether a foot is in the air.
-        t : float
-            The time [s].
-        delay : callable or None
-            Called as delay(gait) with the new gait; returns how much later it must begin [s].
         """
         if self._requested is not None and vars(requested) == vars(self._requested):
             self._requested = requested

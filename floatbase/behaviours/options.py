@@ -89,27 +89,7 @@ class Gains(Value):
 
 @dataclass(frozen=True, eq=False)
 class WalkOptions:
-    """Options of a `Walk` that do not change; `Walk` describes them.
-
-    Parameters
-    ----------
-    clearance, reach, ramp : float
-        Height of the swings [m], largest distance of a foothold from the nominal one [m], and time
-        in which a foot is loaded or unloaded [s].
-    foothold, adjustment, modify_plan, swing : callable
-        Rules for footholds, their adjustment (or None), a change of each plan (or None), and the
-        paths of swings.
-    ground : Terrain or None
-        The ground, if it is known.
-    tasks : tuple of Task
-        Further tasks.
-    acceleration : ndarray, shape (3,)
-        Largest acceleration of the path [m/s², m/s², rad/s²].
-    gains : Gains
-        Gains of the tasks.
-    controller : dict
-        Options of `WholeBodyController`.
-    """
+    """Options of a `Walk` that do not change; `Walk` describes them."""
 
     clearance: float
     reach: float

@@ -12,20 +12,7 @@ from floatbase._validation import Array
 
 @dataclass(frozen=True, eq=False)
 class DesiredMotion:
-    """The motion that a path approaches.
-
-    Parameters
-    ----------
-    first, later : ndarray, shape (3,)
-        Velocity, forwards and to the left [m/s], and yaw rate [rad/s], before and after the time
-        `first_until`.
-    first_until : float
-        End of the first period of a gait [s].
-    begin : float
-        Time before which the path does not move [s].
-    acceleration : ndarray, shape (3,)
-        Largest acceleration of each part [m/s², rad/s²].
-    """
+    """The motion that a path approaches."""
 
     first: Array
     later: Array
@@ -36,19 +23,7 @@ class DesiredMotion:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Position, yaw and velocity of the body's path at one time.
-
-    Parameters
-    ----------
-    time : float
-        The time [s].
-    position : ndarray, shape (2,)
-        Position in the world frame [m].
-    yaw : float
-        Yaw [rad].
-    velocity : ndarray, shape (3,)
-        Velocity, forwards and to the left [m/s], and yaw rate [rad/s].
-    """
+    """Position, yaw and velocity of the body's path at one time."""
 
     time: float
     position: Array
@@ -60,13 +35,6 @@ class Path:
 
         Each part of the velocity approaches the desired one at the largest acceleration. The chord
         of an arc is approximated by its length, so steps that turn far must be short.
-
-        Parameters
-        ----------
-        desired : DesiredMotion
-            The desired motion.
-        t : float
-            The time [s].
         """
         goal = desired.first if t < desired.first_until else desired.later
         duration = max(0.0, t - max(self.time, desired.begin))

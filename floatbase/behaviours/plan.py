@@ -49,21 +49,7 @@ LEVEL = Plane(frozen(np.zeros(2)), 0.0)
 
 @dataclass(frozen=True, eq=False)
 class PlannedSwing:
-    """A foot in the air.
-
-    Parameters
-    ----------
-    path : SwingPath
-        Path of the foot when the plan was made.
-    planned_end : ndarray, shape (3,)
-        Place where the foot was first planned to land, in the world frame [m].
-    yaws : (float, float)
-        Yaw of the foot at lift-off and at touchdown [rad].
-    tilts : (ndarray, ndarray), each of shape (2,)
-        Tilt of a flat foot at lift-off and at touchdown: x and y of a rotation vector [rad].
-    ground : Plane
-        Ground on which the foot lands.
-    """
+    """A foot in the air."""
 
     path: SwingPath
     planned_end: Array
@@ -74,17 +60,7 @@ class PlannedSwing:
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """The feet on the ground.
-
-    Parameters
-    ----------
-    feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame, where it stands or last stood, in the world frame [m].
-    touchdowns : dict of str to float
-        Time of each foot's last touchdown [s].
-    step_offset : ndarray, shape (2,)
-        Shift of the last step, in the world frame [m].
-    """
+    """The feet on the ground."""
 
     feet: Mapping[str, Array]
     touchdowns: Mapping[str, float] = field(default_factory=dict)
@@ -165,19 +141,6 @@ def next_footing(
     """Return the feet on the ground at a change of stance, and by how much to shift the path.
 
     The path is shifted, (2,) [m], if the steps were shifted far.
-
-    Parameters
-    ----------
-    plan : StepPlan
-        The plan up to now.
-    swings : dict of str to SwingPath
-        Present paths of the feet in the air.
-    state : State
-        The measured state.
-    stance : sequence of str
-        Feet that stand from now on.
-    t : float
-        The time [s].
     """
     feet, touchdowns = dict(plan.feet), dict(plan.footing.touchdowns)
     for foot in plan.stance:
@@ -211,39 +174,7 @@ def make_plan(
     previous: StepPlan | None = None,
     swings: Mapping[str, SwingPath] | None = None,
 ) -> StepPlan:
-    """Plan footholds, swings and the motion of the centre of mass.
-
-    Parameters
-    ----------
-    posture : WalkingPosture
-        The standing posture.
-    options : WalkOptions
-        Clearance, ground and shape of the swings.
-    state : State
-        The measured state.
-    path : Path
-        The body's path now.
-    gait : Gait
-        The gait.
-    stance : tuple of str
-        Feet that stand from now on.
-    footing : Footing
-        The feet on the ground.
-    foothold : callable
-        Called as foothold(foot, touchdown) with the time of touchdown [s]; returns the foothold,
-        shape (2,) or (3,), in the world frame [m].
-    yaw_at : callable
-        Called as yaw_at(t) with a time [s]; returns the yaw of the path [rad].
-    previous : StepPlan, optional
-        The plan up to now.
-    swings : dict of str to SwingPath, optional
-        Present paths of the feet that remain in the air.
-
-    Returns
-    -------
-    StepPlan
-        The plan.
-    """
+    """Plan footholds, swings and the motion of the centre of mass."""
     t = path.time
     phases = gait.phases(t, _PLANNED_PHASES, _PLAN_HORIZON)
     same = previous is not None and previous.stance == stance
@@ -297,17 +228,6 @@ def weight_shift(posture: WalkingPosture, state: State, t: float, gait: Gait) ->
 
     The delay is 0 if the capture point is above the feet that stand at the first lift-off, or if
     only two points stand then: such a gait is kept in balance by its steps.
-
-    Parameters
-    ----------
-    posture : WalkingPosture
-        The standing posture.
-    state : State
-        The measured state, with all feet on the ground.
-    t : float
-        The time [s].
-    gait : Gait
-        Gait without lift-offs before t.
     """
     swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
     first = min((times[0] for times in swings.values() if times), default=inf)

@@ -19,26 +19,7 @@ MIN_SIDE_FRACTION = 0.25
 
 
 class WalkingPosture:
-    """Feet and centre of mass of a robot in its standing posture.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        All the robot's contacts.
-    state : State
-        State whose posture the robot keeps.
-
-    Attributes
-    ----------
-    nominal_feet : dict of str to ndarray, shape (3,)
-        Position of each foot's frame, relative to the middle of the feet on the ground [m].
-    flat_feet : set of str
-        Names of the flat feet.
-    ground_height : float
-        Height of the ground below the standing feet [m].
-    omega : float
-        Natural frequency of the pendulum [1/s].
-    """
+    """Feet and centre of mass of a robot in its standing posture."""
 
     def __init__(self, contacts: Contacts, state: State):
         self.contacts, self.state, self.flat_feet = contacts, state, flat_foot_names(contacts)
@@ -85,21 +66,7 @@ class WalkingPosture:
         return np.array([*xy, self.nominal_feet[foot][2] + ground.height(xy)])
 
     def clamp_to_reach(self, foot: str, end: Array, body: Array, yaw: float, reach: float) -> Array:
-        """Return the foothold nearest to `end`, (2,) [m], in reach and on the foot's own side.
-
-        Parameters
-        ----------
-        foot : str
-            Name of the foot.
-        end : ndarray, shape (2,)
-            Desired foothold in the world frame [m].
-        body : ndarray, shape (2,)
-            Position of the centre of mass at touchdown, in the world frame [m].
-        yaw : float
-            Yaw of the body [rad].
-        reach : float
-            Largest distance from the nominal foothold [m].
-        """
+        """Return the foothold nearest to `end`, (2,) [m], in reach and on the foot's own side."""
         nominal = self.nominal_feet[foot][:2]
         offset = rotated_by_yaw(end - body, -yaw) - nominal
         position = nominal + offset * min(1.0, reach / (hypot(*offset) or 1.0))

@@ -41,19 +41,6 @@ def speed_fractions(
     its leg, while the body shifts to the middle of the standing feet. The leg is longest soon after
     lift-off, because the foot starts slowly. In the first period, a foot stays in its nominal
     position until its first lift-off, while the body accelerates.
-
-    Parameters
-    ----------
-    gait : Gait
-        The gait.
-    posture : WalkingPosture
-        The standing posture.
-    reach : float
-        Largest distance of a foothold from the nominal one [m].
-    motion : ndarray, shape (3,)
-        Desired velocity, forwards and to the left [m/s], and yaw rate [rad/s].
-    acceleration : float
-        Largest acceleration of the velocity [m/s²].
     """
     if not motion.any():
         return 1.0, 1.0

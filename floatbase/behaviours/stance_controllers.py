@@ -23,22 +23,7 @@ _JOINT_LIMIT_WEIGHT = 10.0
 
 
 class StanceControllers:
-    """Whole-body controllers of a walk, by the feet that stand.
-
-    Parameters
-    ----------
-    posture : WalkingPosture
-        The standing posture.
-    options : WalkOptions
-        Options of the walk.
-    force_weight : float, optional
-        Weight of a task on the contact forces [1/N²]; None for no such task.
-
-    Attributes
-    ----------
-    plan : StepPlan or None
-        The plan in use, which bounds the normal forces while all feet stand.
-    """
+    """Whole-body controllers of a walk, by the feet that stand."""
 
     def __init__(
         self, posture: WalkingPosture, options: WalkOptions, force_weight: float | None = None

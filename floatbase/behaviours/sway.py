@@ -52,21 +52,7 @@ def required_friction(gait: Gait, posture: WalkingPosture) -> float:
 def check_friction(
     gait: Gait, posture: WalkingPosture, contacts: Contacts, facets: int, inner: bool
 ) -> None:
-    """Raise `InputError` if a gait needs more friction than the contacts have.
-
-    Parameters
-    ----------
-    gait : Gait
-        The gait, which always has a foot on the ground.
-    posture : WalkingPosture
-        The standing posture.
-    contacts : Contacts
-        The contacts.
-    facets : int
-        Number of facets of the friction polyhedra.
-    inner : bool
-        Whether the polyhedra lie inside the friction cones.
-    """
+    """Raise `InputError` if a gait needs more friction than the contacts have."""
     scale = float(np.cos(np.pi / facets)) if inner else 1.0
     available = scale * min((contact.mu for contact in contacts.friction_contacts), default=0.0)
     needed = required_friction(gait, posture)

@@ -32,15 +32,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class BodyPose:
-    """Height and pitch of the body relative to the standing posture.
-
-    Parameters
-    ----------
-    height : float, optional
-        Change of the height of the centre of mass [m].
-    pitch : float, optional
-        Rotation of the base about its y axis, nose down if positive [rad].
-    """
+    """Height and pitch of the body relative to the standing posture."""
 
     height: float = 0.0
     pitch: float = 0.0
@@ -61,28 +53,7 @@ def adjusted_ends(
     com_velocity: Array,
     t: float,
 ) -> dict[str, Array]:
-    """Return the ends of the swings, shifted by the error of the DCM, as far as the legs reach.
-
-    Parameters
-    ----------
-    posture : WalkingPosture
-        The standing posture.
-    reach : float
-        Largest distance of a foothold from the nominal one [m].
-    plan : StepPlan
-        The plan.
-    path : Path
-        The body's path now.
-    com, com_velocity : ndarray, shape (3,)
-        Centre of mass [m] and its velocity [m/s] in the world frame.
-    t : float
-        The time [s].
-
-    Returns
-    -------
-    dict of str to ndarray, shape (3,)
-        Position of each foot's frame at touchdown, in the world frame [m].
-    """
+    """Return the ends of the swings, shifted by the error of the DCM, as far as the legs reach."""
     error = capture_point(com, com_velocity, posture.omega) - plan.plan.dcm(t)
     zone, ends = dead_zone(posture, plan), {}
     for foot, swing in plan.planned_swings.items():

@@ -36,15 +36,7 @@ def as_terrain(name: str, value: Any) -> Terrain | None:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """A plane z = slope · (x, y) + level.
-
-    Parameters
-    ----------
-    slope : ndarray, shape (2,)
-        Slope along x and y [-].
-    level : float
-        Height at the origin [m].
-    """
+    """A plane z = slope · (x, y) + level."""
 
     slope: Array
     level: float

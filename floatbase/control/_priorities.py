@@ -19,25 +19,7 @@ _SIGNIFICANT_MULTIPLIER = 1e-6
 
 
 def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
-    """Return tasks as one list, and the number of tasks in each level.
-
-    Parameters
-    ----------
-    tasks : sequence of Task, or sequence of sequences of Task
-        Tasks, or levels of tasks with the highest priority first.
-
-    Returns
-    -------
-    tasks : list of Task
-        All tasks, level after level.
-    sizes : list of int
-        Number of tasks in each level. Empty if there are no levels.
-
-    Raises
-    ------
-    InputError
-        If some elements are levels and others are not, or if a level is empty.
-    """
+    """Return tasks as one list, and the number of tasks in each level."""
     are_levels = [
         isinstance(each, list | tuple) and not hasattr(each, "residual") for each in tasks
     ]
@@ -57,28 +39,7 @@ def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list
 def with_fixed_residuals(
     qp: QP, solution: Solution, tasks: Sequence[Task], costs: Sequence[tuple[Block, float, Affine]]
 ) -> tuple[Array, Array, list[ConstraintLabel]]:
-    """Return equality constraints that keep the residuals of some tasks at their optimum.
-
-    Parameters
-    ----------
-    qp : QP
-        A QP in x = (q̈, τ, λ).
-    solution : Solution
-        The optimum of the tasks.
-    tasks : sequence of Task
-        The tasks.
-    costs : sequence of tuple
-        Block, weight and residual of each task.
-
-    Returns
-    -------
-    A : ndarray, shape (m, n)
-        Coefficients.
-    b : ndarray, shape (m,)
-        Right-hand side.
-    names : list of ConstraintLabel
-        Names of the rows.
-    """
+    """Return equality constraints that keep the residuals of some tasks at their optimum."""
     rows, right, names = [np.zeros((0, qp.n))], [np.zeros(0)], []
     for task, (block, weight, residual) in zip(tasks, costs, strict=True):
         if weight == 0.0:
@@ -106,31 +67,6 @@ def solve_levels(
     strictly convex in them. The next level therefore keeps the residuals, not the variables. An
     inequality with a positive multiplier is active at all these optima, so the next level keeps it
     as an equality. Soft inequalities are violated no more than in the first level.
-
-    Parameters
-    ----------
-    qps : sequence of QP
-        QP of each level, with the objective of its own tasks and the same constraints.
-    levels : sequence of sequence of Task
-        Tasks of each level.
-    costs : sequence of sequence of tuple
-        Block, weight and residual of each of these tasks.
-    solver : str
-        QP solver.
-
-    Returns
-    -------
-    list of Solution
-        Solution of each level. The last one fulfils all tasks as well as their priorities allow.
-
-    Raises
-    ------
-    InfeasibleError
-        If the first QP has no solution.
-
-    Notes
-    -----
-    Sequences of QPs with this property are described in [Escande2014]_ and [Herzog2016]_.
     """
     solutions: list[Solution] = []
     A, b, names = qps[0].A, qps[0].b, qps[0].equality_names

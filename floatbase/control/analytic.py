@@ -24,18 +24,7 @@ from floatbase.robots import Robot, State
 
 @dataclass(frozen=True, eq=False)
 class AnalyticCommand(Value):
-    """One answer of `AnalyticController`; its arrays are read-only.
-
-    Parameters
-    ----------
-    tau : ndarray, shape (d,)
-        Joint torques to apply [N·m].
-    forces : ndarray, shape (k,)
-        Contact forces planned with them, world frame [N].
-    qdd : ndarray, shape (nv,)
-        Generalized acceleration planned with them: the base's linear [m/s²] and angular [rad/s²]
-        part in the base frame, then the joints [rad/s² or m/s²].
-    """
+    """One answer of `AnalyticController`; its arrays are read-only."""
 
     tau: Array
     forces: Array

@@ -81,25 +81,7 @@ def _as_period(name: str, value: Any) -> float:
 
 
 def as_weight(name: str, value: Any) -> float | None:
-    """Return the weight of a soft constraint, or None for a hard one, checked.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for messages.
-    value : object
-        The argument.
-
-    Returns
-    -------
-    float or None
-        The weight.
-
-    Raises
-    ------
-    InputError
-        If it is not a positive number.
-    """
+    """Return the weight of a soft constraint, or None for a hard one, checked."""
     return None if value is None else as_positive(name, value, maximum=_MAX_WEIGHT)
 
 
@@ -407,20 +389,7 @@ class JointLimits(Value):
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:
-    """Return the positions of the actuated joints, 0 for joints that turn without limits.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot with d joints.
-    q : ndarray, shape (nq,)
-        Configuration.
-
-    Returns
-    -------
-    ndarray, shape (d,)
-        Positions [rad or m].
-    """
+    """Return the positions of the actuated joints, 0 for joints that turn without limits."""
     index = _position_indices(robot)
     return np.where(index >= 0, q[index], 0.0)
 

@@ -579,20 +579,6 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
 
     The rows are the friction facets and the minimum normal force of every point, then the maximum
     normal forces.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        Contacts with k force components.
-    limits : Limits
-        The limits.
-
-    Returns
-    -------
-    G : ndarray, shape (m, k)
-        Coefficients.
-    names : tuple of ConstraintLabel
-        Names of the rows.
     """
     per_point = limits.facets + 1
     names: list[ConstraintLabel] = []
@@ -620,66 +606,21 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
 
 
 def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Array) -> Array:
-    """Return h of `force_rows`.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        Contacts with P points.
-    limits : Limits
-        The limits.
-    least, largest : ndarray, shape (P,)
-        Minimum and maximum normal force of every point [N].
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Right-hand side [N].
-    """
+    """Return h of `force_rows`."""
     h = np.zeros((contacts.n_points, limits.facets + 1))
     h[:, -1] = -least
     return np.concatenate([h.ravel(), largest[hard_maximum(contacts, limits)]])
 
 
 def hard_maximum(contacts: Contacts, limits: Limits) -> npt.NDArray[np.bool_]:
-    """Return which contact points have a hard maximum of the normal force.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        Contacts with P points.
-    limits : Limits
-        The limits.
-
-    Returns
-    -------
-    ndarray of bool, shape (P,)
-        True for points with a hard maximum.
-    """
+    """Return which contact points have a hard maximum of the normal force."""
     has_maximum: npt.NDArray[np.bool_] = limits.bounded_points(contacts)[1]
     return has_maximum & (limits.normal_force_weight is None)
 
 
 @lru_cache(maxsize=64)
 def torque_rows(robot: Robot, limits: Limits) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
-    """Return G, h and names of τ ≤ limit and -τ ≤ limit, for every joint that has a limit.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot with d joints.
-    limits : Limits
-        The limits.
-
-    Returns
-    -------
-    G : ndarray, shape (m, d)
-        Coefficients.
-    h : ndarray, shape (m,)
-        Right-hand side [N·m].
-    names : tuple of ConstraintLabel
-        Names of the rows.
-    """
+    """Return G, h and names of τ ≤ limit and -τ ≤ limit, for every joint that has a limit."""
     limited = np.flatnonzero(np.isfinite(limits.torque_limits))
     rows, bound = np.eye(robot.d)[limited], limits.torque_limits[limited]
     sides = [(side, robot.joint_names[i]) for side in ("upper", "lower") for i in limited]

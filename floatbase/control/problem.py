@@ -300,26 +300,7 @@ def assemble_qp(
     normal_forces: tuple[Array, Array],
     inequalities: Sequence[tuple[Array, Array]],
 ) -> QP:
-    """Assemble the QP of `build_qp` from terms that are already evaluated at the state.
-
-    Parameters
-    ----------
-    eom : EquationsOfMotion
-        Equations of motion (7) at the state.
-    costs : sequence of tuple
-        Block, weight and residual of each task.
-    limits : Limits
-        Inequality constraints.
-    normal_forces : tuple of ndarray, shape (P,)
-        Hard minimum and maximum of the normal force at every contact point [N].
-    inequalities : sequence of tuple
-        G and h of each of `limits.all_inequalities`.
-
-    Returns
-    -------
-    QP
-        The QP in x = (q̈, τ, λ).
-    """
+    """Assemble the QP of `build_qp` from terms that are already evaluated at the state."""
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
     n = nv + d + k
@@ -435,27 +416,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[
 
 
 def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-    """Return the residual of a task, after checking that it fits its block of x.
-
-    Parameters
-    ----------
-    task : Task
-        The task.
-    eom : EquationsOfMotion
-        Equations of motion at a state.
-    t : float, optional
-        Time [s].
-
-    Returns
-    -------
-    Affine
-        The residual.
-
-    Raises
-    ------
-    InputError
-        If the residual is not an `Affine` of the size of its block.
-    """
+    """Return the residual of a task, after checking that it fits its block of x."""
     try:
         residual = task.residual(eom, t)
     except InputError as error:  # such as an `Affine` with NaN: name the task

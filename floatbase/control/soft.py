@@ -26,13 +26,7 @@ SOFT_LIMIT_WEIGHT = 1e4  # of limits that are made soft, per N, N·m, rad/s² or
 
 @dataclass(frozen=True, eq=False)
 class SoftConstraint(Value):
-    """A constraint whose forces act but whose motion is only a cost, in `ContactMotionTask`.
-
-    Parameters
-    ----------
-    contact : MotionConstraint
-        The rigid constraint.
-    """
+    """A constraint whose forces act but whose motion is only a cost, in `ContactMotionTask`."""
 
     contact: MotionConstraint
     row_names: ClassVar[tuple[str, ...]] = ()
@@ -48,51 +42,17 @@ class SoftConstraint(Value):
         return self.contact.k
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """Return the Jacobian J of eq. (4).
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-        t : float, optional
-            Time [s].
-
-        Returns
-        -------
-        ndarray, shape (k, nv)
-            The Jacobian.
-        """
+        """Return the Jacobian J of eq. (4)."""
         return self.contact.jacobian(state, t)
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """Return A and b of eq. (5), which have no rows.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-        t : float, optional
-            Time [s].
-
-        Returns
-        -------
-        A : ndarray, shape (0, nv)
-            Empty matrix.
-        b : ndarray, shape (0,)
-            Empty vector.
-        """
+        """Return A and b of eq. (5), which have no rows."""
         return read_only(np.zeros((0, state.robot.nv))), read_only(np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class SoftContact(SoftConstraint):
-    """A soft constraint whose forces act at points, inside their friction cones.
-
-    Parameters
-    ----------
-    contact : FrictionContact
-        The rigid contact.
-    """
+    """A soft constraint whose forces act at points, inside their friction cones."""
 
     contact: FrictionContact
 
@@ -112,34 +72,13 @@ class SoftContact(SoftConstraint):
         return self.contact.point_names
 
     def positions(self, state: State) -> Array:
-        """Return the positions of the points.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Positions in the world frame [m].
-        """
+        """Return the positions of the points."""
         return self.contact.positions(state)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactMotionTask(Value):
-    """The motion constraint of contacts as a cost: residual A q̈ - b of eq. (5).
-
-    Parameters
-    ----------
-    contacts : Contacts
-        The rigid contacts.
-    weight : float
-        Weight of ½ ‖residual‖² in the objective [1/(m/s²)²].
-    name : str, optional
-        Name used in messages.
-    """
+    """The motion constraint of contacts as a cost: residual A q̈ - b of eq. (5)."""
 
     contacts: Contacts
     weight: float
@@ -147,20 +86,7 @@ class ContactMotionTask(Value):
     block: ClassVar[Block] = "qdd"
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """Return A q̈ - b as a function of q̈.
-
-        Parameters
-        ----------
-        eom : EquationsOfMotion
-            Equations of motion at a state.
-        t : float, optional
-            Time [s].
-
-        Returns
-        -------
-        Affine
-            The residual, shape (m,) [m/s², rad/s²].
-        """
+        """Return A q̈ - b as a function of q̈."""
         A, b = self.contacts.constraint(eom.state, t)
         return Affine(A, -b)
 
@@ -168,24 +94,7 @@ class ContactMotionTask(Value):
 def with_soft_contacts(
     contacts: Contacts, tasks: Sequence[Task], weight: float
 ) -> tuple[Contacts, tuple[Task, ...]]:
-    """Return soft contacts and tasks from contacts and tasks that may be soft or rigid.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        Rigid or soft contacts.
-    tasks : sequence of Task
-        Tasks, with or without a `ContactMotionTask`.
-    weight : float
-        Weight of the contacts' motion [1/(m/s²)²].
-
-    Returns
-    -------
-    contacts : Contacts
-        Soft contacts.
-    tasks : tuple of Task
-        Tasks with a `ContactMotionTask` of this weight.
-    """
+    """Return soft contacts and tasks from contacts and tasks that may be soft or rigid."""
     rigid = Contacts(
         [
             contact.contact if isinstance(contact, SoftConstraint) else contact

@@ -30,19 +30,6 @@ class ContactSpace(Value):
     """The contacts along the r independent directions of motion that they resolve.
 
     `contact_space` decides the rank r once, for all other functions.
-
-    Parameters
-    ----------
-    A : ndarray, shape (r, nv)
-        Orthonormal rows. A q̈ = b with this A and b replaces that of eq. (7), in the least-squares
-        sense if the rows of eq. (7) are inconsistent.
-    b : ndarray, shape (r,)
-        Right-hand side for these rows [m/s², rad/s²].
-    force_map : ndarray, shape (k, r)
-        Maps a change of A q̈ to the smallest λ that causes it: A M⁻¹ Jᵀ force_map = 1.
-    null_forces : ndarray, shape (k, k - r)
-        Orthonormal columns that span the forces without effect on the resolved motions. They span
-        null(Jᵀ), except for directions that A resolves poorly.
     """
 
     A: Array

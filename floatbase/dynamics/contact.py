@@ -144,54 +144,15 @@ class SinglePointContact(Value):
         return (self.frame,)
 
     def positions(self, state: State) -> Array:
-        """Compute the position of the contact point.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-
-        Returns
-        -------
-        ndarray, shape (1, 3)
-            Position in the world frame [m].
-        """
+        """Compute the position of the contact point."""
         return read_only([state.point(self.frame) + self._arm(state)[0]])
 
     def jacobian(self, state: State, t: float = 0.0) -> Array:
-        """Compute the Jacobian of the body point at the contact.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-        t : float, optional
-            Time [s]; without effect here.
-
-        Returns
-        -------
-        ndarray, shape (3, nv)
-            Maps v to the velocity of the body point in world axes.
-        """
+        """Compute the Jacobian of the body point at the contact."""
         return self._jacobian(state, self._arm(state)[0])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """Compute A = J and b = -J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-        t : float, optional
-            Time [s]; without effect here.
-
-        Returns
-        -------
-        A : ndarray, shape (3, nv)
-            Jacobian of the body point at the contact, in world axes.
-        b : ndarray, shape (3,)
-            Right-hand side [m/s²].
-        """
+        """Compute A = J and b = -J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm."""
         arm, arm_rate = self._arm(state)
         drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))

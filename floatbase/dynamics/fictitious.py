@@ -27,15 +27,6 @@ class BiasForces(Value):
 
     The split between centrifugal and Coriolis forces depends on the coordinates, and so does their
     size; see `bias_forces`.
-
-    Parameters
-    ----------
-    gravity : ndarray, shape (nv,)
-        Gravity forces g(q) [N, N·m].
-    centrifugal : ndarray, shape (nv,)
-        Terms in v_i² [N, N·m].
-    coriolis : ndarray, shape (nv,)
-        Terms in v_i v_j with i ≠ j [N, N·m].
     """
 
     gravity: Array
@@ -145,23 +136,6 @@ class RotatingFrameView(Value):
     """The motion of a free particle in a rotating frame, with one row for each time.
 
     The three accelerations together explain the curved path of the particle in the frame.
-
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        Times [s].
-    rotation : ndarray, shape (n, 3, 3)
-        Rotation matrices from the frame to the world.
-    position : ndarray, shape (n, 3)
-        Position p of the particle, in the rotating frame [m].
-    velocity : ndarray, shape (n, 3)
-        Velocity ṗ relative to the rotating frame, in its axes [m/s].
-    centrifugal : ndarray, shape (n, 3)
-        Centrifugal acceleration -ω × (ω × p), in the rotating frame [m/s²].
-    coriolis : ndarray, shape (n, 3)
-        Coriolis acceleration -2 ω × ṗ, in the rotating frame [m/s²].
-    euler : ndarray, shape (n, 3)
-        Euler acceleration -ω̇ × p, in the rotating frame [m/s²].
     """
 
     time: Array

@@ -366,32 +366,7 @@ def undetermined_forces(eom: EquationsOfMotion) -> Array:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Sizes, ranks and dimensions of the equations of motion at one state.
-
-    Parameters
-    ----------
-    nv : int
-        Length of q̈.
-    d : int
-        Length of τ.
-    k : int
-        Length of λ.
-    rank_J : int
-        Rank of J.
-    rank_J_base : int
-        Rank of J_b, the base columns of J.
-    null_B : int
-        Dimension of the null space of B, eq. (12), which is d + k - rank J.
-    null_C : int
-        Dimension of the null space of C, eq. (10), which is d + k - rank J.
-    internal : int
-        Dimension of null(J_bᵀ), the internal forces. Torques control `internal - undetermined` of
-        them.
-    undetermined : int
-        Dimension of null(Jᵀ), the forces without effect.
-    rank_V_qdd : int
-        Number of independent directions of β that change q̈, which is d - rank J + rank J_b.
-    """
+    """Sizes, ranks and dimensions of the equations of motion at one state."""
 
     nv: int
     d: int

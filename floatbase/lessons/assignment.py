@@ -9,18 +9,7 @@ FILE = Path(__file__).with_name("assignment.json")  # only in packages without s
 
 
 def where_solutions_are(name: str) -> str:
-    """Return a sentence about the solution of an exercise that this package does not have.
-
-    Parameters
-    ----------
-    name : str
-        Name of the exercise.
-
-    Returns
-    -------
-    str
-        From whom and when the solution can be had.
-    """
+    """Return a sentence about the solution of an exercise that this package does not have."""
     try:
         found = json.loads(FILE.read_text(encoding="utf-8"))
     except (OSError, ValueError):

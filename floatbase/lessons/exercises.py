@@ -28,17 +28,7 @@ TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
 @dataclass(frozen=True, eq=False)
 class OwnNumber:
-    """Number in an exercise that can be another one for each student.
-
-    Parameters
-    ----------
-    text : str
-        Sentence with the number as "{}", which is shown to the student.
-    values : sequence of float
-        Numbers to choose from, in the unit of the text.
-    judge : callable
-        Function of the number that returns the judge of the exercise.
-    """
+    """Number in an exercise that can be another one for each student."""
 
     text: str
     values: Sequence[float]
@@ -52,31 +42,7 @@ class OwnNumber:
 
 @dataclass(frozen=True, eq=False)
 class Exercise:
-    """Exercise of a lesson.
-
-    Parameters
-    ----------
-    name : str
-        Name of the lesson and number of the exercise, such as "01.2" or "C.2".
-    statement : str
-        Statement of what the learner has to find, with shape, unit and frame.
-    stub : str
-        Code that the learner starts from; it runs.
-    solution : str
-        Code that replaces the stub.
-    judge : callable
-        Function that takes an answer and returns a `Verdict`.
-    explanation : str
-        Why the solution is right; it is shown with the solution.
-    namespace : callable
-        Function without arguments that returns the names of the lesson that the stub uses, with
-        their values. NumPy is available as `np`.
-    examples : callable
-        Function without arguments that returns answers with the names of the hints that they must
-        get, in addition to the examples of the judge.
-    own : OwnNumber, optional
-        Number of the exercise that can differ between students.
-    """
+    """Exercise of a lesson."""
 
     name: str
     statement: str
@@ -206,13 +172,7 @@ def own_numbers(student: str) -> None:
 
 
 def student_id(given: Any) -> str:
-    """Check an id of a student and return it without spaces around it.
-
-    Raises
-    ------
-    InputError
-        If the id is not a printable string of 1 to 80 characters.
-    """
+    """Check an id of a student and return it without spaces around it."""
     text = as_string("id", given).strip()
     if not text or not text.isprintable() or len(text) > 80:
         raise InputError('id must be your id in the class, such as "s123456".')
@@ -235,10 +195,7 @@ def show_progress() -> None:
 
 
 def _is_placeholder(answer: Any, placeholder: Any) -> bool:
-    """Return whether an answer is still the placeholder.
-
-    Numbers may differ by rounding on another machine. Functions are compared by their code.
-    """
+    """Return whether an answer is still the placeholder."""
     if isinstance(placeholder, FunctionType):
         return _bytecode(answer) == _bytecode(placeholder)
     if isinstance(placeholder, list) and all(isinstance(part, str) for part in placeholder):

@@ -26,22 +26,7 @@ MU = 0.7
 
 
 def figure_1_left(background: str = "white") -> Viewer:
-    """Draw a fixed-base robot that pushes against a wall.
-
-    The figure shows the force f_r of the wall and the moment τ_b with which the bolts hold the
-    base. The moment is τ_b = -(p - p_base) × f_r, exerted by the ground on the base. Eq. (1) has no
-    such term, because bolts withstand any moment.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-
-    Returns
-    -------
-    Viewer
-        Viewer that shows the figure.
-    """
+    """Draw a fixed-base robot that pushes against a wall."""
     robot = load("ur5")
     view = Viewer(robot, background=background)
     state = robot.standing()
@@ -65,24 +50,7 @@ def figure_1_left(background: str = "white") -> Viewer:
 
 
 def figure_1_right(background: str = "white") -> Viewer:
-    """Draw a floating base with the sums of its contact forces.
-
-    The contact forces f_i add up to the force f_c and the moment τ_c at the centre of mass.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-
-    Returns
-    -------
-    Viewer
-        Viewer that shows the figure.
-
-    Notes
-    -----
-    [FBR]_, eqs. (20), (21).
-    """
+    """Draw a floating base with the sums of its contact forces."""
     robot = load("go2")
     view = Viewer(robot, background=background, scale=0.004)
     state, scale = robot.standing(), 0.004
@@ -105,20 +73,7 @@ def figure_1_right(background: str = "white") -> Viewer:
 
 
 def figure_2(background: str = "white") -> Viewer:
-    """Draw a quadruped with its base frame, its centre of mass x_c and its feet x_i.
-
-    The centre of mass and the origin of the base are different points.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-
-    Returns
-    -------
-    Viewer
-        Viewer that shows the figure.
-    """
+    """Draw a quadruped with its base frame, its centre of mass x_c and its feet x_i."""
     robot = load("go2")
     view = Viewer(robot, background=background)
     state = robot.standing()
@@ -142,22 +97,7 @@ def figure_2(background: str = "white") -> Viewer:
 
 
 def figure_3_left(background: str = "white") -> Viewer:
-    """Draw the friction cone with a force f, its normal part f_⊥ and its tangential part f_∥.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-
-    Returns
-    -------
-    Viewer
-        Viewer that shows the figure.
-
-    Notes
-    -----
-    [FBR]_, eq. (28).
-    """
+    """Draw the friction cone with a force f, its normal part f_⊥ and its tangential part f_∥."""
     view, along, across = _cone_stage(background)
     force = along + across
     picture = _cone() | {
@@ -177,22 +117,7 @@ def figure_3_left(background: str = "white") -> Viewer:
 
 
 def figure_3_right(background: str = "white") -> Viewer:
-    """Draw the plane through the normal and a force, where α_∥ is at most μ α_⊥.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-
-    Returns
-    -------
-    Viewer
-        Viewer that shows the figure.
-
-    Notes
-    -----
-    [FBR]_, eq. (28).
-    """
+    """Draw the plane through the normal and a force, where α_∥ is at most μ α_⊥."""
     view, along, across = _cone_stage(background)
     height, most = along[2], MU * along[2]
     plane = np.array([[0, 0, 0], [0, MU * 0.8, 0.8], [0, -MU * 0.8, 0.8]], dtype=float)
@@ -218,20 +143,7 @@ def figure_3_right(background: str = "white") -> Viewer:
 
 
 def stepping(background: str = "white", height: int = 480) -> Viewer:
-    """Play a quadruped that is pushed to its left with 300 N for 0.1 s and steps to stay upright.
-
-    Parameters
-    ----------
-    background : str, optional
-        Background of the picture, such as "white".
-    height : int, optional
-        Height of the picture in a notebook [pixels].
-
-    Returns
-    -------
-    Viewer
-        Viewer that plays the run in a loop, at half speed.
-    """
+    """Play a quadruped that is pushed left with 300 N for 0.1 s and steps to catch itself."""
     robot = load("go2")
     stand = Stand(robot, Contacts.feet(robot), stepping_gait=Gait.trot(robot, swing=0.2))
     push = Push(np.array([0.0, 300.0, 0.0]), start=0.3)

@@ -19,20 +19,7 @@ _ENTRY = "inventory {}"  # in the progress file
 
 
 class InventoryQuestion(NamedTuple):
-    """Question with four answers.
-
-    Parameters
-    ----------
-    text : str
-        The question.
-    right : str
-        The right answer.
-    wrong : dict of str to str
-        Three wrong answers, each with the mistake that leads to it: a hint of an exercise, such as
-        "00.1:weight_alone", a wrong choice of a prediction, such as "03.g:it moves", or "".
-    place : int
-        Place of the right answer among the four.
-    """
+    """Question with four answers."""
 
     text: str
     right: str
@@ -192,22 +179,7 @@ KEY = "".join(LETTERS[question.place] for question in QUESTIONS)
 
 
 def inventory(time: str = "", letters: str = "") -> None:
-    """Print the questions of the concept inventory, or store your answers to them.
-
-    You do not learn which answers are right, so that the same questions can be asked again.
-
-    Parameters
-    ----------
-    time : {"before", "after"}, optional
-        Whether you answer before or after the course. Without it, the questions are printed.
-    letters : str
-        One letter for each question: a, b, c or d, or - for no answer. Spaces do not count.
-
-    Raises
-    ------
-    InputError
-        If the time or the letters are invalid.
-    """
+    """Print the questions of the concept inventory, or store your answers to them."""
     if not time:
         for number, question in enumerate(QUESTIONS, 1):
             print(f"{number}. {question.text}")
@@ -260,26 +232,7 @@ def mistakes(letters: str) -> list[str]:
 
 
 def gain_report(answers: list[dict[str, Any]]) -> str:
-    """Write the gain of a class for each concept.
-
-    The normalized gain is the fraction of what could be gained: (after - before) / (1 - before),
-    with the fractions of right answers of all who answered both times.
-
-    Parameters
-    ----------
-    answers : list of dict
-        For each learner: letters by time, as `stored_letters` returns them.
-
-    Returns
-    -------
-    str
-        One line for each concept, and one for all.
-
-    Raises
-    ------
-    InputError
-        If nobody answered both times.
-    """
+    """Write the gain of a class for each concept."""
     found = [(scores(one.get("before")), scores(one.get("after"))) for one in answers]
     both = [(first, last) for first, last in found if first is not None and last is not None]
     if not both:

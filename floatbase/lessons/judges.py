@@ -26,19 +26,7 @@ Example: TypeAlias = tuple[Any, str]
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a check. A notebook shows it as a line of text.
-
-    Parameters
-    ----------
-    right : bool
-        Whether the answer is right.
-    text : str
-        The comment for the learner.
-    hint : str
-        Name of the mistake that the text is about; "" if the answer is right.
-    is_try : bool
-        Whether the answer is the learner's own; False for an unchanged stub.
-    """
+    """Result of a check. A notebook shows it as a line of text."""
 
     right: bool
     text: str
@@ -56,24 +44,7 @@ NO_ANSWER = Verdict(
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
-    """Return the minimizer of a learner's cost, or a verdict that says what is wrong with the cost.
-
-    Parameters
-    ----------
-    answer : object
-        Any answer of a learner.
-    n : int
-        Number of variables that the cost must have.
-    block : str
-        Name of these variables, for the message.
-    hint : str, optional
-        Advice for a cost with a different number of variables.
-
-    Returns
-    -------
-    ndarray, shape (n,), or Verdict
-        The minimizer, or what is wrong.
-    """
+    """Return the minimizer of a learner's cost, or a verdict on what is wrong with the cost."""
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
     if not isinstance(answer, Quadratic):
@@ -97,20 +68,7 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
 
 
 def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
-    """Return an answer as an array of finite numbers, or a verdict that says what is wrong with it.
-
-    Parameters
-    ----------
-    answer : object
-        Any answer of a learner.
-    *shapes : tuple of int
-        Shapes that are accepted; a message names the first.
-
-    Returns
-    -------
-    ndarray or Verdict
-        The numbers, or what is wrong.
-    """
+    """Return an answer as an array of finite numbers, or a verdict on what is wrong with it."""
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
     try:
@@ -136,18 +94,7 @@ def array_or_verdict(answer: Any, *shapes: tuple[int, ...]) -> Array | Verdict:
 def array_judge(
     *shapes: tuple[int, ...],
 ) -> Callable[[Callable[[Array], Verdict]], Callable[[Any], Verdict]]:
-    """Decorate a judge of arrays, so that it judges any answer.
-
-    Parameters
-    ----------
-    *shapes : tuple of int
-        Shapes that are accepted; a message names the first.
-
-    Returns
-    -------
-    callable
-        Decorator that turns a function of an array into a function of any answer.
-    """
+    """Decorate a judge of arrays, so that it judges any answer."""
 
     def decorate(judge: Callable[[Array], Verdict]) -> Callable[[Any], Verdict]:
         @wraps(judge)
@@ -161,18 +108,7 @@ def array_judge(
 
 
 def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
-    """Return an answer that is a function, or a verdict that the answer is not a function.
-
-    Parameters
-    ----------
-    answer : object
-        Any answer of a learner.
-
-    Returns
-    -------
-    callable or Verdict
-        The function, or what is wrong.
-    """
+    """Return an answer that is a function, or a verdict that the answer is not a function."""
     if answer is None or answer is Ellipsis:
         return Verdict(
             False, "There is no answer yet. Give your function, without parentheses.", "no_answer"
@@ -187,21 +123,7 @@ def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
 
 
 def lasting_or_verdict(run: Callable[[], Rollout], why: str = "") -> Rollout | Verdict:
-    """Run a simulation, and return its record or a verdict that says why it failed or ended early.
-
-    Parameters
-    ----------
-    run : callable
-        Function without arguments that returns the `Rollout`. The function raises `InputError` if
-        the answer cannot be simulated.
-    why : str, optional
-        Sentence that is added if the run ends early.
-
-    Returns
-    -------
-    Rollout or Verdict
-        The record, or what is wrong.
-    """
+    """Run a simulation, and return its record or a verdict on why it failed or ended early."""
     try:
         record = run()
     except InputError as error:
@@ -224,20 +146,7 @@ def _shape_error(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
 
 
 def format_vector(vector: npt.ArrayLike, digits: int = 0) -> str:
-    """Write a vector as text, such as "(1, 0, -2)".
-
-    Parameters
-    ----------
-    vector : array_like, shape (n,)
-        The vector.
-    digits : int, optional
-        Maximum number of decimals.
-
-    Returns
-    -------
-    str
-        The text, formatted by `rounded`.
-    """
+    """Write a vector as text, such as "(1, 0, -2)"."""
     return rounded(np.round(np.asarray(vector, dtype=np.float64), digits), digits=12, floor=0.0)
 
 
@@ -319,10 +228,7 @@ class NumericJudge:
         return "unknown"
 
     def _equal(self, a: Any, b: Any, tolerance: float = 0.0) -> bool:
-        """Return whether two arrays are equal within a tolerance.
-
-        The tolerance is a fraction of the largest entry of b, and at least `self.tolerance`.
-        """
+        """Return whether two arrays are equal within a tolerance."""
         b, relative = np.asarray(b, dtype=np.float64), max(tolerance, self.tolerance)
         return a.shape == b.shape and bool(
             np.max(np.abs(a - b)) <= relative * (1e-9 + np.max(np.abs(b)))
@@ -331,16 +237,7 @@ class NumericJudge:
 
 @dataclass(frozen=True, eq=False)
 class ShapeJudge:
-    """Judge that comments on known wrong shapes and leaves every other shape to another judge.
-
-    Parameters
-    ----------
-    judge : callable
-        Judge of the other shapes.
-    shapes : mapping of tuple to str
-        For each known wrong shape: the comment on it. The name of the hint is built from the shape,
-        such as "shape_4x3", or "shape_" for a single number.
-    """
+    """Judge that comments on known wrong shapes and leaves every other shape to another judge."""
 
     judge: Callable[[Any], Verdict]
     shapes: Mapping[tuple[int, ...], str]

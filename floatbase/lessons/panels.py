@@ -102,11 +102,7 @@ class SliderPanel(widgets.VBox):
         self.note.value = self.draw_at(self.values())
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """Return what a notebook shows.
-
-        The picture is added here and not earlier: the camera has been placed by now, so a still
-        picture keeps that view.
-        """
+        """Return what a notebook shows."""
         if display_mode() == "site":
             return precomputed_panel(self)
         self._picture.children = [self.view.widget()] if self.view else []
@@ -114,10 +110,7 @@ class SliderPanel(widgets.VBox):
 
 
 def _flex_layout(share: int, least: int) -> widgets.Layout:
-    """Return the layout of a part of a row that takes a share of the width [%].
-
-    Where that is less than `least` pixels, the part moves to its own line.
-    """
+    """Return the layout of a part of a row that takes a share of the width [%]."""
     return widgets.Layout(flex=f"1 1 {share}%", min_width=f"min({least}px, 100%)")
 
 
@@ -209,10 +202,7 @@ def _checked_range(name: str, bounds: Any) -> tuple[float, float, float, str, fl
 def _slider(
     text: str, low: float, first: float, high: float, step: float, on_release: bool
 ) -> widgets.FloatSlider:
-    """Return a slider that shows as many decimals as its step.
-
-    With `on_release` its value changes only when it is released.
-    """
+    """Return a slider that shows as many decimals as its step."""
     return widgets.FloatSlider(
         value=first,
         min=low,
@@ -228,11 +218,7 @@ def _slider(
 
 
 def _round_step(*bounds: float) -> float:
-    """Return a round slider step that divides the range into at least 50 steps.
-
-    The step is the largest of 1, 2 or 5 times a power of ten that divides all bounds. If there is
-    none, because a bound is not round, the step is so small that the difference is not visible.
-    """
+    """Return a round slider step that divides the range into at least 50 steps."""
     most = (max(bounds) - min(bounds)) / 50
     power = math.floor(math.log10(most)) if most > 0 else 0
     steps = [float(f"{digit}e{power - i}") for i in range(4) for digit in (5, 2, 1)]
@@ -244,10 +230,7 @@ def _round_step(*bounds: float) -> float:
 
 
 def _displayed_value(slider: widgets.FloatSlider) -> float:
-    """Return the value as the slider shows it.
-
-    A browser adds up steps, so the last digits of the value may be wrong.
-    """
+    """Return the value as the slider shows it."""
     return float(format(slider.value, slider.readout_format)) + 0.0  # never -0
 
 
@@ -403,20 +386,14 @@ class _PushPanel(widgets.VBox):
 
 
 class _StatusLine(widgets.Label):
-    """Line with the status of a simulation, or the last action while it runs.
-
-    Both the kernel's thread and the simulation's thread update the line.
-    """
+    """Line with the status of a simulation, or the last action while it runs."""
 
     def __init__(self, run: LiveSimulation):
         super().__init__(value=run.status)
         self._run, self._news, self._telling = run, "", threading.Lock()
 
     def show_status(self, news: str | None = None) -> None:
-        """Show the present status.
-
-        While the simulation runs, `news` is shown instead: "" for none, None for the last one.
-        """
+        """Show the present status."""
         # the lock covers reading the status, so that the last line is never about an earlier one
         with self._telling:
             self._news = self._news if news is None else news

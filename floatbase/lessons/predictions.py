@@ -169,23 +169,7 @@ def _is_sure_and_wrong(entry: dict[str, Any]) -> bool:
 
 
 def accepted(result: Any, unit: str) -> Any:
-    """Return which predictions count as right.
-
-    A number counts as right if it is within 10 % of the result, or within 2 % of the largest of
-    several results. A count, which has no unit, must be equal.
-
-    Parameters
-    ----------
-    result : float, sequence of float or str
-        The result, as `compare` stores it.
-    unit : str
-        Its unit.
-
-    Returns
-    -------
-    str or list of (float, float)
-        The right choice, or the lowest and the highest right number for each number.
-    """
+    """Return which predictions count as right."""
     if isinstance(result, str):
         return result
     numbers = result if isinstance(result, list) else [result]
@@ -250,10 +234,7 @@ def _describe_error(said: Any, result: Any, unit: str) -> str:
 
 
 def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
-    """Save what is new about a prediction; return what went wrong, or "".
-
-    A prediction that cannot be saved is remembered as long as this process runs.
-    """
+    """Save what is new about a prediction; return what went wrong, or ""."""
     entry = _unsaved.pop(name, {}) | entry
     if all(stored.get(key) == value for key, value in entry.items()):
         return ""
@@ -264,13 +245,7 @@ def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
 
 
 def parse_answer(answer: Any, unit: str, choices: Sequence[str], count: int) -> Any:
-    """Return the choice or the numbers that a learner's answer means; see `predict`.
-
-    Raises
-    ------
-    InputError
-        If the answer cannot be used.
-    """
+    """Return the choice or the numbers that a learner's answer means; see `predict`."""
     return _match_choice(answer, choices) if choices else _parse_numbers(answer, unit, count)
 
 
@@ -310,11 +285,7 @@ def _parse_numbers(answer: Any, unit: str, count: int) -> Any:
 
 
 def _stored_result(value: Any) -> Any:
-    """Convert a result to the form that is stored: a number or a flat list.
-
-    Integers stay integers. Other numbers are rounded to six digits, which are the same on every
-    processor.
-    """
+    """Convert a result to the form that is stored: a number or a flat list."""
     given = numeric_copy(value)
     if given is None:
         raise InputError(

@@ -261,10 +261,7 @@ def from_json(kept: Any) -> Any:
 
 
 def _append_line(line: bytes) -> str:
-    """Append a line to the file; return what went wrong, or "".
-
-    With an empty line, only check whether the file could be written.
-    """
+    """Append a line to the file; return what went wrong, or ""."""
     lost, advice = (
         "Tries and predictions cannot be saved",
         "Set FLOATBASE_HOME to a folder that you can write to",

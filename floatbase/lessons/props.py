@@ -233,10 +233,7 @@ def _unit_wheel() -> Shape:
 
 @lru_cache(maxsize=1)
 def _unit_table() -> Shape:
-    """Return a disc of radius 1 with its top at z = 0, a rim and twelve painted lines.
-
-    The line along x is dark and wide.
-    """
+    """Return a disc of radius 1 with its top at z = 0, a rim and twelve painted lines."""
     top = geometry.surface_of_revolution([(0.97, 0.0), (0.0, 0.0)], 72)
     rim = geometry.surface_of_revolution(
         [(0.97, -0.05), (1.0, -0.05), (1.0, 0.012), (0.97, 0.012), (0.97, -0.05)], 72

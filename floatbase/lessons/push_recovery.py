@@ -138,18 +138,7 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
 
 
 def measure_push_recovery(lesson: str) -> PushRecovery:
-    """Measure the push-recovery map of a lesson and store it.
-
-    Parameters
-    ----------
-    lesson : str
-        Name of the lesson, such as "05", or of a second map, such as "09 standing".
-
-    Returns
-    -------
-    PushRecovery
-        The new map.
-    """
+    """Measure the push-recovery map of a lesson and store it."""
     make, watch = (
         controller_factory(lesson),
         getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME),

@@ -194,10 +194,7 @@ def _clipped(corners: Array, normal: Array, bound: float) -> Array:
 
 
 def _plot_levels(qp: QP, box: Box, axis: Axes) -> None:
-    """Plot curves of equal objective.
-
-    Their objective values grow quadratically, so that the curves of a bowl are equally spaced.
-    """
+    """Plot curves of equal objective."""
     try:
         # this maps a circle of radius r to the ellipse on which the objective is r²/2 above its
         # minimum
@@ -229,10 +226,7 @@ def _plot_contours(qp: QP, box: Box, axis: Axes) -> None:
 
 
 def _plot_constraint(qp: QP, i: int, thick: bool, box: Box, axis: Axes) -> None:
-    """Plot the line on which a constraint holds with equality.
-
-    Its name is on the forbidden side, beside the border of the feasible set.
-    """
+    """Plot the line on which a constraint holds with equality."""
     G, h = qp.G[i], qp.h[i]
     length = np.linalg.norm(G)
     if not length:

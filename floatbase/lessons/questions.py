@@ -17,26 +17,7 @@ _BOLD = re.compile(r"\*\*Predict (\w+\.\w+)\*\*: ?")
 
 @dataclass(frozen=True)
 class Question:
-    """Prediction that a lesson asks for.
-
-    Parameters
-    ----------
-    name : str
-        Name of the prediction, such as "02.c".
-    topic : str
-        Heading of its part of the lesson.
-    context : str
-        The paragraph before the question, in Markdown, or "".
-    text : str
-        The question, in Markdown. Context and question differ from the lesson's texts if these
-        cannot be understood outside the lesson.
-    choices : tuple of str
-        Strings to choose from; without choices, the answer is numbers.
-    unit : str
-        Unit of the numbers.
-    count : int
-        How many numbers.
-    """
+    """Prediction that a lesson asks for."""
 
     name: str
     topic: str
@@ -73,13 +54,7 @@ def predict_call(source: str) -> tuple[str, dict[str, Any]]:
 
 @cache
 def all_questions() -> dict[str, Question]:
-    """Return the predictions of all lessons, by name.
-
-    Returns
-    -------
-    dict of str to Question
-        The questions in the order of the lessons; empty if the notebooks are not installed.
-    """
+    """Return the predictions of all lessons, by name."""
     found = {}
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
         above, topic = "", ""

@@ -86,18 +86,7 @@ def recall(name: str = "", *answer: Any) -> None:
 
 
 def due_questions(now: datetime | None = None) -> list[Question]:
-    """Return the questions that are due, at most three, the most overdue first.
-
-    Parameters
-    ----------
-    now : datetime, optional
-        The time; by default the present.
-
-    Returns
-    -------
-    list of Question
-        Questions from different lessons, if there are enough.
-    """
+    """Return the questions that are due, at most three, the most overdue first."""
     now = now or datetime.now().astimezone()
     history = progress.history()
     overdue = {}
@@ -188,13 +177,7 @@ def capitalized(text: str) -> str:
 
 
 def ask(read: Callable[[str], str] | None = None) -> None:
-    """Ask the questions that are due in a terminal.
-
-    Parameters
-    ----------
-    read : callable, optional
-        Function that shows a prompt and returns a line; by default `input`.
-    """
+    """Ask the questions that are due in a terminal."""
     asked = due_questions()
     if not asked:
         print("There is nothing to recall today.")

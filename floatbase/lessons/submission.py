@@ -171,10 +171,7 @@ def _is_of(name: str, lesson: str) -> bool:
 
 
 def _own_path(folder: Path, name: str, lesson: str) -> Path:
-    """Return the path of a learner's file: the first one that is free or holds this name.
-
-    A free one is created, empty, so that a learner who hands in at the same time gets another one.
-    """
+    """Return the path of a learner's file: the first one that is free or holds this name."""
     stem = "answers-" + "_".join(re.findall(r"\w+", name)) + (lesson and f"-lesson{lesson}")
     path, number = folder / f"{stem}.json", 1
     while True:

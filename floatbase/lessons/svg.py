@@ -9,22 +9,7 @@ from floatbase._validation import Array
 
 
 def element(tag: str, content: str = "", /, **attributes: str | float) -> str:
-    """Write an SVG element.
-
-    Parameters
-    ----------
-    tag : str
-        Name of the element.
-    content : str, optional
-        Contents of the element.
-    **attributes : str or float
-        Attributes; "_" in a name stands for "-". Floats are lengths in pixels and get one decimal.
-
-    Returns
-    -------
-    str
-        The element as text.
-    """
+    """Write an SVG element."""
     written = "".join(
         f' {name.replace("_", "-")}="{f"{value:.1f}" if isinstance(value, float) else value}"'
         for name, value in attributes.items()
@@ -74,24 +59,7 @@ def drawing(content: str, width: float, view_box: str) -> str:
 
 
 def captioned(content: str, size: tuple[int, int], margin: int, *lines: str) -> str:
-    """Draw a picture, clipped to its size, with lines of text below.
-
-    Parameters
-    ----------
-    content : str
-        Elements of the picture.
-    size : tuple of int
-        Width and height [px].
-    margin : int
-        Margin on the left and right, for long lines [px].
-    *lines : str
-        The lines of text.
-
-    Returns
-    -------
-    str
-        The drawing as SVG.
-    """
+    """Draw a picture, clipped to its size, with lines of text below."""
     width, height = size
     box = element("svg", content, x=0, y=0, width=width, height=height)
     words = "".join(text((width / 2, height + 18 * i), each) for i, each in enumerate(lines, 1))
@@ -100,22 +68,7 @@ def captioned(content: str, size: tuple[int, int], margin: int, *lines: str) -> 
 
 
 def from_above(points: Array, middle: tuple[float, float], scale: float) -> Array:
-    """Convert points to a drawing from above, with x upwards and y to the left.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 2) or (n, 3)
-        Points in the world frame [m].
-    middle : tuple of float
-        Place of the origin in the drawing [px].
-    scale : float
-        Scale [px/m].
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Points in the drawing [px].
-    """
+    """Convert points to a drawing from above, with x upwards and y to the left."""
     return np.asarray(np.array(middle) - scale * points[:, 1::-1])
 
 

@@ -165,20 +165,7 @@ class TargetTask(Value):
         return f"all of them, as in lambda t: ({', '.join(self.target_shapes)})"
 
     def shapes_for(self, robot: Robot, k: int) -> dict[str, tuple[int, ...]]:
-        """Return the shape of each target by the name of its field.
-
-        Parameters
-        ----------
-        robot : Robot
-            Robot of the task.
-        k : int
-            Number of contact force components.
-
-        Returns
-        -------
-        dict of str to tuple of int
-            Shapes of the targets.
-        """
+        """Return the shape of each target by the name of its field."""
         sizes = {"nq": robot.nq, "d": robot.d, "k": k}
         return {
             name: tuple(sizes[n] if isinstance(n, str) else n for n in shape)
@@ -186,28 +173,7 @@ class TargetTask(Value):
         }
 
     def targets_at(self, robot: Robot, k: int, t: float) -> list[Array]:
-        """Return the targets at a time, in the order of `target_shapes`.
-
-        Parameters
-        ----------
-        robot : Robot
-            Robot of the task.
-        k : int
-            Number of contact force components.
-        t : float
-            Time [s].
-
-        Returns
-        -------
-        list of ndarray
-            Target and its derivatives.
-
-        Raises
-        ------
-        InputError
-            If a function returns a value of the wrong shape, or an invalid rotation matrix or
-            configuration.
-        """
+        """Return the targets at a time, in the order of `target_shapes`."""
         shapes = self.shapes_for(robot, k)
         values = [getattr(self, name) for name in shapes]
         if self.is_time_varying:

@@ -33,20 +33,7 @@ class MotionTask(TargetTask):
     kd: float | None
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """Compute the residual J q̈ + J̇ q̇ - a.
-
-        Parameters
-        ----------
-        eom : EquationsOfMotion
-            Equations of motion at the current state.
-        t : float, optional
-            Time at which the targets are evaluated [s].
-
-        Returns
-        -------
-        Affine
-            Map from q̈ to the residual [m/s² or rad/s²], in world axes for a point or a frame.
-        """
+        """Compute the residual J q̈ + J̇ q̇ - a."""
         x, v, a = self._targets(eom, t)
         J, drift, e, e_dot = self._motion(eom.state, x, v)
         assert self.kd is not None  # set by the constructor
@@ -287,23 +274,6 @@ def nearest_rotation(name: str, R: Array) -> Array:
     """Return the rotation matrix nearest to a matrix with rounding errors.
 
     Printed digits and float32 numbers have such errors.
-
-    Parameters
-    ----------
-    name : str
-        Name of the target in messages.
-    R : array_like, shape (3, 3)
-        Rotation matrix with rounding errors, dimensionless.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Rotation matrix, read-only.
-
-    Raises
-    ------
-    InputError
-        If an entry of R Rᵀ differs from the identity by more than 1e-6, or if R is a reflection.
     """
     R = as_array(f"rotation of {name}", R, (3, 3))
     error = np.max(np.abs(R @ R.T - _IDENTITY))

@@ -19,20 +19,7 @@ class _BlockTask(TargetTask):
     weight: float = 1e-5
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
-        """Compute the residual x - target.
-
-        Parameters
-        ----------
-        eom : EquationsOfMotion
-            Equations of motion at the current state.
-        t : float, optional
-            Time at which the targets are evaluated [s].
-
-        Returns
-        -------
-        Affine
-            Map from the block to the residual, in its unit [N or N·m].
-        """
+        """Compute the residual x - target."""
         (target,) = self._targets(eom, t)
         return Affine.identity(target.size) - target
 

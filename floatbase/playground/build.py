@@ -43,42 +43,13 @@ _RAMP_TIME = 1.5  # s in which the ellipse grows from zero to its full size
 
 
 def ground(settings: Settings) -> Ground:
-    """Make the actual ground.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-
-    Returns
-    -------
-    Ground
-        Ground with the actual friction and slope.
-    """
+    """Make the actual ground."""
     mu, normal = settings.friction[1], np.array(settings.normals[1])
     return Ground(mu) if settings.slope[1] == 0.0 else Ground(mu, normal=normal)
 
 
 def perturbation(settings: Settings, robot: Robot) -> Perturbation:
-    """Make the perturbation of the simulation, which replaces eq. (7).
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-    robot : Robot
-        Robot that is simulated.
-
-    Returns
-    -------
-    Perturbation
-        What differs from exact physics.
-
-    Raises
-    ------
-    UnknownNameError
-        If the leg that is switched off is not the name of a foot.
-    """
+    """Make the perturbation of the simulation, which replaces eq. (7)."""
     off = settings.actual_off
     return Perturbation(
         mass=settings.mass[1],
@@ -91,18 +62,7 @@ def perturbation(settings: Settings, robot: Robot) -> Perturbation:
 
 
 def mismatch(settings: Settings) -> ModelMismatch | None:
-    """Make the controller's model mismatch.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-
-    Returns
-    -------
-    ModelMismatch or None
-        What the controller assumes instead of eq. (7), or None if its model is exact.
-    """
+    """Make the controller's model mismatch."""
     off = settings.assumed_off
     ignored = "forces" in off and settings.leg not in settings.lifted_feet
     made = ModelMismatch(
@@ -119,22 +79,7 @@ def _switched_off(options: dict[str, str], off: tuple[str, ...]) -> dict[str, An
 
 
 def actuators(settings: Settings, robot: Robot, state: State) -> FirstOrderLag | None:
-    """Make the actual actuators.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-    robot : Robot
-        Robot that the actuators drive.
-    state : State
-        State in which the actuators' initial torques hold the robot up.
-
-    Returns
-    -------
-    FirstOrderLag or None
-        Actuators with the actual bandwidth, or None if they are ideal.
-    """
+    """Make the actual actuators."""
     if settings.bandwidth[1] >= IDEAL_BANDWIDTH:
         return None
     lag = FirstOrderLag(robot, settings.bandwidth[1])
@@ -144,27 +89,7 @@ def actuators(settings: Settings, robot: Robot, state: State) -> FirstOrderLag |
 
 
 def gait(settings: Settings, robot: Robot) -> Gait:
-    """Make the selected gait, which starts one second after its selection.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-    robot : Robot
-        Robot that walks.
-
-    Returns
-    -------
-    Gait
-        The gait.
-
-    Raises
-    ------
-    InputError
-        If the playground has no gaits for this number of feet.
-    UnknownNameError
-        If a robot with this number of feet does not have the gait.
-    """
+    """Make the selected gait, which starts one second after its selection."""
     gaits = _by_feet(GAITS, robot)
     if settings.gait not in gaits:
         raise unknown_name(f"gait of {robot.name}", settings.gait, gaits)
@@ -172,25 +97,7 @@ def gait(settings: Settings, robot: Robot) -> Gait:
 
 
 def recovery_gait(robot: Robot) -> tuple[str, float]:
-    """Return the gait with which a pushed robot takes steps.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot that is pushed.
-
-    Returns
-    -------
-    name : str
-        Name of the gait.
-    swing : float
-        Duration of a swing [s].
-
-    Raises
-    ------
-    InputError
-        If the playground has no gaits for this number of feet.
-    """
+    """Return the gait with which a pushed robot takes steps."""
     return _by_feet(_RECOVERY_GAITS, robot)
 
 
@@ -206,29 +113,7 @@ def _by_feet(table: dict[int, T], robot: Robot) -> T:
 def controller(
     settings: Settings, robot: Robot, sim: PerturbedSimulation, state: State
 ) -> Controller:
-    """Make a controller for standing or walking.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-    robot : Robot
-        Robot that is controlled.
-    sim : PerturbedSimulation
-        Simulation whose base wrench is set if the base has motors.
-    state : State
-        State that defines the standing posture.
-
-    Returns
-    -------
-    Controller
-        The controller.
-
-    Raises
-    ------
-    FloatbaseError
-        If the settings do not fit the robot.
-    """
+    """Make a controller for standing or walking."""
     contacts = Contacts.feet(
         robot, settings.friction[0], normals=settings.normals[0] if settings.slope[0] else None
     )

@@ -286,10 +286,7 @@ class Playground:
             self.run.reset()
 
     def _change(self) -> bool:
-        """Change the session, and return whether the robot was put back on its feet.
-
-        Settings that the picture cannot draw are refused, like those that do not fit the robot.
-        """
+        """Change the session, and return whether the robot was put back on its feet."""
         session = self.session
         try:
             wanted = replace(session.settings, **self._applying)

@@ -77,13 +77,7 @@ _FREE_PLAY = "free play"
 
 
 class Panel:
-    """Controls of a playground, added to its page on construction.
-
-    Parameters
-    ----------
-    playground : Playground
-        Playground to control.
-    """
+    """Controls of a playground, added to its page on construction."""
 
     def __init__(self, playground: Playground):
         self._playground = playground
@@ -232,13 +226,7 @@ class Panel:
         self._playground.set(**{attribute: off if on else (*off, term)}, leg=leg)
 
     def show_view_settings(self, speed: float) -> None:
-        """Show the push, the speed and the displayed terms at their controls.
-
-        Parameters
-        ----------
-        speed : float
-            Ratio of simulated time to real time [-].
-        """
+        """Show the push, the speed and the displayed terms at their controls."""
         play = self._playground
         values: dict[str, Any] = {
             "speed": speed,
@@ -251,13 +239,7 @@ class Panel:
             play.view.set_control_value(name, value)
 
     def show_settings(self, settings: Settings) -> None:
-        """Show settings at the controls; only a robot with a floating base has these controls.
-
-        Parameters
-        ----------
-        settings : Settings
-            Settings to show.
-        """
+        """Show settings at the controls; only a robot with a floating base has these controls."""
         if not self._playground.robot.is_floating:
             return
         sliders = [*_PAIRED_SLIDERS, *_STANCE_SLIDERS, _NOD_SLIDER, *_QP_SLIDERS]

@@ -182,12 +182,7 @@ class PerturbedSimulation(Simulation):
         super().advance(tau, pushes)
 
     def _velocity_compensation(self) -> Array:
-        """Return the generalized forces that cancel the velocity part of h, in MuJoCo coordinates.
-
-        MuJoCo's bias forces minus those at rest give the velocity part for MuJoCo's coordinates, in
-        which the base velocity is expressed along the world axes. In eq. (7) it is expressed along
-        the base's own axes, which rotate. This adds M times ω × v of the base.
-        """
+        """Return generalized forces that cancel the velocity part of h, in MuJoCo coordinates."""
         model, data = self.model, self._scratch
         data.qpos[:], data.qvel[:] = self.data.qpos, self.data.qvel
         mujoco.mj_fwdPosition(model, data)

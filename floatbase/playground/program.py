@@ -19,29 +19,7 @@ _PUSH_START = 0.5  # s: the robot is at rest by then
 
 
 def program(settings: Settings, robot: Robot, period: float, push: Push | None = None) -> str:
-    """Write a program that makes and runs the same robot for 3 s.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings of the playground.
-    robot : Robot
-        Robot to simulate.
-    period : float
-        Control period [s].
-    push : Push, optional
-        Push that acts at 0.5 s in the program.
-
-    Returns
-    -------
-    str
-        Source code of the program.
-
-    Raises
-    ------
-    FloatbaseError
-        If the settings do not fit the robot.
-    """
+    """Write a program that makes and runs the same robot for 3 s."""
     given = build.perturbation(settings, robot)
     is_perturbed = given != Perturbation() or "zeros" in settings.actual_off
     perturbation = given if is_perturbed else None
@@ -200,11 +178,7 @@ def _literal(value: object) -> str:
 
 @lru_cache(maxsize=8)
 def _load_call(robot: Robot) -> str:
-    """Return the call that loads a robot.
-
-    If `load` does not give this robot, the call reads a URDF file with its name.
-    User-defined limits, locked joints and feet of different radii are left out.
-    """
+    """Return the call that loads a robot."""
     with suppress(FloatbaseError):
         if load(robot.name) == robot:
             return f"fb.load({robot.name!r})"

@@ -166,11 +166,7 @@ class Session:
         self.actuators, self.controller = actuators, controller
 
     def _go_on(self, settings: Settings) -> None:
-        """Continue in the same simulation with new settings.
-
-        A walk continues if only its velocity or gait changes. Raises `FloatbaseError` before
-        anything has changed.
-        """
+        """Continue in the same simulation with new settings."""
         before, walk = self.settings, self.walk
         perturbation = build.perturbation(settings, self.robot)
         actuators = self.actuators

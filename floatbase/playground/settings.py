@@ -168,16 +168,5 @@ PAIR_NAMES = ("friction", "slope", "mass", "bandwidth")  # settings that are (no
 
 
 def six_digits(x: float) -> float:
-    """Round a number to six significant digits.
-
-    Parameters
-    ----------
-    x : float
-        Number to round [-].
-
-    Returns
-    -------
-    float
-        The rounded number.
-    """
+    """Round a number to six significant digits."""
     return float(f"{x:.6g}")

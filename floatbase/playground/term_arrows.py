@@ -135,10 +135,7 @@ def _velocity(record: fb.Rollout, scale: float, size: float) -> Picture:
 
 
 def _torques(record: fb.Rollout, scale: float, size: float) -> Picture:
-    """Draw each joint torque as a curled arrow around the joint's axis.
-
-    The radius is that of a force that has this torque at a lever arm of 0.3 m.
-    """
+    """Draw each joint torque as a curled arrow around the joint's axis."""
     state, first = record.final, record.robot.nv - record.robot.d
     picture: Picture = {}
     for i, (joint, tau) in enumerate(

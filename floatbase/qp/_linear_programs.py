@@ -23,30 +23,7 @@ def linear_program(
         None,
     ),
 ) -> OptimizeResult:
-    """Solve the linear program min cᵀ x subject to A x = b and G x ≤ h.
-
-    Parameters
-    ----------
-    cost : ndarray, shape (n,)
-        Cost vector c.
-    equalities : tuple of ndarray, optional
-        A, shape (m, n), and b, shape (m,); none by default.
-    inequalities : tuple of ndarray, optional
-        G, shape (l, n), and h, shape (l,); none by default.
-    bounds : tuple or sequence of tuple, optional
-        Lower and upper bound of all variables, or one such pair per variable. None means no bound.
-        By default x ≥ 0.
-
-    Returns
-    -------
-    OptimizeResult
-        Result of SciPy. Its `status` is always `OPTIMAL`, `INFEASIBLE` or `UNBOUNDED`.
-
-    Raises
-    ------
-    SolverError
-        If HiGHS does not converge.
-    """
+    """Solve the linear program min cᵀ x subject to A x = b and G x ≤ h."""
     from scipy.optimize import linprog  # slow to import, and rarely needed
 
     (A, b), (G, h) = equalities or (None, None), inequalities or (None, None)

@@ -29,16 +29,6 @@ def infeasible(constraints: Iterable[str]) -> InfeasibleError:
 
     More than a few constraints are grouped by kind and counted. Each is then named by its owner, or
     by its full name if its owner has several constraints of that kind.
-
-    Parameters
-    ----------
-    constraints : iterable of str
-        Names of the constraints, plain strings or `ConstraintLabel`.
-
-    Returns
-    -------
-    InfeasibleError
-        The error to raise.
     """
     labels = [
         row if isinstance(row, ConstraintLabel) else ConstraintLabel(row) for row in constraints
@@ -62,18 +52,7 @@ def infeasible(constraints: Iterable[str]) -> InfeasibleError:
 
 
 def unbounded(problem: object) -> SolverError:
-    """Return the error for a problem whose objective decreases without limit.
-
-    Parameters
-    ----------
-    problem : object
-        Problem, whose repr the message shows.
-
-    Returns
-    -------
-    SolverError
-        The error to raise.
-    """
+    """Return the error for a problem whose objective decreases without limit."""
     return SolverError(
         f"The objective of {problem!r} has no minimum: it decreases without limit along a "
         f"direction that has no curvature and meets no constraint. "
@@ -82,20 +61,7 @@ def unbounded(problem: object) -> SolverError:
 
 
 def not_convex(problem: object, H: Array) -> SolverError:
-    """Return the error for a problem whose objective has negative curvature.
-
-    Parameters
-    ----------
-    problem : object
-        Problem, whose repr the message shows.
-    H : ndarray, shape (n, n)
-        Matrix of the objective on the space where the equalities hold.
-
-    Returns
-    -------
-    SolverError
-        The error to raise.
-    """
+    """Return the error for a problem whose objective has negative curvature."""
     return SolverError(
         f"{problem!r} is not convex: along one direction its curvature is "
         f"{np.linalg.eigvalsh(H)[0]:.3g}. "
@@ -104,20 +70,7 @@ def not_convex(problem: object, H: Array) -> SolverError:
 
 
 def violation_tolerance(h: Array, x: Array | None = None) -> Array:
-    """Return how far rows of unit length may be violated: `FEASIBILITY_TOLERANCE` plus rounding.
-
-    Parameters
-    ----------
-    h : ndarray, shape (l,)
-        Right-hand sides of the rows.
-    x : ndarray, shape (n,), optional
-        Point at which the rows are evaluated.
-
-    Returns
-    -------
-    ndarray, shape (l,)
-        Tolerance of each row.
-    """
+    """Return how far rows of unit length may be violated: `FEASIBILITY_TOLERANCE` plus rounding."""
     magnitude = 0.0 if x is None else float(np.max(np.abs(x), initial=0.0))
     return FEASIBILITY_TOLERANCE + _ROUNDING * (np.abs(h) + magnitude)
 

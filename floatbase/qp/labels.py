@@ -51,27 +51,7 @@ class ConstraintLabel(str):
 
 
 def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[ConstraintLabel, ...]:
-    """Return a label for each row of a matrix.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names of the rows, or none. The default names are `kind` and a number, as in "equality 0".
-    count : int
-        Number of rows.
-    kind : {"equality", "inequality"}
-        Kind of the rows, used in default names and messages.
-
-    Returns
-    -------
-    tuple of ConstraintLabel
-        One label per row.
-
-    Raises
-    ------
-    InputError
-        If the number of names differs from `count`, or if a name is not unique.
-    """
+    """Return a label for each row of a matrix."""
     given = names if isinstance(names, tuple) else ()
     labels = tuple(name for name in given if isinstance(name, ConstraintLabel))
     if not labels or len(labels) < len(given):  # not labels of another QP, which are checked

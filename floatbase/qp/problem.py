@@ -294,14 +294,7 @@ class QP(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InequalityQP(QP):
-    """A `QP` without equalities, made from another one, with given `row_norms`.
-
-    Parameters
-    ----------
-    row_norms : array_like, shape (l,)
-        Lengths of the rows in the variables of the other problem. The remaining parameters are
-        those of `QP`.
-    """
+    """A `QP` without equalities, made from another one, with given `row_norms`."""
 
     row_norms: Array = field(kw_only=True)
 

@@ -240,15 +240,6 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
     summed in extended precision, if the processor supports it, from the original problem. Return
     None if a step is too large for rounding, or if it violates a row that is not active, which can
     happen if the optimum is not unique.
-
-    Parameters
-    ----------
-    qp : QP
-        The problem.
-    y : ndarray, shape (p,)
-        Minimizer of `qp.reduced`.
-    mu : ndarray, shape (l,)
-        Multipliers of the inequalities.
     """
     reduced, space, n = qp.reduced, qp.equality_space, len(y)
     active = np.flatnonzero(mu > 0.0)

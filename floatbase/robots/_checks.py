@@ -89,19 +89,6 @@ def check_unit_norms(
     """Raise `InputError` if a quaternion or a (cos, sin) pair is not of length 1.
 
     A (cos, sin) pair describes a joint without limits.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        Model of the robot.
-    name : str
-        Name of the configuration, for the message.
-    q : ndarray, shape (nq,)
-        Configuration.
-    hint : str, optional
-        Text that follows the last word of the message.
-    first_joint : int, optional
-        First of Pinocchio's joints to check; 2 skips the base of a floating-base robot.
     """
     if pin.isNormalized(model, q, UNIT_NORM_TOLERANCE):
         return  # faster than the loop below

@@ -13,22 +13,7 @@ from floatbase.robots.robot import Foot
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """Data that the catalogue adds to a robot of example-robot-data.
-
-    Parameters
-    ----------
-    description : str
-        Purpose of the robot.
-    feet : tuple of Foot
-        Places where the robot can touch the ground.
-    torque_limit : float or None
-        Torque limit of every joint, if the limits in the URDF are wrong [N·m].
-    joints : mapping of str to float
-        Joint angles of the posture that replace those of the reference posture, by joint name
-        [rad].
-    sources : mapping of str to str
-        Sources of these numbers.
-    """
+    """Data that the catalogue adds to a robot of example-robot-data."""
 
     description: str
     feet: tuple[Foot, ...] = ()

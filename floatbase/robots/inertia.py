@@ -16,28 +16,7 @@ _UPPER = "xx", "xy", "xz", "yy", "yz", "zz"  # entries of a tensor in a URDF, ro
 def add_point_mass(
     model: pin.Model, urdf: str, frame_id: int, mass: float, position: npt.ArrayLike
 ) -> tuple[pin.Model, str]:
-    """Return a model and its URDF with a point mass fixed to a link.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        The model.
-    urdf : str
-        Text of the URDF from which the model was made.
-    frame_id : int
-        Index of the frame that carries the mass.
-    mass : float
-        The mass [kg].
-    position : array_like, shape (3,)
-        Position of the mass in the frame [m].
-
-    Returns
-    -------
-    model : pinocchio.Model
-        A copy of the model with the mass.
-    urdf : str
-        The URDF with the mass.
-    """
+    """Return a model and its URDF with a point mass fixed to a link."""
     carrier = link = model.frames[frame_id]
     while link.type != pin.FrameType.BODY:
         link = model.frames[link.parentFrame]
@@ -52,24 +31,7 @@ def add_point_mass(
 
 
 def scale_masses(model: pin.Model, urdf: str, factor: float) -> tuple[pin.Model, str]:
-    """Return a model and its URDF with all masses multiplied by a factor.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        The model.
-    urdf : str
-        Text of the URDF from which the model was made.
-    factor : float
-        Factor of all masses, moments of inertia and rotor inertias [-].
-
-    Returns
-    -------
-    model : pinocchio.Model
-        A copy of the model with the other masses.
-    urdf : str
-        The URDF with the other masses; it does not contain the rotor inertias.
-    """
+    """Return a model and its URDF with all masses multiplied by a factor."""
     model = model.copy()
     for i, inertia in enumerate(model.inertias):
         model.inertias[i] = _scaled(inertia, factor)

@@ -555,22 +555,7 @@ class Robot(Value):
 
 
 class Workspace(local):
-    """Memory for Pinocchio's results, one per thread; allocating it takes longer than filling it.
-
-    Parameters
-    ----------
-    model : pinocchio.Model
-        Model for which the memory is allocated.
-
-    Attributes
-    ----------
-    data : pinocchio.Data
-        The results.
-    state : callable
-        Weak reference to the state that the results belong to.
-    has_jacobians : bool
-        Whether the joint Jacobians are among the results.
-    """
+    """Memory for Pinocchio's results, one per thread; allocation takes longer than filling."""
 
     def __init__(self, model: pin.Model):
         self.data = model.createData()

@@ -36,34 +36,7 @@ def find_standing_state(
     surface: Callable[[Array], float] | None = None,
     balanced: bool = False,
 ) -> State:
-    """Find the standing state at rest nearest to `robot.posture`; see `Robot.standing`.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot to place on the ground.
-    height : float, optional
-        Height of the base's origin above z = 0 in the world frame [m]. By default it follows from
-        the feet.
-    normal : array_like, shape (3,) or (n, 3), optional
-        Normals of the ground planes in the world frame; they are normalized. By default up.
-    offset : float or array_like, shape (n,), optional
-        Offsets of the planes normal · x = offset [m]; 0 by default.
-    surface : callable, optional
-        Height of the ground as a function of x and y, shape (2,) [m].
-    balanced : bool, optional
-        Whether the CoM keeps its horizontal distance from the middle of the feet.
-
-    Returns
-    -------
-    State
-        The standing state. A fixed-base robot and a robot without feet get their posture.
-
-    Raises
-    ------
-    InputError
-        If the feet cannot all reach the ground.
-    """
+    """Find the standing state at rest nearest to `robot.posture`; see `Robot.standing`."""
     posture = State(robot, robot.posture)
     normals, offsets = _UP if normal is None else normal, 0.0 if offset is None else offset
     planes = as_half_spaces("the ground", normals, offsets)

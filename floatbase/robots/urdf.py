@@ -21,23 +21,7 @@ _ROUNDING = 1e-12
 
 
 def read_urdf(path: Path) -> str:
-    """Read the text of a URDF file.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file.
-
-    Returns
-    -------
-    str
-        The text.
-
-    Raises
-    ------
-    InputError
-        If the file does not exist or cannot be read.
-    """
+    """Read the text of a URDF file."""
     try:
         return path.read_bytes().decode(
             "utf-8-sig", errors="replace"
@@ -50,28 +34,7 @@ def read_urdf(path: Path) -> str:
 
 
 def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
-    """Build the Pinocchio model of a URDF text, with a root joint if the base is floating.
-
-    Parameters
-    ----------
-    name : str
-        Name of the robot, for messages.
-    urdf : str
-        Text of the URDF.
-    floating : bool
-        Whether the base can move freely.
-
-    Returns
-    -------
-    pinocchio.Model
-        The model.
-
-    Raises
-    ------
-    InputError
-        If the text is not valid XML or not a URDF. Pinocchio accepts some text that later readers
-        reject.
-    """
+    """Build the Pinocchio model of a URDF text, with a root joint if the base is floating."""
     try:
         ElementTree.fromstring(urdf)
         return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
@@ -107,22 +70,7 @@ def _parse_error(urdf: str, error: Exception) -> str:
 
 
 def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
-    """Raise `InputError` for content that Pinocchio accepts but eqs. (1)-(7) cannot represent.
-
-    Parameters
-    ----------
-    name : str
-        Name of the robot, for messages.
-    urdf : str
-        Text of the URDF.
-    model : pinocchio.Model
-        Model built from the text.
-
-    Raises
-    ------
-    InputError
-        If an inertia, limit, axis, name, joint type or joint coupling is not supported.
-    """
+    """Raise `InputError` for content that Pinocchio accepts but eqs. (1)-(7) cannot represent."""
     root = ElementTree.fromstring(urdf)
     for check in _CHECKS:
         check(name, root, model)
@@ -253,24 +201,7 @@ def _movable_joints(root: ElementTree.Element) -> list[ElementTree.Element]:
 
 
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:
-    """Return a URDF with some joints fixed at their positions in a configuration.
-
-    Parameters
-    ----------
-    urdf : str
-        Text of the URDF.
-    model : pinocchio.Model
-        Model built from the text.
-    q : ndarray, shape (nq,)
-        Configuration that gives the positions of the joints.
-    joints : collection of str
-        Names of the joints to fix.
-
-    Returns
-    -------
-    str
-        Text of the new URDF.
-    """
+    """Return a URDF with some joints fixed at their positions in a configuration."""
     data, root = model.createData(), ElementTree.fromstring(urdf)
     pin.framesForwardKinematics(model, data, q)
     for joint in root.findall("joint"):
@@ -294,16 +225,6 @@ def without_world_link(urdf: str) -> str:
     """Return a URDF without the link "world" and the joints attached to it.
 
     Some URDFs have such a link below the base.
-
-    Parameters
-    ----------
-    urdf : str
-        Text of the URDF.
-
-    Returns
-    -------
-    str
-        Text of the new URDF.
     """
     root = ElementTree.fromstring(urdf)
     for element in [

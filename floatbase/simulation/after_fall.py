@@ -20,14 +20,6 @@ def joint_damping(sim: Simulation, period: float) -> Array:
 
     The damping is the joint's effective inertia in the present state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05
     s.
-
-    Parameters
-    ----------
-    sim : Simulation
-        The simulation.
-    period : float
-        Time for which a torque is held [s]. The time constant is at least twice as long, because a
-        shorter one would make the joint oscillate.
     """
     inverse_inertia = np.diag(np.linalg.inv(sim.state.M))[sim.robot.nv - sim.robot.d :]
     return np.array(1.0 / (max(_DAMPING_TIME_CONSTANT, 2.0 * period) * inverse_inertia))

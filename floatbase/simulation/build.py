@@ -54,20 +54,6 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    ground : Ground
-        The ground.
-    timestep : float
-        Timestep of the simulation [s].
-
-    Raises
-    ------
-    SimulationError
-        If MuJoCo cannot build the model.
     """
     try:
         model = build_spec(robot, ground, timestep).compile()
@@ -85,17 +71,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 
 
 def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
-    """Write the description from which `build_model` builds the model; same parameters and errors.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    ground : Ground
-        The ground.
-    timestep : float
-        Timestep of the simulation [s].
-    """
+    """Write the description from which `build_model` builds the model; same arguments."""
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

@@ -13,25 +13,7 @@ from floatbase.simulation.ground import Ground, box_distance
 
 
 class FootContacts:
-    """Reader of the feet's contacts in a MuJoCo model's data.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-        MuJoCo's model of the robot on the ground.
-    ground : Ground
-        The ground.
-    point_names : sequence of str
-        Names of the feet's contact points.
-
-    Attributes
-    ----------
-    geoms : ndarray, shape (points,)
-        MuJoCo's ids of the feet's balls.
-    max_contacts : int
-        Usual limit on the number of simultaneous contacts of the feet. On planes alone there are
-        never more.
-    """
+    """Reader of the feet's contacts in a MuJoCo model's data."""
 
     def __init__(self, model: mujoco.MjModel, ground: Ground, point_names: Sequence[str]):
         self._ground, self._n_planes = ground, len(ground.normals)
@@ -48,25 +30,7 @@ class FootContacts:
     def read(
         self, model: mujoco.MjModel, data: mujoco.MjData, link_collisions: bool
     ) -> tuple[npt.NDArray[np.int32], Array]:
-        """Return the n contacts of the feet at this instant.
-
-        Parameters
-        ----------
-        model : mujoco.MjModel
-            MuJoCo's model.
-        data : mujoco.MjData
-            MuJoCo's data of the model.
-        link_collisions : bool
-            Whether links may touch the ground, too; contacts of links are left out.
-
-        Returns
-        -------
-        geoms : ndarray, shape (n, 2)
-            MuJoCo's ids of plane or box, and ball.
-        forces : ndarray, shape (3 n,)
-            Contact forces [N]. On planes they are in the contact frames, normal component first. On
-            boxes they are in the world frame, because contact frames change at an edge.
-        """
+        """Return the n contacts of the feet at this instant."""
         contact, forces, n_limits = data.contact, data.efc_force, data.nl
         if n_limits:  # the contacts follow the joints that are at their limits
             forces = forces[n_limits:]
@@ -107,20 +71,7 @@ class FootContacts:
         return np.where(swapped[:, None], geoms[:, ::-1], geoms), forces.ravel()
 
     def forces(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Return the forces on the contact points at N instants.
-
-        Parameters
-        ----------
-        geoms : ndarray, shape (N, n, 2)
-            Ids of plane or box, and ball, as from `read`; geom 0 stands for no contact.
-        contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces as from `read` [N].
-
-        Returns
-        -------
-        ndarray, shape (N, points, 3)
-            Forces in the world frame [N].
-        """
+        """Return the forces on the contact points at N instants."""
         n, planes, foot_geoms = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
         forces = np.zeros((n, len(self._is_foot), 3))
         per_contact = contact_frame_forces.reshape(*foot_geoms.shape, 3)
@@ -133,18 +84,7 @@ class FootContacts:
         return forces[:, self.geoms]
 
     def positions(self, centres: Array) -> Array:
-        """Return the point of each ball nearest to the ground, in the world frame.
-
-        Parameters
-        ----------
-        centres : ndarray, shape (..., points, 3)
-            Centres of the balls in the world frame [m].
-
-        Returns
-        -------
-        ndarray, shape (..., points, 3)
-            Nearest points in the world frame [m].
-        """
+        """Return the point of each ball nearest to the ground, in the world frame."""
         distances = centres @ self._ground.normals.T - self._ground.offsets
         directions = self._ground.normals[np.argmin(distances, axis=-1)]
         if self._ground.boxes:

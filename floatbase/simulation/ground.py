@@ -384,22 +384,7 @@ class Ground(Value):
 
 
 def box_distance(points: Array, bounds: Array) -> tuple[Array, Array]:
-    """Return the distances of points from a box, and the directions in which they grow.
-
-    Parameters
-    ----------
-    points : ndarray, shape (..., 3)
-        Points in the world frame [m].
-    bounds : ndarray, shape (5,)
-        x0, x1, y0, y1 and top of the box, which has no bottom [m].
-
-    Returns
-    -------
-    distances : ndarray, shape (...)
-        Distances, negative inside [m].
-    directions : ndarray, shape (..., 3)
-        Unit vectors in the world frame that point away from the box.
-    """
+    """Return the distances of points from a box, and the directions in which they grow."""
     x0, x1, y0, y1, top = bounds
     # how far a point lies outside each of the five faces, negative inside
     faces = np.stack(

@@ -29,16 +29,6 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
 
     All links that one joint moves share one hull, because a plane touches a body exactly where it
     touches the body's hull. A robot with a fixed base has no hulls.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    tuple of (int, ndarray, shape (n, 3))
-        Pinocchio's id of each joint, and points in the joint's frame [m].
     """
     if not robot.is_floating:
         return ()

@@ -348,22 +348,7 @@ def _max_scaling(wrenches: WrenchSet, push: Array, weight_wrench: Array) -> floa
 
 
 def _distance_to_border(polygon: Array, point: Array, directions: Array) -> Array:
-    """Return the distance of a point to the border of a convex polygon in each direction.
-
-    Parameters
-    ----------
-    polygon : ndarray, shape (k, 2)
-        Corners, counter-clockwise [m].
-    point : ndarray, shape (2,)
-        The point [m].
-    directions : ndarray, shape (n, 2)
-        Unit vectors.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Distances; 0 for a point that is not inside [m].
-    """
+    """Return the distance of a point to the border of a convex polygon in each direction."""
     if len(polygon) < 3:
         return np.zeros(len(directions))
     edges = np.roll(polygon, -1, axis=0) - polygon

@@ -265,17 +265,6 @@ class Recorder:
     """Collector of the rows of a rollout.
 
     Call `before_tick`, `after_step` for each timestep, and `complete_tick` in each control step.
-
-    Parameters
-    ----------
-    sim : Simulation
-        The simulation.
-    stance : Contacts
-        The controller's contacts at the beginning.
-    ticks : int
-        Largest number of rows.
-    substeps : int
-        Timesteps in each control step.
     """
 
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
@@ -342,23 +331,7 @@ class Recorder:
         targets: tuple[Array, Mapping[str, slice]] | None = None,
         joint_limits: JointLimits | None = None,
     ) -> None:
-        """Complete a row.
-
-        Parameters
-        ----------
-        tau_desired : ndarray, shape (d,)
-            Torques that the controller requested [N·m].
-        stance : Contacts
-            The controller's contacts.
-        planned : ndarray, shape (k,), or None
-            Forces that the controller planned at the contacts, in the world frame [N].
-        planned_qdd : ndarray, shape (nv,), or None
-            Accelerations that the controller planned [m/s² or rad/s²].
-        targets : (ndarray, mapping of str to slice), optional
-            The controller's targets, as `Command.target_values` and `Command.target_entries`.
-        joint_limits : JointLimits or None
-            Limits of these accelerations.
-        """
+        """Complete a row."""
         n = self._n
         if targets is not None:
             self._targets.append((n, *targets))
@@ -381,29 +354,7 @@ class Recorder:
         error: FloatbaseError | None = None,
         controller_off_time: float | None = None,
     ) -> Rollout:
-        """Return the record as a `Rollout`.
-
-        Parameters
-        ----------
-        pushes : tuple of Push
-            All pushes given to `rollout`.
-        outcome : {"completed", "fell", "diverged", "controller failed"}
-            Why the run ended.
-        error : FloatbaseError, optional
-            Exception of a controller that failed.
-        controller_off_time : float, optional
-            Time at which the controller was switched off [s].
-
-        Returns
-        -------
-        Rollout
-            The record of all completed rows.
-
-        Raises
-        ------
-        InputError
-            If a contact was a point in one stance and a flat foot in another.
-        """
+        """Return the record as a `Rollout`."""
         # the stance before the first row is a walk's last one of the run before: it must not count
         contacts = self._stances[0] if self._stances else self._initial_stance
         for contact in (contact for stance in dict.fromkeys(self._stances) for contact in stance):

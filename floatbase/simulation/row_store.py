@@ -72,20 +72,6 @@ class RowStore:
 
     The file is in JSON Lines format: the first line describes the sweep, and each further line is a
     completed point. The file is locked while the store is open. An incomplete last line is removed.
-
-    Parameters
-    ----------
-    path : str or Path or None
-        Path of the file; None stores nothing.
-    name : str
-        Name of the function.
-    points : sequence of dict
-        Parameters of all points, as JSON values.
-
-    Raises
-    ------
-    InputError
-        If the file holds something else, is in use by another sweep, or cannot be written to.
     """
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
@@ -118,13 +104,7 @@ class RowStore:
             raise
 
     def add(self, i: int, row: Row) -> None:
-        """Store the row of point i, as JSON values, and write it to the file at once.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written to, for example because the disk is full.
-        """
+        """Store the row of point i, as JSON values, and write it to the file at once."""
         self.rows[i] = row
         if self._file >= 0:
             self._write(json.dumps({"point": i, **row}))

@@ -98,20 +98,7 @@ PRESETS = {
 
 
 def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
-    """Compute the point that the camera looks at, and its own position.
-
-    Parameters
-    ----------
-    view : View
-        The view.
-    low, high : ndarray, shape (3,)
-        Corners of the box that fills the picture, in the world frame [m].
-
-    Returns
-    -------
-    tuple of ndarray, shape (3,)
-        Target and position of the camera, in the world frame [m].
-    """
+    """Compute the point that the camera looks at, and its own position."""
     if view.around is None:
         target, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     else:
@@ -127,15 +114,7 @@ def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 class FollowingCamera:
-    """The camera of a viewer: it looks at a robot, and can follow it.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot that fills the picture.
-    follows : bool
-        Whether the camera follows the robot.
-    """
+    """The camera of a viewer: it looks at a robot, and can follow it."""
 
     def __init__(self, robot: Robot, follows: bool):
         self.robot, self.follows = robot, follows
@@ -144,24 +123,7 @@ class FollowingCamera:
     def commands(
         self, painter: Painter, view: View, state: State | None, followed: str = ROBOT
     ) -> tuple[protocol.Update, ...]:
-        """Return the commands for the camera, for what it follows, and for the presets.
-
-        Parameters
-        ----------
-        painter : Painter
-            The painter of the viewer, which knows the robot's size and the ground.
-        view : View
-            Where to look from.
-        state : State or None
-            Current state of the robot; None for the standing pose.
-        followed : str, optional
-            Path of the item that the camera follows.
-
-        Returns
-        -------
-        tuple of Update
-            The commands.
-        """
+        """Return the commands for the camera, for what it follows, and for the presets."""
         self._state = state
         presets = protocol.set_views(
             {name: self._placement(painter, preset) for name, preset in PRESETS.items()}
@@ -173,20 +135,7 @@ class FollowingCamera:
         )
 
     def follow_command(self, painter: Painter, followed: str) -> protocol.Update:
-        """Return the command that sets what the camera follows; nothing if it does not follow.
-
-        Parameters
-        ----------
-        painter : Painter
-            The painter of the viewer.
-        followed : str
-            Path of the item to follow.
-
-        Returns
-        -------
-        Update
-            The command.
-        """
+        """Return the command that sets what the camera follows; nothing if it does not follow."""
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self.follows and self.robot.is_floating
         start = (self._state or painter.standing).joint_transforms[1][:3, 3]

@@ -23,10 +23,7 @@ COLUMNS = ("", "model", "reality")
 
 
 class Controls:
-    """The controls of a window's page, in a panel beside the picture.
-
-    All callbacks run in the window's thread.
-    """
+    """The controls of a window's page, in a panel beside the picture."""
 
     window: Window
 
@@ -46,36 +43,7 @@ class Controls:
         at_most: str = "",
         on_release: bool = False,
     ) -> None:
-        """Add a slider to the panel in the page.
-
-        Parameters
-        ----------
-        name : str
-            Label of the slider.
-        changed : callable
-            Called as `changed(value)` when the reader moves the slider, in the window's thread.
-        value : float
-            Initial value, restored by a double click, in the slider's own unit like `low`, `high`
-            and `step`.
-        low, high : float
-            Range of the slider.
-        step : float, optional
-            Smallest step.
-        section : str, optional
-            Heading under which the slider appears; "" for the top of the panel, which is always
-            open.
-        column : {"", "model", "reality"}, optional
-            Column of the slider in a row of two; the name must end in this word.
-        at_most : str, optional
-            Word shown instead of the highest value, such as "ideal".
-        on_release : bool, optional
-            Whether to call `changed` only when the slider is released.
-
-        Raises
-        ------
-        InputError
-            If `value` is outside the range, or if `name` does not end in `column`.
-        """
+        """Add a slider to the panel in the page."""
         low, high = as_number("low", low), as_number("high", high, minimum=as_number("low", low))
         value, step = as_number("value", value, "", low, high), as_positive("step", step)
         place: dict[str, Any] = _placement(name, section, column) | (
@@ -87,38 +55,14 @@ class Controls:
         self._add_control(name, changed, value=value, min=low, max=high, step=step, **place)
 
     def add_button(self, name: str, pressed: Callable[[], None], section: str = "") -> None:
-        """Add a button to the panel in the page.
-
-        Parameters
-        ----------
-        name : str
-            Label of the button.
-        pressed : callable
-            Called as `pressed()` when the button is pressed, in the window's thread.
-        section : str, optional
-            Heading under which the button appears; "" for the top of the panel, which is always
-            open.
-        """
+        """Add a button to the panel in the page."""
         as_callable("pressed", pressed, "pressed()")
         self._add_control(name, lambda _: pressed(), **_placement(name, section))
 
     def add_checkbox(
         self, name: str, changed: Callable[[bool], None], value: bool, section: str = ""
     ) -> None:
-        """Add a check box to the panel in the page.
-
-        Parameters
-        ----------
-        name : str
-            Label of the check box.
-        changed : callable
-            Called as `changed(value)` when the reader changes it, in the window's thread.
-        value : bool
-            Initial value.
-        section : str, optional
-            Heading under which the check box appears; "" for the top of the panel, which is always
-            open.
-        """
+        """Add a check box to the panel in the page."""
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(name, changed, value=as_bool("value", value), **_placement(name, section))
 
@@ -130,26 +74,7 @@ class Controls:
         value: int = 0,
         section: str = "",
     ) -> None:
-        """Add a drop-down list to the panel in the page.
-
-        Parameters
-        ----------
-        name : str
-            Label of the list.
-        changed : callable
-            Called as `changed(value)` with the index of the chosen entry, in the window's thread.
-        choices : sequence of str
-            Entries of the list, at least one.
-        value : int, optional
-            Index of the initial entry.
-        section : str, optional
-            Heading under which the list appears; "" for the top of the panel, which is always open.
-
-        Raises
-        ------
-        InputError
-            If `choices` is empty, or if it has no entry `value`.
-        """
+        """Add a drop-down list to the panel in the page."""
         choices = as_strings("choices", choices)
         if not choices:
             raise InputError("choices is empty; it must have at least one entry.")
@@ -162,21 +87,7 @@ class Controls:
     def add_toggle(
         self, name: str, changed: Callable[[bool], None], value: bool, symbol: str, part: str
     ) -> None:
-        """Add a toggle for a term of an equation, above the picture.
-
-        Parameters
-        ----------
-        name : str
-            Purpose of the toggle, for its tooltip and for screen readers.
-        changed : callable
-            Called as `changed(value)` in the window's thread; `value` is True if the toggle is on.
-        value : bool
-            Whether the toggle is on initially.
-        symbol : str
-            Symbol of the term; toggles of the same symbol are stacked.
-        part : str
-            "shown" for the symbol itself, else the text on the toggle.
-        """
+        """Add a toggle for a term of an equation, above the picture."""
         changed = as_callable("changed", changed, "changed(value)")
         self._add_control(
             name,
@@ -187,19 +98,7 @@ class Controls:
         )
 
     def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
-        """Write text into the panel, or change it.
-
-        Parameters
-        ----------
-        name : str
-            Name that identifies the text.
-        words : str
-            The text.
-        section : str, optional
-            Heading under which the text appears; "" for the top of the panel, which is always open.
-        code : bool, optional
-            Whether the text is a program; it then has a button that copies it.
-        """
+        """Write text into the panel, or change it."""
         place = _placement(name, section)
         self.window.put(
             [
@@ -214,19 +113,7 @@ class Controls:
         )
 
     def add_plot_point(self, name: str, t: float, value: float, unit: str = "") -> None:
-        """Add a point to the plot of a quantity over the last seconds, at the top of the panel.
-
-        Parameters
-        ----------
-        name : str
-            Name of the quantity.
-        t : float
-            Time [s].
-        value : float
-            Value of the quantity, in `unit`.
-        unit : str, optional
-            Unit of the value.
-        """
+        """Add a point to the plot of a quantity over the last seconds, at the top of the panel."""
         point = {
             "t": as_number("t", t, "s"),
             "value": as_number("value", value),
@@ -237,16 +124,7 @@ class Controls:
         )
 
     def on_drag(self, pushed: Callable[[float, float], None], max_force: float) -> None:
-        """Set the function that is called when the user drags the robot with Shift held down.
-
-        Parameters
-        ----------
-        pushed : callable
-            Called as `pushed(force, towards)` in the window's thread when the user lets go:
-            force [N] and horizontal direction [°], 0 for +x and 90 for +y of the world frame.
-        max_force : float
-            Force of the longest drag [N].
-        """
+        """Set the function that is called when the user drags the robot with Shift held down."""
         pushed = as_callable("pushed", pushed, "pushed(force, towards)")
         max_force = as_positive("max_force", max_force, "N")
         direction = 0.0
@@ -264,20 +142,7 @@ class Controls:
         self._add_control("push [N]", let_go, min=0.0, max=max_force, **hidden)
 
     def set_control_value(self, name: str, value: float | bool) -> None:
-        """Show another value in a control, without calling its callback.
-
-        Parameters
-        ----------
-        name : str
-            Name of the control.
-        value : float or bool
-            Value to show.
-
-        Raises
-        ------
-        ViewerError
-            If there is no control of this name.
-        """
+        """Show another value in a control, without calling its callback."""
         self.window.scene.set_control_value(as_string("name", name), value, "")
         self.window.put([])
 

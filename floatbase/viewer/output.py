@@ -31,30 +31,7 @@ class Output:
     def save(
         self, path: str | Path, title: str | None = None, size: tuple[int, int] = (960, 600)
     ) -> Path:
-        """Write the scene to a file in the format of its extension.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write. An .html file is one page, still or moving, that needs neither server nor
-            network. .mp4 and .gif files contain the recording at the speed of `play`, a .png file
-            its first picture; these need a browser and `pip install "floatbase[video]"`.
-        title : str, optional
-            Title of the page.
-        size : tuple of int, optional
-            Width and height of films and images [pixels], even numbers.
-
-        Returns
-        -------
-        Path
-            Path of the file.
-
-        Raises
-        ------
-        ViewerError
-            If nothing has been drawn yet, if the extension is unknown, or if the file cannot be
-            written.
-        """
+        """Write the scene to a file in the format of its extension."""
         target = Path(as_string("path", str(path) if isinstance(path, Path) else path))
         if self.window.scene.is_empty:
             raise ViewerError(
@@ -80,38 +57,12 @@ class Output:
         return target
 
     def static_html(self, title: str | None = None) -> str:
-        """Return the current scene as one HTML page that needs neither server nor network.
-
-        Parameters
-        ----------
-        title : str, optional
-            Title of the page; by default, the robot's name.
-
-        Returns
-        -------
-        str
-            HTML of the page.
-        """
+        """Return the current scene as one HTML page that needs neither server nor network."""
         title = "" if title is None else as_string("title", title)
         return pages.file_page(self.window.scene.file_commands(), title or self.robot.name)
 
     def widget(self) -> Widget:
-        """Make a widget that shows the picture, for use in panels.
-
-        The widget is live until the viewer is displayed again; then it shows the image with which
-        it opened. If the environment variable FLOATBASE_VIEWER is "static", or if the viewer is
-        closed, the widget is a static copy of the scene.
-
-        Returns
-        -------
-        Widget
-            The widget.
-
-        Raises
-        ------
-        ViewerError
-            If anywidget is not installed.
-        """
+        """Make a widget that shows the picture, for use in panels."""
         if self._is_static:
             import ipywidgets
 
@@ -123,10 +74,7 @@ class Output:
         )
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """Return the live picture, and an image of it for readers that cannot show widgets.
-
-        A program that stores notebooks can replace both; see `MIMEBUNDLES`.
-        """
+        """Return the live picture, and an image of it for readers that cannot show widgets."""
         if (bundle := MIMEBUNDLES.get(display_mode())) is not None:
             return bundle(self)
         if self._is_static:

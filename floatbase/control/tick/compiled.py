@@ -39,18 +39,7 @@ _JOINTS = (
 def announce_if_slow(
     text: str, is_true: Callable[[], bool] = lambda: True, after: float = 6.0
 ) -> Iterator[None]:
-    """Print a message to stderr if the enclosed code takes more than `after` seconds.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-    is_true : callable, optional
-        Called as is_true() after that time, and every second from then on. The message is printed
-        when `is_true` first returns True.
-    after : float, optional
-        Delay [s].
-    """
+    """Print a message to stderr if the enclosed code takes more than `after` seconds."""
     ended = Event()
 
     def announce() -> None:
@@ -82,20 +71,7 @@ def cache_warning() -> str:
 
 
 def unsupported_reason(problem: Problem, solver: str) -> str:
-    """Return why a problem cannot run compiled, or "" if it can.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    solver : str
-        Name of the requested QP solver.
-
-    Returns
-    -------
-    str
-        The reason, or "".
-    """
+    """Return why a problem cannot run compiled, or "" if it can."""
     if solver != "daqp":
         return f"solver {solver!r} was requested, but the compiled controller has its own solver"
     try:
@@ -132,38 +108,7 @@ def _unsupported_robot_reason(robot: Robot) -> str:
 
 
 class CompiledTick:
-    """The compiled controller of one problem, for which `unsupported_reason` returns "".
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
-    Attributes
-    ----------
-    qdd, tau, forces : slice
-        Slices of q̈, τ and λ in the array of a result.
-    layout : TargetLayout
-        Positions of the targets in the array of all targets.
-    infeasible : int
-        Code of a tick that has no solution.
-    unchecked_tasks : list of Task
-        Tasks that the problem arrays do not check: user-defined and time-varying ones.
-    arguments : tuple
-        Arguments of `tick.tick` after q, v and `TickInputs.packed`, without the result and the
-        number of stages.
-    default_inputs : TickInputs
-        Inputs without a state: zeros for time-varying targets, and no user-defined terms.
-    workspace : tuple of ndarray
-        Memory of the tick, for real numbers and for integers.
-
-    Raises
-    ------
-    UnknownNameError
-        If a frame does not exist.
-    InputError
-        If a constant target has the wrong shape.
-    """
+    """The compiled controller of one problem, for which `unsupported_reason` returns ""."""
 
     def __init__(self, problem: Problem):
         from floatbase.control.tick import dual_search, tick
@@ -212,26 +157,7 @@ class CompiledTick:
     def __call__(
         self, q: Array, v: Array, t: float, targets: Array | None = None
     ) -> tuple[Array, int, TickInputs] | None:
-        """Run one tick, or return None if the reference backend must decide.
-
-        Parameters
-        ----------
-        q : ndarray, shape (nq,)
-            Configuration, a writable float64 array.
-        v : ndarray, shape (nv,)
-            Generalized velocity, base part in the base frame [m/s, rad/s], a writable float64
-            array.
-        t : float
-            Time [s].
-        targets : ndarray, shape (n,), optional
-            All targets, in the order of `layout`; by default those of the tasks.
-
-        Returns
-        -------
-        tuple or None
-            The array of numbers that `tick.tick` fills, the number of active inequalities or the
-            code `infeasible`, and the inputs of the tick.
-        """
+        """Run one tick, or return None if the reference backend must decide."""
         if q.shape != self._q_shape or v.shape != self._v_shape:
             return None
         inputs: TickInputs | None = self.default_inputs
@@ -247,13 +173,7 @@ class CompiledTick:
         return (result, n_active, inputs) if decided else None
 
     def warm_up(self) -> str:
-        """Run one tick outside the loop, which compiles the code or loads it from disk.
-
-        Returns
-        -------
-        str
-            Why the tick cannot be compiled, or "".
-        """
+        """Run one tick outside the loop, which compiles the code or loads it from disk."""
         from floatbase.control.tick import jit, tick
 
         duration = cache_warning() or ". This happens once and takes about a minute"
@@ -290,18 +210,7 @@ class CompiledTick:
             self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
 
     def empty_result(self, inputs: TickInputs) -> Array:
-        """Return an uninitialized array for the numbers of one tick.
-
-        Parameters
-        ----------
-        inputs : TickInputs
-            Inputs of the tick.
-
-        Returns
-        -------
-        ndarray
-            The array.
-        """
+        """Return an uninitialized array for the numbers of one tick."""
         size = self.forces.stop + 2 * self._n_multipliers
         if self._has_soft:
             size += 2 * self._problem.robot.d + sum(len(h) for _, h in inputs.inequalities)
@@ -311,22 +220,6 @@ class CompiledTick:
         """Return the reference QP of a tick, with the values that user functions returned in it.
 
         The functions are not called again, since they might return other values.
-
-        Parameters
-        ----------
-        q : ndarray, shape (nq,)
-            Configuration.
-        v : ndarray, shape (nv,)
-            Generalized velocity, base part in the base frame [m/s, rad/s].
-        t : float
-            Time [s].
-        inputs : TickInputs
-            Inputs of the tick.
-
-        Returns
-        -------
-        QP
-            The QP.
         """
         eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
         for i, task in enumerate(self.layout.fixed_tasks(inputs.packed[: self.layout.size])):
@@ -341,22 +234,7 @@ class CompiledTick:
         )
 
     def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
-        """Return the multipliers of all inequalities of the reference QP.
-
-        Parameters
-        ----------
-        result : ndarray
-            Numbers that a call returned.
-        n_active : int
-            Number of active inequalities.
-        inputs : TickInputs
-            Inputs of the tick.
-
-        Returns
-        -------
-        ndarray
-            One multiplier for each inequality, zero if it is inactive.
-        """
+        """Return the multipliers of all inequalities of the reference QP."""
         limits, contacts = self._problem.limits, self._problem.contacts
         # the reference QP has rows for limited joints only
         limited, d = np.isfinite(limits.torque_limits), limits.torque_limits.size
@@ -394,25 +272,7 @@ class CompiledTick:
     def inputs_at(
         self, q: Array, v: Array, t: float, targets: Array | None = None
     ) -> TickInputs | None:
-        """Return the inputs of a tick, in new arrays since other threads may run ticks too.
-
-        Parameters
-        ----------
-        q : ndarray, shape (nq,)
-            Configuration.
-        v : ndarray, shape (nv,)
-            Generalized velocity, base part in the base frame [m/s, rad/s].
-        t : float
-            Time [s].
-        targets : ndarray, shape (n,), optional
-            All targets, in the order of `layout`; by default those of the tasks.
-
-        Returns
-        -------
-        TickInputs or None
-            None if something is wrong with the inputs. The reference backend then finds and reports
-            the error.
-        """
+        """Return the inputs of a tick, in new arrays since other threads may run ticks too."""
         try:
             if targets is None:
                 targets = self.layout.at(t) if self.layout.varies else self.layout.constant

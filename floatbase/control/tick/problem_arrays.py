@@ -36,23 +36,7 @@ PolyhedronOptions: TypeAlias = tuple[
 
 
 class Dynamics:
-    """Pinocchio's results for one robot.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Attributes
-    ----------
-    views : tuple of ndarray
-        M (nv, nv), h (nv,), J (6, nv), Ag (6, nv), poses of all joints (n, 12). Every `update`
-        overwrites them.
-    tree, links : ndarray
-        As in `kinematics.Bodies`.
-    lock : Lock
-        Held from `update` until the views have been read.
-    """
+    """Pinocchio's results for one robot."""
 
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
 

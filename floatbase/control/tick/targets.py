@@ -42,22 +42,7 @@ class TaskTargets(NamedTuple):
 
 
 class TargetLayout:
-    """Positions of all targets in one array: those of the tasks with a compiled form.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
-    Attributes
-    ----------
-    tasks : list of TaskTargets
-        The tasks, in the problem's order.
-    size : int
-        Length of the array.
-    names : mapping of str to slice
-        Entries of each task: the target, then its derivatives, each row by row.
-    """
+    """Positions of all targets in one array: those of the tasks with a compiled form."""
 
     def __init__(self, problem: Problem):
         self._problem, self.size, self.tasks = problem, 0, list[TaskTargets]()
@@ -82,18 +67,7 @@ class TargetLayout:
         return bool(self._varying)
 
     def at(self, t: float) -> Array:
-        """Return all targets at a time, a new array.
-
-        Parameters
-        ----------
-        t : float
-            The time [s].
-
-        Raises
-        ------
-        InputError
-            If a target is not valid.
-        """
+        """Return all targets at a time, a new array."""
         targets, each_varying = self.constant.copy(), self._varying
         for each in each_varying:
             self._write(each, targets, t)
@@ -118,18 +92,7 @@ class TargetLayout:
             first += value.size
 
     def fixed_tasks(self, targets: Array) -> list[Task]:
-        """Return the problem's tasks with constant targets from an array.
-
-        Parameters
-        ----------
-        targets : ndarray, shape (n,)
-            All targets.
-
-        Raises
-        ------
-        InputError
-            If a target is not valid.
-        """
+        """Return the problem's tasks with constant targets from an array."""
         tasks: list[Task] = list(self._problem.tasks)
         for each in self.tasks:
             values, first = {}, each.entries.start
@@ -140,18 +103,7 @@ class TargetLayout:
         return tasks
 
     def fixed_problem(self, targets: Array) -> Problem:
-        """Return the problem with constant targets from an array.
-
-        Parameters
-        ----------
-        targets : ndarray, shape (n,)
-            All targets.
-
-        Raises
-        ------
-        InputError
-            If a target is not valid.
-        """
+        """Return the problem with constant targets from an array."""
         tasks = self.fixed_tasks(as_array("targets", targets, (self.size,)))
         for each in self.tasks:  # checks that need the robot
             cast(TargetTask, tasks[each.task_index]).targets_at(

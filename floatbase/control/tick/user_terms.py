@@ -41,20 +41,7 @@ class TickInputs(NamedTuple):
 
 
 class UserTerms:
-    """User-defined objects of a problem, which the problem arrays do not contain.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
-    Attributes
-    ----------
-    any : bool
-        Whether the problem has user-defined objects.
-    varies : bool
-        Whether these objects, or a bound of a normal force, must be evaluated at every tick.
-    """
+    """User-defined objects of a problem, which the problem arrays do not contain."""
 
     def __init__(self, problem: Problem):
         self._problem, self._limits = problem, problem.limits

@@ -21,10 +21,7 @@ def _go2() -> Robot:
 
 @cache
 def _sum_of_forces(up: float = UP) -> float:
-    """Compute the vertical contact force from M q̈ + h, with neither the mass nor the weight.
-
-    The whole robot accelerates upwards.
-    """
+    """Compute the vertical contact force from M q̈ + h, with neither the mass nor the weight."""
     state = _go2().standing()  # its base is level, so the third row is vertical
     qdd = np.zeros(_go2().nv)
     qdd[2] = up

@@ -23,18 +23,7 @@ from floatbase.robots import PLATE_SIZE, with_floating_base
 
 
 def _actuation_of_solo8(belt: float = 1.0, torque: int = 1) -> Array:
-    """Return S, column by column, from the angles by which the joints turn the motors.
-
-    A joint velocity turns the motor in this joint, and the hip also turns the motor that the belt
-    connects with the knee. By equal power, S is the transpose of this map.
-
-    Parameters
-    ----------
-    belt : float
-        Lever arm of the belt on the hip [-].
-    torque : int
-        Index of the motor with the belt: 1 for the knee of the front left leg.
-    """
+    """Return S, column by column, from the angles by which the joints turn the motors."""
     robot = fb.load("solo8")
     turns = np.hstack([np.zeros((robot.d, 6)), np.eye(robot.d)])
     turns[torque, 6 + (torque - 1 if torque % 2 else torque + 1)] = belt
@@ -42,11 +31,7 @@ def _actuation_of_solo8(belt: float = 1.0, torque: int = 1) -> Array:
 
 
 def _held_width() -> float:
-    """Return the width of the plate whose rear edge is where the force of the floor acts [m].
-
-    The base rows for q̈ = 0 give the force and moment of the plate on the base. The centre of
-    pressure follows from them.
-    """
+    """Return the width of the plate whose rear edge is where the force of the floor acts [m]."""
     state = _on_the_plate()
     wrench = (state.h - state.frame_jacobian("tool0")[:3].T @ np.array([-120.0, 0.0, 0.0]))[:6]
     about_the_floor = wrench[4] + state.point("base_link")[2] * wrench[0]
@@ -65,12 +50,7 @@ def _by_levers(
     below: float = 0.0,
     ahead: float | None = None,
 ) -> float:
-    """Return the width at which push and weight have equal moments about the rear edge [m].
-
-    The parameters change one quantity at a time, for known mistakes: press and weight [N], below:
-    part of the tool's height that does not count [m], ahead: distance of the weight from the middle
-    [m].
-    """
+    """Return the width at which push and weight have equal moments about the rear edge [m]."""
     state = _on_the_plate()
     height, weight = (
         state.point("tool0")[2] - below,
@@ -87,10 +67,7 @@ def _in_proportion() -> float:
 
 @array_judge((4, 3), (12,))
 def _judge_thrust(f: Array) -> Verdict:
-    """Judge thrusts at the four feet of a standing go2.
-
-    The thrusts must add up to 200 N straight up, without a moment about the centre of mass.
-    """
+    """Judge thrusts at the four feet of a standing go2."""
     f = f.reshape(4, 3)
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))

@@ -31,44 +31,12 @@ LIFT_URDF = """
 
 
 def joint_turn(joint: int, angle: float, duration: float) -> Callable[[float], Array]:
-    """Return a path that turns one of six joints; it starts and ends at rest.
-
-    Parameters
-    ----------
-    joint : int
-        Index of the joint, from 0.
-    angle : float
-        Angle of the turn [rad].
-    duration : float
-        Duration [s].
-
-    Returns
-    -------
-    callable
-        The path for `joint_servo`: a function of time [s] that returns joint offsets, shape (6,),
-        [rad].
-    """
+    """Return a path that turns one of six joints; it starts and ends at rest."""
     return lambda t: angle * minimum_jerk(t / duration)[0] * np.eye(6)[joint]
 
 
 def joint_circle(first: int, second: int, size: float, duration: float) -> Callable[[float], Array]:
-    """Return a path on which two of six joints go once around a circle; it starts and ends at rest.
-
-    Parameters
-    ----------
-    first, second : int
-        Indices of the joints, from 0.
-    size : float
-        Radius of the circle [rad].
-    duration : float
-        Duration [s].
-
-    Returns
-    -------
-    callable
-        The path for `joint_servo`: a function of time [s] that returns joint offsets, shape (6,),
-        [rad].
-    """
+    """Return a path on which two of six joints go once around a circle, from rest to rest."""
 
     def path(t: float) -> Array:
         angle = 2.0 * np.pi * minimum_jerk(t / duration)[0]
@@ -78,35 +46,13 @@ def joint_circle(first: int, second: int, size: float, duration: float) -> Calla
 
 
 def weightless_simulation(robot: Robot) -> fb.Simulation:
-    """Return a simulation of a robot without gravity.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    Simulation
-        The simulation.
-    """
+    """Return a simulation of a robot without gravity."""
     sim = fb.Simulation(robot)
     sim.model.opt.gravity[:] = 0.0
     return sim
 
 
 def base_rotation(record: Rollout) -> Array:
-    """Return how far the base turned in a record.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Rotation vector (axis times angle) from the first row to the last, in the world frame [°].
-    """
+    """Return how far the base turned in a record."""
     first, last = (record.state(i).frame_pose("base_link").rotation for i in (0, -1))
     return read_only(np.degrees(pin.log3(last @ first.T)))

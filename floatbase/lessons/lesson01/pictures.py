@@ -42,22 +42,7 @@ def show_arm(view: Viewer, state: fb.State) -> Viewer:
 
 
 def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """Return a panel for Figure 1, left: a slider sets how hard the arm presses against a wall.
-
-    The wall responds with f_r, and the bolts with a force and τ_b.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    state : State
-        The bolted arm at rest with its tool at the wall.
-
-    Returns
-    -------
-    SliderPanel
-        The panel.
-    """
+    """Return a panel for Figure 1, left: a slider sets how hard the arm presses against a wall."""
     view.show(state, com=False)
     view.camera(PRESSING_VIEW)
     tool = state.point("tool0")
@@ -117,10 +102,7 @@ def play_pressing(view: Viewer, record: Rollout) -> Viewer:
 
 
 def play_floating(view: Viewer, record: Rollout) -> Viewer:
-    """Play a record of the arm without bolts, gravity and ground, with axes on its base.
-
-    A ghost shows the initial state.
-    """
+    """Play a record of the arm without bolts, gravity and ground, with axes on its base."""
 
     def picture(state: fb.State, i: int) -> Picture:
         return _without_ground(_draw_arm(view, state, first=record.state(0)))
@@ -130,10 +112,7 @@ def play_floating(view: Viewer, record: Rollout) -> Viewer:
 
 
 def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
-    """Return a panel with go2 in the air: a slider swings its legs.
-
-    The base stays in place, but the centre of mass moves (note 3 of the course text).
-    """
+    """Return a panel with go2 in the air: a slider swings its legs."""
     first = state.robot.nv - state.robot.d
     swing = np.zeros(state.robot.nv)
     swing[[first + i for i, name in enumerate(state.robot.joint_names) if "thigh" in name]] = -1.0
@@ -154,10 +133,7 @@ def com_panel(view: Viewer, state: fb.State) -> SliderPanel:
 
 
 def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """Return a panel for Figure 1, right: sliders set the acceleration of the body.
-
-    The feet respond with the forces f_i, which add up to f_c and τ_c.
-    """
+    """Return a panel for Figure 1, right: sliders set the acceleration of the body."""
 
     def draw(forwards: float, up: float, turn: float) -> str:
         tasks: list[Task] = [
@@ -183,15 +159,7 @@ def stance_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slider
 
 
 def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> SliderPanel:
-    """Return a panel with go2 in space and a thruster at every foot.
-
-    Sliders set the vertical thrust of the left and of the right feet, and a horizontal thrust that
-    points forwards at the left feet and backwards at the right feet.
-
-    Notes
-    -----
-    [FBR]_, eq. (4).
-    """
+    """Return a panel with go2 in space and a thruster at every foot."""
     eom = fb.equations_of_motion(state, contacts)
     left = np.array([name[1] == "L" for name in contacts.names])
     gravity, feet = np.array([0.0, 0.0, 9.81]), contacts.positions(state)

@@ -28,27 +28,7 @@ def run_constant_torques(
     motion: MotionSolver,
     duration: float = 0.2,
 ) -> Rollout:
-    """Simulate a robot under constant torques, with the contact forces of (7) as planned forces.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    contacts : Contacts
-        Contacts in (7).
-    tau : array_like, shape (d,)
-        Torques [N·m].
-    motion : callable
-        Solver of (7): a function of (eom, τ, b) that returns (q̈, λ).
-    duration : float, optional
-        Duration [s].
-
-    Returns
-    -------
-    Rollout
-        The record. `planned` contains the λ of (7) in every millisecond, `measured` the contact
-        forces of the physics engine.
-    """
+    """Simulate a robot under constant torques, with the contact forces of (7) as planned forces."""
     torques = np.array(tau, dtype=np.float64)
 
     def by_equation(q: Array, v: Array) -> Array:
@@ -61,37 +41,13 @@ def run_constant_torques(
 
 
 def foot_displacement(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:
-    """Return how far the feet have moved from their first position.
-
-    Parameters
-    ----------
-    states : sequence of State
-        The states.
-    contacts : Contacts
-        The feet.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Largest displacement of a foot in each state [m].
-    """
+    """Return how far the feet have moved from their first position."""
     places = np.array([contacts.positions(state) for state in states])
     return np.asarray(np.linalg.norm(places - places[0], axis=2).max(axis=1))
 
 
 def tool_displacement(record: Rollout) -> Array:
-    """Return how far the tool of an arm has moved from its first position.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Displacement of the tool in each row [mm].
-    """
+    """Return how far the tool of an arm has moved from its first position."""
     places = np.array([record.state(i).point("tool0") for i in range(len(record))])
     return 1e3 * np.asarray(np.linalg.norm(places - places[0], axis=1))
 
@@ -102,12 +58,7 @@ def load_disc() -> Robot:
 
 
 def rolling_wheel() -> RollingWheel:
-    """Return the rolling constraint of the disc of `load_disc` on level ground.
-
-    Notes
-    -----
-    [FBR]_, eq. (6).
-    """
+    """Return the rolling constraint of the disc of `load_disc` on level ground."""
     return RollingWheel("disc", np.array([0.0, 1.0, 0.0]), DISC_RADIUS)
 
 
@@ -115,28 +66,7 @@ def disc_state(
     robot: Robot, place: Sequence[float] = (0.0, 0.0), heading: float = 0.0, rolled: float = 0.0,
     speed: float = 0.0, turning: float = 0.0,
 ) -> fb.State:  # fmt: skip
-    """Return a state of the disc, upright on the ground and rolling without slip.
-
-    Parameters
-    ----------
-    robot : Robot
-        The disc.
-    place : sequence of float, optional
-        x and y of its centre in the world frame [m].
-    heading : float, optional
-        Direction of rolling: angle about the vertical [rad]; 0 is along x.
-    rolled : float, optional
-        Angle by which the disc has turned about its axle [rad].
-    speed : float, optional
-        Speed along its heading [m/s].
-    turning : float, optional
-        Angular velocity about the vertical [rad/s].
-
-    Returns
-    -------
-    State
-        The state.
-    """
+    """Return a state of the disc, upright on the ground and rolling without slip."""
     R = pin.utils.rotate("z", heading) @ pin.utils.rotate("y", rolled)
     velocity = speed * np.array([np.cos(heading), np.sin(heading), 0.0])
     omega = speed / DISC_RADIUS * R[:, 1] + turning * np.array([0.0, 0.0, 1.0])
@@ -147,26 +77,7 @@ def disc_state(
 def parking_states(
     robot: Robot, distance: float = 0.5, angle: float = 0.7, steps: int = 20
 ) -> list[fb.State]:
-    """Return the states of a disc that parks: it rolls ahead, turns, rolls back and turns back.
-
-    Each of the four parts takes 1 s.
-
-    Parameters
-    ----------
-    robot : Robot
-        The disc.
-    distance : float, optional
-        Distance that the disc rolls [m].
-    angle : float, optional
-        Angle that the disc turns [rad].
-    steps : int, optional
-        States per second.
-
-    Returns
-    -------
-    list of State
-        The states, with their velocities.
-    """
+    """Return the states of a disc that parks: it rolls ahead, turns, rolls back and turns back."""
     states, x, y, heading, rolled = [], 0.0, 0.0, 0.0, 0.0
     for speed, turning in ((distance, 0.0), (0.0, angle), (-distance, 0.0), (0.0, -angle)):
         for _ in range(steps):

@@ -25,24 +25,7 @@ MOMENT_SCALE = 0.01  # m drawn for a newton metre
 
 
 def draw_equation(eom: EquationsOfMotion) -> Figure:
-    """Draw (4) to scale for four point feet: the non-zero entries of M, h, S and Jᵀ.
-
-    The base rows are above the line.
-
-    Parameters
-    ----------
-    eom : EquationsOfMotion
-        The equations of motion.
-
-    Returns
-    -------
-    Figure
-        The figure.
-
-    Notes
-    -----
-    [FBR]_, eq. (4).
-    """
+    """Draw (4) to scale for four point feet: the non-zero entries of M, h, S and Jᵀ."""
     feet = [str(name).split("_")[0] for name in eom.contacts.names]
     # middle of each leg's joints, and of each foot's force
     in_threes = 3.0 * np.arange(len(feet)) + 1.0
@@ -68,27 +51,7 @@ def draw_equation(eom: EquationsOfMotion) -> Figure:
 
 
 def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str) -> SliderPanel:
-    """Return a panel with sliders for a force at one foot.
-
-    The picture shows the force and moment on the base that follow by Jᵀ. The note lists Jᵀ λ: the
-    base rows and the torques of the leg.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    state : State
-        State of the robot.
-    contacts : Contacts
-        Its contacts.
-    foot : str
-        Name of the foot in `contacts`.
-
-    Returns
-    -------
-    SliderPanel
-        The panel.
-    """
+    """Return a panel with sliders for a force at one foot."""
     J = fb.equations_of_motion(state, contacts).J[contacts.force_slice(foot)]
     base = state.frame_pose("base")
     leg = [i for i, name in enumerate(state.robot.joint_names) if name.startswith(foot[:2])]
@@ -134,22 +97,7 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
 
 
 def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> Viewer:
-    """Play the arm without b, and the arm with b as a ghost.
-
-    A pin marks the initial position of the tool. A thick line leads from there to the tool.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    without_b, with_b : Rollout
-        Records of the same length.
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Play the arm without b, and the arm with b as a ghost."""
     home, colour = without_b.state(0).point("tool0"), view.painter.text_colour
     pin = {"home/pin": shapes.rod(home, np.eye(3), 0.24, 0.005, colour)}
     pin["home/name"] = shapes.label(home + [0.0, 0.0, 0.27], "home", 0.035, colour)
@@ -176,26 +124,7 @@ def play_collapse_comparison(
     contacts: fb.Contacts,
     duration: float,
 ) -> Viewer:
-    """Play the robot without b, and the robot with b as a ghost.
-
-    Marks show where the feet belong, and lines lead from there to the feet.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    without_b, with_b : sequence of State
-        The same number of states.
-    contacts : Contacts
-        The pinned feet.
-    duration : float
-        Time from the first state to the last [s].
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Play the robot without b, and the robot with b as a ghost."""
     places = contacts.positions(without_b[0])
     home = {
         f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03)
@@ -228,10 +157,7 @@ def play_collapse_comparison(
 
 
 def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
-    """Return a panel with sliders for a parking disc: how far it rolls and turns, and the time.
-
-    The picture shows the disc at that time, its path on the ground, and its start and end.
-    """
+    """Return a panel with sliders for a parking disc: how far it rolls and turns, and the time."""
 
     def draw(distance: float, angle: float, time: float) -> str:
         states = parking_states(robot, distance, angle)

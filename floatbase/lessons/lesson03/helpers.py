@@ -16,12 +16,7 @@ from floatbase.robots import Robot
 
 @cache
 def standing_go2_eom() -> EquationsOfMotion:
-    """Return the equations of motion of go2 standing on four feet.
-
-    Notes
-    -----
-    [FBR]_, eq. (7).
-    """
+    """Return the equations of motion of go2 standing on four feet."""
     robot = fb.load("go2")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
 

@@ -72,26 +72,7 @@ def motion_bars(
     forces: npt.ArrayLike,
     full: tuple[float, float, float] = FULL,
 ) -> str:
-    """Draw all numbers of a quadruped's motion as bars, leg by leg.
-
-    Hovering over a bar shows its name, number and unit.
-
-    Parameters
-    ----------
-    qdd : array_like, shape (18,)
-        Acceleration [m/s², rad/s²].
-    tau : array_like, shape (12,)
-        Torques [N·m].
-    forces : array_like, shape (12,)
-        Contact forces [N].
-    full : tuple of float, optional
-        Value of a bar of full length for each of the three. A longer bar gets a dark end.
-
-    Returns
-    -------
-    str
-        The bars as HTML.
-    """
+    """Draw all numbers of a quadruped's motion as bars, leg by leg."""
     legs = ("front left", "front right", "rear left", "rear right")
     joints, axes = ("hip", "thigh", "knee"), ("x", "y", "z")
     qdd = np.asarray(qdd)
@@ -122,11 +103,7 @@ def motion_bars(
 
 
 def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: float) -> str:
-    """Draw the bars of q̈, τ or λ as SVG of a fixed size, which wraps but never shrinks.
-
-    title: text above, beginning with the symbol; blocks: three numbers each; values: shape
-    (len(blocks), 3); most: value of a bar of full length. Text has the colour of the page.
-    """
+    """Draw the bars of q̈, τ or λ as SVG of a fixed size, which wraps but never shrinks."""
     width, bottom = BLOCK * len(blocks), ZERO_LINE + FULL_BAR
     drawn = svg.element("text", title, y=12, font_size=13)
     drawn += svg.line((0, ZERO_LINE), (width, ZERO_LINE), stroke_opacity="0.5")

@@ -24,18 +24,7 @@ TOLERANCE = 1e-5
 
 
 def zeta_columns(eom: EquationsOfMotion | None = None) -> Array:
-    """Return the constant and the matrix of ζ side by side, shape (12, 13).
-
-    Parameters
-    ----------
-    eom : EquationsOfMotion, optional
-        Equations of motion; by default, those of the tilted go2.
-
-    Notes
-    -----
-    [FBR]_, eq. (9). The optimality conditions of min ½ x M x - x (S τ - h) subject to J x = b are
-    solved, with λ as the multiplier, so this does not repeat the expression that is asked for.
-    """
+    """Return the constant and the matrix of ζ side by side, shape (12, 13)."""
     eom = eom or tilted_go2_eom()
     nv, k = eom.nv, eom.k
     kkt = np.block([[eom.M, -eom.J.T], [eom.J, np.zeros((k, k))]])
@@ -231,11 +220,7 @@ def _fault_of_directions(V: Array) -> Verdict | None:
 
 
 def judge_all_pairs(answer: Any) -> Verdict:
-    """Judge the matrix of exercise 03.3.
-
-    The first column must be the shortest pair. The others may be any orthonormal basis of the null
-    space.
-    """
+    """Judge the matrix of exercise 03.3."""
     try:
         shape = np.shape(answer)
     except ValueError:  # rows of different lengths

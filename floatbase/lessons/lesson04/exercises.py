@@ -29,10 +29,7 @@ from floatbase.simulation import Rollout
 
 
 def _gradient_by_newton() -> Array:
-    """Compute the gradient from the contact forces: a_c = Σ f / m + g with λ = ζ(τ).
-
-    This computation needs neither the Jacobian nor the drift of the centre of mass.
-    """
+    """Compute the gradient from the contact forces: a_c = Σ f / m + g with λ = ζ(τ)."""
     eom = tilted_go2_eom()
     zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
     sums = np.tile(np.eye(3), 4) / mass

@@ -19,17 +19,7 @@ SETTLING_TIME = 0.02  # s in which the engine's soft contact settles
 
 
 class MinimumCostController:
-    """Controller that minimizes a cost on the torques in every control step.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    contacts : Contacts
-        Its contacts.
-    cost : callable
-        Function of the equations of motion that returns a `Quadratic` on τ.
-    """
+    """Controller that minimizes a cost on the torques in every control step."""
 
     def __init__(
         self, robot: Robot, contacts: fb.Contacts, cost: Callable[[EquationsOfMotion], fb.Quadratic]

@@ -105,21 +105,7 @@ def friction_ratios(contacts: fb.Contacts, forces: npt.ArrayLike) -> Array:
 
 
 class ConstantForceController:
-    """Controller that always commands the smallest torques for the same contact forces.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    contacts : Contacts
-        Its contacts.
-    forces : array_like, shape (k,)
-        Contact forces in the world frame [N].
-
-    Notes
-    -----
-    [FBR]_, eq. (25).
-    """
+    """Controller that always commands the smallest torques for the same contact forces."""
 
     def __init__(self, robot: Robot, contacts: fb.Contacts, forces: npt.ArrayLike):
         self.robot, self.contacts, self.forces = robot, contacts, as_forces(forces, contacts.k)
@@ -131,19 +117,7 @@ class ConstantForceController:
 
 
 def rotation_error(now: fb.State, goal: fb.State) -> Array:
-    """Return the rotation vector from the base's orientation in one state to that in another.
-
-    Parameters
-    ----------
-    now, goal : State
-        The actual and the desired state.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Rotation vector θ of the actual orientation relative to the desired one, in the world frame
-        [rad].
-    """
+    """Return the rotation vector from the base's orientation in one state to that in another."""
     R, R_goal = (state.frame_pose("base").rotation for state in (now, goal))
     return np.asarray(pin.log3(R @ R_goal.T))
 
@@ -159,21 +133,13 @@ def moving_and_goal_state() -> tuple[fb.State, fb.State]:
 
 @cache
 def arm_robot_eom() -> EquationsOfMotion:
-    """Return the equations of motion of anymal_kinova standing on four feet.
-
-    Notes
-    -----
-    [FBR]_, eq. (7).
-    """
+    """Return the equations of motion of anymal_kinova standing on four feet."""
     robot = fb.load("anymal_kinova")
     return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot, mu=0.7))
 
 
 def squeezed_standing_forces() -> Array:
-    """Return the contact forces of exercise 05.2, shape (12,), world frame [N].
-
-    The forces are those of standing still, with an internal force of 20 N between the front feet.
-    """
+    """Return the contact forces of exercise 05.2, shape (12,), world frame [N]."""
     space = fb.feasible_space(arm_robot_eom())
     forces = space.forces(standing_still_beta(space)).copy()
     for foot, side in (("LF_FOOT", 20.0), ("RF_FOOT", -20.0)):

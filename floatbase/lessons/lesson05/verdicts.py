@@ -52,10 +52,7 @@ STIFFNESS, DAMPING = 100.0, 20.0  # 1/s² and 1/s: gains of exercise 05.1
 
 
 def _force_by_momentum() -> Array:
-    """Compute the force from the rate of momentum of all links.
-
-    Any q̈ with the desired acceleration of the centre of mass will do.
-    """
+    """Compute the force from the rate of momentum of all links."""
     now, goal = moving_and_goal_state()
     a = -STIFFNESS * (now.com - goal.com) - DAMPING * now.com_velocity
     qdd = np.linalg.pinv(now.com_jacobian) @ (a - now.com_drift)

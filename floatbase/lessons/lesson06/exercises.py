@@ -50,10 +50,7 @@ class _HalfSpaceJudge(NumericJudge):
 
 
 def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: float = 0.0) -> Array:
-    """Compute the constraints of exercise 06.1 from the edges of the polyhedron.
-
-    The edges lie on the cone, and the normal of each facet is perpendicular to two of them.
-    """
+    """Compute the constraints of exercise 06.1 from the edges of the polyhedron."""
     n = np.asarray(normal) / np.linalg.norm(normal)
     t1, t2 = tangents(n)
     angles = turn + 2 * np.pi * (np.arange(BANK_FACETS + 1) - 0.5) / BANK_FACETS

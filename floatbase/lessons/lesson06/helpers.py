@@ -164,29 +164,7 @@ def make_controller() -> ConeController:
 def state_with_feet_at(
     robot: fb.Robot, base: npt.ArrayLike, centres: Mapping[str, npt.ArrayLike]
 ) -> fb.State:
-    """Return the state with a level base at one place and the feet at given places.
-
-    The joints are found by Newton's method. The legs must have three joints each.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    base : array_like, shape (3,)
-        Position of the base in the world frame [m].
-    centres : mapping of str to array_like, shape (3,)
-        For each foot: position of its centre in the world frame [m].
-
-    Returns
-    -------
-    State
-        The state.
-
-    Raises
-    ------
-    InputError
-        If the legs cannot reach these places.
-    """
+    """Return the state with a level base at one place and the feet at given places."""
     q = robot.standing().q.copy()
     q[:3], q[3:7] = base, [0.0, 0.0, 0.0, 1.0]
     for _ in range(_MAX_STEPS):

@@ -217,24 +217,7 @@ def slope_normal(degrees: float) -> Array:
 
 
 def region_picture(state: fb.State, feet: Array, region: Array) -> str:
-    """Draw from above the region of the centre of mass, the hull of the feet, and the centre.
-
-    The region is filled, the hull is dashed, and a dot marks the centre of mass.
-
-    Parameters
-    ----------
-    state : State
-        State of the robot.
-    feet : ndarray, shape (n, 3)
-        Positions of the feet in the world frame [m].
-    region : ndarray, shape (k, 2)
-        Vertices of the region from `support_region` [m]; none if there is no such place.
-
-    Returns
-    -------
-    str
-        The drawing as SVG.
-    """
+    """Draw from above the region of the centre of mass, the hull of the feet, and the centre."""
     middle, (width, height) = feet[:, :2].mean(axis=0), DRAWING_SIZE
 
     def seen(points: Array) -> Array:

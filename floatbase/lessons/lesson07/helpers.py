@@ -148,20 +148,7 @@ def leaning_controller(mu: float) -> fb.WholeBodyController:
 
 
 def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
-    """Return the controller of exercise 07.3.
-
-    Parameters
-    ----------
-    kp, kd, weight : float
-        Gains [1/s², 1/s] and weight [-] of the task for the centre of mass.
-    posture : float
-        Weight of the posture task [-].
-
-    Returns
-    -------
-    WholeBodyController
-        The controller.
-    """
+    """Return the controller of exercise 07.3."""
     state = standing_go2_eom().state
     com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)
     tasks = [com, fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]

@@ -39,20 +39,7 @@ def plot_one_foot() -> Axes:
 
 
 def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
-    """Plot how far the centre of mass and the feet are from their initial positions.
-
-    For the feet, the largest displacement is plotted.
-
-    Parameters
-    ----------
-    records : mapping of str to Rollout
-        The records by name.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot how far the centre of mass and the feet are from their initial positions."""
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.2), layout="constrained")
     for (name, record), colour, style in zip(records.items(), GREYS, _STYLES, strict=False):
         feet = np.linalg.norm(record.foot_positions - record.foot_positions[0], axis=2).max(axis=1)

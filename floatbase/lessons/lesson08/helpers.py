@@ -26,10 +26,7 @@ _ROW_STEP = 3  # the margin is computed in every third row: every 12 ms of a cra
 
 
 def make_controller() -> Stand:
-    """Return the controller of the lesson's push-recovery map.
-
-    The controller makes go2 stand, and trot on the spot when necessary.
-    """
+    """Return the controller of the lesson's push-recovery map."""
     robot = fb.load("go2")
     return Stand(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot))
 
@@ -127,11 +124,7 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
 
 
 def smallest_support_margin(record: Rollout) -> float:
-    """Return the smallest margin of the centre of mass in a record [m].
-
-    The margin is its distance, seen from above, from the edge of the support polygon of the feet on
-    the ground.
-    """
+    """Return the smallest margin of the centre of mass in a record [m]."""
     names = record.contacts.names
     margins = []
     for i in range(0, len(record), _ROW_STEP):
@@ -142,20 +135,7 @@ def smallest_support_margin(record: Rollout) -> float:
 
 @cache
 def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
-    """Simulate 6 s of a crawl.
-
-    Parameters
-    ----------
-    swing, pause : float
-        Durations of a swing and of a pause, as for `Gait.crawl` [s].
-    forwards : float
-        Speed [m/s].
-
-    Returns
-    -------
-    Rollout
-        The record.
-    """
+    """Simulate 6 s of a crawl."""
     return run_go2(crawl(swing, pause, forwards), CRAWL_DURATION, period=SLOW_PERIOD)
 
 
@@ -178,25 +158,7 @@ def opposite_foot(foot: str) -> str:
 def shortest_com_shift(
     state: fb.State, foot: str, to: Callable[[Array], Array] | None = None
 ) -> Array:
-    """Return the shortest shift of the centre of mass that lets a foot lift off.
-
-    After this shift, the diagonally opposite foot carries nothing when the foot lifts off.
-
-    Parameters
-    ----------
-    state : State
-        State before the shift.
-    foot : str
-        Foot that is to lift off.
-    to : callable, optional
-        Function that replaces the centre of mass, shape (2,), [m], by another starting point. It is
-        used for known mistakes.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        The shift in the world frame [m].
-    """
+    """Return the shortest shift of the centre of mass that lets a foot lift off."""
     contacts = fb.Contacts.points(state.robot)
     feet = dict(zip(contacts.names, contacts.positions(state)[:, :2], strict=True))
     a, b = (feet[name] for name in contacts.names if name not in (foot, opposite_foot(foot)))

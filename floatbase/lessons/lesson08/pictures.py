@@ -165,22 +165,7 @@ def show_foothold(view: Viewer, state: fb.State, speed: float, time: float, ahea
 
 
 def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture:
-    """Return marks on the ground: a patch for a foot, a label for any other name.
-
-    A line connects two feet.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer of the picture.
-    places : mapping of str to array_like, shape (2,)
-        For each name: its place in the world frame [m].
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-    """
+    """Return marks on the ground: a patch for a foot, a label for any other name."""
     feet = {foot.frame for foot in view.robot.feet}
     picture: Picture = {}
     aside = np.array([0.0, 0.13, 0.02])  # of the first label; the next one is on the other side
@@ -274,11 +259,7 @@ class PushComparison(widgets.VBox):
         super().close()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        """Return what a notebook shows.
-
-        The pictures are added only here, as in a slider panel. A static page shows some recorded
-        pushes of both robots.
-        """
+        """Return what a notebook shows."""
         if display_mode() == "site":
             titles = {
                 title: (self.views[title], run.sim, run.controller)

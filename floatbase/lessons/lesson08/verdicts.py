@@ -87,11 +87,7 @@ def shift_mistakes() -> dict[str, Callable[[], Any]]:
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
-    """Return anymal_kinova standing and three lengths [m].
-
-    The lengths are the height of the centre of mass, and its distances along x from the hind and
-    front feet.
-    """
+    """Return anymal_kinova standing and three lengths [m]."""
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
     return state, float(state.com[2]), float(-x.min()), float(x.max())
@@ -99,10 +95,7 @@ def _backwards() -> tuple[fb.State, float, float, float]:
 
 @cache
 def hardest_push() -> float:
-    """Return the largest push [N] after which a pendulum above the hind feet does not pass them.
-
-    The motion of the pendulum is integrated numerically.
-    """
+    """Return the largest push [N] after which a pendulum above the hind feet does not pass them."""
     state, height, away, _ = _backwards()
     rate = state.robot.gravity / height
 

@@ -56,10 +56,7 @@ def ankle_sensor_reading() -> Array:
 
 
 def _pushed() -> Array:
-    """Compute the centre of pressure as the mean of the corners, weighted by their forces.
-
-    No moment is used. The result has shape (2,) and is relative to the point below the sensor [m].
-    """
+    """Compute the centre of pressure as the mean of the corners, weighted by their forces."""
     state = load_talos().standing()
     sole = fb.Contacts.flat_feet(load_talos()).only("left_sole_link")
     return (
@@ -68,10 +65,7 @@ def _pushed() -> Array:
 
 
 def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
-    """Return a function that computes the centre of pressure from the sensor.
-
-    height [m]: the moments are changed by height · force.
-    """
+    """Return a function that computes the centre of pressure from the sensor."""
 
     def value() -> Array:
         fx, fy, fz, tx, ty, _ = ankle_sensor_reading()

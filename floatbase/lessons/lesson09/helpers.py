@@ -125,27 +125,7 @@ def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
 def corner_forces(
     state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4
 ) -> Array:
-    """Return the forces at the corners of a sole whose wrench is closest to a given one.
-
-    The forces are inside their pyramids. If many forces have that wrench, the smallest ones are
-    returned.
-
-    Parameters
-    ----------
-    state : State
-        The state.
-    sole : Contacts
-        Contacts of one sole.
-    wrench : array_like, shape (6,)
-        Force and moment about the origin of the sole's frame, in the world frame [N, N·m].
-    facets : int, optional
-        Number of facets of each pyramid.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        Forces in the world frame [N].
-    """
+    """Return the forces at the corners of a sole whose wrench is closest to a given one."""
     cones = zip(sole.normals, sole.mus, strict=True)
     rows = block_diag(*(FrictionPolyhedron(n, mu, facets).face_matrix for n, mu in cones))
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
@@ -188,10 +168,7 @@ def leaning_controller(
 
 
 def make_controller() -> Stand:
-    """Return the controller of the lesson's push-recovery map.
-
-    Talos stands on its soles, and steps when its capture point comes close to their edge.
-    """
+    """Return the controller of the lesson's push-recovery map."""
     return Stand(
         load_talos(),
         fb.Contacts.flat_feet(load_talos(), mu=MU),

@@ -58,10 +58,7 @@ def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt
 
 
 def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
-    """Remove everything above the feet of Talos from a picture, and add a scale of forces.
-
-    With a `side`, only that foot remains.
-    """
+    """Remove everything above the feet of Talos from a picture, and add a scale of forces."""
     feet = tuple(f"robot/leg_{name}_6" for name in ("left", "right") if side in ("", name))
     kept = {
         path: item
@@ -73,25 +70,7 @@ def _feet_only(view: Viewer, picture: Picture, side: str = "") -> Picture:
 
 
 def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Draw soles from above with their centres of pressure.
-
-    Corners are dots whose area is proportional to their normal force, centres of pressure are
-    crosses, and x_c is a ring.
-
-    Parameters
-    ----------
-    state : State
-        State of the robot.
-    contacts : Contacts
-        The soles.
-    forces : array_like, shape (k,)
-        Forces at the corners in the world frame [N].
-
-    Returns
-    -------
-    str
-        The drawing as SVG.
-    """
+    """Draw soles from above with their centres of pressure."""
     flat, drawn = np.asarray(forces, dtype=np.float64), ""
     first = 0
     for contact in contacts:
@@ -231,10 +210,7 @@ def limit_kinds(rows: npt.ArrayLike) -> list[str]:
 
 
 def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
-    """Draw which centres of pressure along x and twists the sole allows at this force, as SVG.
-
-    The wrench is a dot.
-    """
+    """Draw which centres of pressure along x and twists the sole allows at this force, as SVG."""
     half, most = 150.0, 60.0  # mm, N·m: the ends of the axes
     sx, sy = WIDE / (2 * half), HIGH / (2 * most)
     x = np.linspace(-half, half, _COLUMNS)
@@ -315,18 +291,7 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
 
 
 def plot_lean(record: Rollout) -> Axes:
-    """Plot the motion of x_c and of the centre of pressure along x between the edges of the soles.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot x_c and the centre of pressure along x between the edges of the soles."""
     figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     edges = record.foot_positions[..., 0]
     axis.fill_between(

@@ -30,23 +30,7 @@ def _push_force() -> float:
 
 @cache
 def run_jump(height: float, distance: float) -> Rollout:
-    """Simulate a jump of go2.
-
-    Parameters
-    ----------
-    height, distance : float
-        Height and distance, as for `Jump` [m].
-
-    Returns
-    -------
-    Rollout
-        The record.
-
-    Raises
-    ------
-    InputError
-        If a motor or the friction is insufficient.
-    """
+    """Simulate a jump of go2."""
     robot = fb.load("go2")
     jump = Jump(robot, fb.Contacts.feet(robot, mu=MU), height, distance, start=0.1)
     return run_go2(jump, _DURATION)

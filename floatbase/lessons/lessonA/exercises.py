@@ -54,11 +54,7 @@ def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callabl
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
-    """Compute the joint effect of two joints at 1 rad/s.
-
-    The effect is the sum of both columns of the Coriolis matrix, each at the other joint's
-    velocity.
-    """
+    """Compute the joint effect of two joints at 1 rad/s."""
     e = np.eye(6)
     return np.asarray(
         coriolis_matrix(arm_state(tuple(e[i]))) @ e[j]

@@ -90,10 +90,7 @@ def _rod(
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
-    """Draw the path, shape (n, 3) [m], and the final accelerations [m/s²] from above, as SVG.
-
-    The table is at rest in this drawing.
-    """
+    """Draw the path, shape (n, 3) [m], and the final accelerations [m/s²] from above, as SVG."""
     half, scale = SIDE / 2, 0.95 * SIDE / (2 * TABLE_RADIUS)
 
     def seen(points: Array) -> Array:
@@ -181,10 +178,7 @@ def show_tumble(view: Viewer, glide: float, spin: float) -> str:
 
 
 def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
-    """Return the base's acceleration in the world frame, shape (3,) [m/s²].
-
-    Only the velocity part of h acts, written in the given axes.
-    """
+    """Return the base's acceleration in the world frame, shape (3,) [m/s²]."""
     R = state.frame_pose("base").rotation
     if axes == "base":
         return np.asarray(

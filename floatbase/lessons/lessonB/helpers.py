@@ -30,21 +30,7 @@ JointMotion = Callable[[float], tuple[float, float]]
 
 
 class BenchSample(NamedTuple):
-    """State of the bench at one time.
-
-    Parameters
-    ----------
-    time : float
-        Time [s].
-    torque : float
-        Torque at the joint [N·m].
-    u : float
-        Command to the valve, from -1 to 1, or the opening of the valve in a force loop [-].
-    pressure_a, pressure_b : float
-        Pressures in the chambers A and B [Pa].
-    angle : float
-        Angle of the joint from the centre [rad].
-    """
+    """State of the bench at one time."""
 
     time: float
     torque: float
@@ -176,10 +162,7 @@ class Bench:
 
 
 def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
-    """Return one cylinder with its force loop, at zero torque.
-
-    The size of the cylinder does not depend on the supply pressure.
-    """
+    """Return one cylinder with its force loop, at zero torque."""
     actuators = HydraulicActuators(standing_go2_eom().robot, hydraulics)
     size = KNEE_TORQUE / Hydraulics().weakest_torque
     actuators.cylinders = Cylinders(hydraulics, [size], [0.0])
@@ -188,22 +171,7 @@ def _knee_actuators(hydraulics: Hydraulics) -> HydraulicActuators:
 
 
 def run_force_loop(bench: Bench, bandwidth: float, time: float) -> list[BenchSample]:
-    """Run the force loop of floatbase on a new bench.
-
-    Parameters
-    ----------
-    bench : Bench
-        The bench.
-    bandwidth : float
-        Bandwidth of the force loop [Hz].
-    time : float
-        Duration [s].
-
-    Returns
-    -------
-    list of BenchSample
-        The samples.
-    """
+    """Run the force loop of floatbase on a new bench."""
     bench.actuators = _knee_actuators(replace(bench.hydraulics, loop_bandwidth=bandwidth))
     for _ in range(round(time / bench.dt)):
         bench.actuators.step([bench.desired_torque], [bench.angle], [bench.velocity], bench.dt)
@@ -212,17 +180,7 @@ def run_force_loop(bench: Bench, bandwidth: float, time: float) -> list[BenchSam
 
 
 class PushResponse(NamedTuple):
-    """Response to a push.
-
-    Parameters
-    ----------
-    outcome : str
-        Outcome of the run, as in `Rollout`.
-    offset : float
-        Largest distance of go2 from its place at the end [mm].
-    oscillation : float
-        Range of the remaining oscillation at the end [mm].
-    """
+    """Response to a push."""
 
     outcome: str
     offset: float
@@ -231,20 +189,7 @@ class PushResponse(NamedTuple):
 
 @cache
 def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
-    """Push go2 on the default cylinders, as in the lesson.
-
-    Parameters
-    ----------
-    kp, kd : float
-        Gains of all its tasks [1/s², 1/s].
-    bandwidth : float, optional
-        Bandwidth of the force loops [Hz].
-
-    Returns
-    -------
-    PushResponse
-        The response.
-    """
+    """Push go2 on the default cylinders, as in the lesson."""
     robot = fb.load("go2")
     state = robot.standing()
     tasks = [replace(task, kp=kp, kd=kd) for task in fb.standing_tasks(state)]  # type: ignore[type-var]

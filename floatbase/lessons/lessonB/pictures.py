@@ -166,10 +166,7 @@ def _towards(gamma: float) -> Array:
 
 
 def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
-    """Return the pressures of both chambers for a torque [Pa].
-
-    One is as far below the supply pressure as the other is above the tank pressure.
-    """
+    """Return the pressures of both chambers for a torque [Pa]."""
     h = bench.hydraulics
     lines, force = (
         h.supply_pressure + h.tank_pressure,

@@ -21,10 +21,7 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 
 
 def slanted_table() -> QP:
-    """Return the bowl and the slanted table of exercise C.1.
-
-    up ≥ 0.5 along is written as 0.5 along - up ≤ 0.
-    """
+    """Return the bowl and the slanted table of exercise C.1."""
     H = np.diag([1.0, 4.0])
     return QP(
         H,
@@ -37,10 +34,7 @@ def slanted_table() -> QP:
 
 
 def _price() -> float:
-    """Compute the multiplier as the rate of the minimum when the constraint is relaxed.
-
-    No system of equations is used.
-    """
+    """Compute the multiplier as the rate of the minimum when the constraint is relaxed."""
     qp = slanted_table()
     h = 1e-4
     low, high = (
@@ -53,11 +47,7 @@ def _price() -> float:
 
 
 def _judge_guess(answer: Any) -> Verdict:
-    """Judge a guess of the active constraints.
-
-    One system of equations with the guess is solved, as in the game, and the conditions for the
-    optimum are checked as a solver does.
-    """
+    """Judge a guess of the active constraints."""
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet. List the names of constraints.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):

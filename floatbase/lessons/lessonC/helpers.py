@@ -191,24 +191,7 @@ def braking_qp() -> fb.QP:
 
 
 def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
-    """Return the answer to an exercise if it is right, or else a default; print which one it is.
-
-    This does not count as a try.
-
-    Parameters
-    ----------
-    name : str
-        Name of the exercise.
-    answer : object
-        The answer.
-    otherwise : object
-        The default.
-
-    Returns
-    -------
-    object
-        `answer` or `otherwise`.
-    """
+    """Return the answer to an exercise if it is right, or else a default; print which one it is."""
     if all_exercises()[name].judge(answer).right:
         print(f"{name}: the lesson continues with your answer.")
         return answer
@@ -219,28 +202,7 @@ def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
 def longest_step(
     x: Array, p: Array, G: Array, h: Array, W: Sequence[int]
 ) -> tuple[float, int | None]:
-    """Return the longest feasible step from x along p, and the constraint that blocks it.
-
-    This is the solution of exercise C.2.
-
-    Parameters
-    ----------
-    x, p : ndarray, shape (n,)
-        Point and direction.
-    G : ndarray, shape (m, n)
-        Matrix of the inequality constraints G x ≤ h.
-    h : ndarray, shape (m,)
-        Right-hand side of the constraints.
-    W : sequence of int
-        Indices of the constraints in the working set, which cannot block.
-
-    Returns
-    -------
-    float
-        Length of the step, at most 1 [-].
-    int or None
-        Index of the first blocking constraint.
-    """
+    """Return the longest feasible step from x along p, and the constraint that blocks it."""
     slack, speed = np.round(h - G @ x, 9), G @ p
     length, blocking = 1.0, None
     for i in range(len(h)):
@@ -250,22 +212,7 @@ def longest_step(
 
 
 def row_to_drop(W: Sequence[int], prices: Array) -> int | None:
-    """Return the constraint in W with the most negative multiplier, or None if none is negative.
-
-    This is the solution of exercise C.3.
-
-    Parameters
-    ----------
-    W : sequence of int
-        Indices of the constraints in the working set.
-    prices : ndarray, shape (len(W),)
-        Their multipliers.
-
-    Returns
-    -------
-    int or None
-        Index of the constraint.
-    """
+    """Return the constraint in W with the most negative multiplier, or None if none is negative."""
     if len(W) == 0 or min(prices) > -1e-9:
         return None
     return int(W[int(np.argmin(prices))])

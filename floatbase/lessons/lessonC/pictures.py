@@ -129,10 +129,7 @@ class ActiveSetGame(widgets.VBox):
         )
 
     def _site_bundle(self) -> dict[str, Any]:
-        """Return the mimebundle for a static page: every set of constraints with every bowl.
-
-        The game is reset.
-        """
+        """Return the mimebundle for a static page: every set of constraints with every bowl."""
         bowls = tuple(str(i + 1) for i in range(len(self._puzzles)))
         pack = static_export.StaticExport([], words="In the live lesson the clicks are counted.")
         switches = list(product((0, 1), repeat=len(self.rows)))
@@ -174,22 +171,7 @@ def _describe_faults(faults: Sequence[str]) -> str:
 
 
 def check_active_set(qp: QP, working: Sequence[str]) -> tuple[Array | None, list[str]]:
-    """Find the minimum with some constraints as equalities, and say what is wrong with it.
-
-    Parameters
-    ----------
-    qp : QP
-        The problem.
-    working : sequence of str
-        Names of the constraints.
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        The minimum; None if the constraints have no common point or depend on one another.
-    list of str
-        What is wrong; empty at the optimum.
-    """
+    """Find the minimum with some constraints as equalities, and say what is wrong with it."""
     rows = [qp.inequality_names.index(name) for name in working]
     G, k = qp.G[rows], len(rows)
     if k and np.linalg.matrix_rank(G) < k:

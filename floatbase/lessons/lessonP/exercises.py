@@ -106,10 +106,7 @@ def _corners() -> tuple[Array, dict[str, Array]]:
 
 
 def _nearest(first: str = "FL_foot", second: str = "RR_foot") -> Array:
-    """Return the shift of the centre of mass to the line through two feet, shape (3,) [m].
-
-    The nearest point is found by least squares along the line.
-    """
+    """Return the shift of the centre of mass to the line through two feet, shape (3,) [m]."""
     com, feet = _corners()
     line = feet[second] - feet[first]
     along = np.linalg.lstsq(line[:, None], com - feet[first], rcond=None)[0]

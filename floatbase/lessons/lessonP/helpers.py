@@ -32,20 +32,7 @@ def _run_standing(sim: fb.Simulation, kp: float) -> Rollout:
 
 
 def com_sag(kp: float, bag: float = BAG_MASS) -> float:
-    """Return how far the centre of mass of go2 sinks if go2 is heavier than the controller assumes.
-
-    Parameters
-    ----------
-    kp : float
-        Gain of the task for the centre of mass [1/s²].
-    bag : float, optional
-        Additional mass, distributed over all links [kg].
-
-    Returns
-    -------
-    float
-        The distance [m]; infinite if the robot does not stand.
-    """
+    """Return how far go2's centre of mass sinks if go2 is heavier than the controller assumes."""
     robot = fb.load("go2")
     sim = PerturbedSimulation(robot, MU, perturbation=Perturbation(mass=1.0 + bag / robot.mass))
     record = _run_standing(sim, kp)
@@ -63,20 +50,7 @@ def unknown_mass_record() -> Rollout:
 
 
 def time_on_two_feet(shift: npt.ArrayLike) -> float:
-    """Return how long go2 stays up on FL and RR.
-
-    Before that, go2 shifts its centre of mass on four feet for a second.
-
-    Parameters
-    ----------
-    shift : array_like, shape (3,)
-        The shift in the world frame [m].
-
-    Returns
-    -------
-    float
-        Time, at most 3 s [s].
-    """
+    """Return how long go2 stays up on FL and RR."""
     robot = fb.load("go2")
     sim = fb.Simulation(robot, MU)
     state, contacts, lifted = sim.state, Contacts.feet(robot, MU), ("FR_foot", "RL_foot")

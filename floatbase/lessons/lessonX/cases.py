@@ -34,21 +34,7 @@ FAULTS: tuple[Fault, ...] = ("friction", "normal", "mass", "drift", "slow motors
 
 @dataclass(frozen=True)
 class Twist:
-    """Motion that a robot was supposed to perform, and the slope on which it stood.
-
-    Parameters
-    ----------
-    pitch, yaw : float
-        Half the widths of the ellipse that its base follows [rad].
-    rate : float
-        Loops per second [1/s].
-    direction : {1, -1}
-        Direction of the motion.
-    tilt : float
-        Slope of the ground [°].
-    heading : float
-        Horizontal direction of the ground's normal [rad].
-    """
+    """Motion that a robot was supposed to perform, and the slope on which it stood."""
 
     pitch: float = 0.22
     yaw: float = 0.45
@@ -110,15 +96,7 @@ class TwistController:
 
 
 class SwappedMotors:
-    """Actuators with the cables of two motors swapped, so that each gets the command of the other.
-
-    Parameters
-    ----------
-    d : int
-        Number of joints.
-    first, second : int
-        Indices of the two motors.
-    """
+    """Actuators with the cables of two motors swapped, so that each gets the other's command."""
 
     def __init__(self, d: int, first: int, second: int):
         self.order = np.arange(d)
@@ -131,21 +109,7 @@ class SwappedMotors:
 
 @dataclass(frozen=True)
 class InjectedFault:
-    """Fault of a robot or its controller; none by default.
-
-    Parameters
-    ----------
-    kind : str or None
-        Name of the fault, one of `FAULTS`.
-    size : float
-        "friction": actual friction coefficient [-]. "normal": angle between the assumed and the
-        actual normal [°]. "mass": assumed mass as a multiple of the actual one [-]. "slow motors":
-        time constant [ms].
-    heading : float
-        "normal": direction in which the assumed normal is turned [rad].
-    joints : tuple of str
-        "swapped motors": names of the two joints.
-    """
+    """Fault of a robot or its controller; none by default."""
 
     kind: Fault | None = None
     size: float = 0.0
@@ -176,24 +140,7 @@ def record_box(
     pushes: tuple[fb.Push, ...] = (),
     seconds: float = SECONDS,
 ) -> BlackBox:
-    """Simulate go2 that twists with a fault, until it falls or the time [s] is over.
-
-    Parameters
-    ----------
-    name : str
-        Name of the box.
-    twist, injected_fault
-        The motion and the fault.
-    pushes : tuple of Push, optional
-        Pushes on the robot.
-    seconds : float, optional
-        Largest duration of the record [s].
-
-    Returns
-    -------
-    BlackBox
-        The record.
-    """
+    """Simulate go2 that twists with a fault, until it falls or the time [s] is over."""
     robot, fault = fb.load("go2"), injected_fault.kind
     mu = injected_fault.size if fault == "friction" else MU
     assumed = (
@@ -248,19 +195,7 @@ def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
 
 @dataclass(frozen=True)
 class Case:
-    """Randomly drawn case, whose fault the investigation does not know.
-
-    Parameters
-    ----------
-    name : str
-        Name of the box.
-    twists : tuple of Twist
-        Random motions. The first whose end agrees with `falls` counts.
-    injected_fault : InjectedFault
-        The fault.
-    pushes : tuple of Push
-        Kicks.
-    """
+    """Randomly drawn case, whose fault the investigation does not know."""
 
     name: str
     twists: tuple[Twist, ...]
@@ -273,10 +208,7 @@ class Case:
         return bool(self.injected_fault.kind or self.pushes)
 
     def record(self) -> BlackBox:
-        """Return the black box of this case.
-
-        By luck, one robot in twenty survives a forgotten drift; then the next motion is tried.
-        """
+        """Return the black box of this case."""
         for twist in self.twists:
             box = record_box(self.name, twist, self.injected_fault, self.pushes)
             if box.fell == self.falls:
@@ -285,18 +217,7 @@ class Case:
 
 
 def random_cases(seed: int) -> tuple[Case, ...]:
-    """Return six random cases, one of each fault, in random order.
-
-    Parameters
-    ----------
-    seed : int
-        Seed; the same seed gives the same cases.
-
-    Returns
-    -------
-    tuple of Case
-        The cases.
-    """
+    """Return six random cases, one of each fault, in random order."""
     rng = np.random.default_rng([as_integer("seed", seed, 0, LARGEST_SEED), 6])
     order = [FAULTS[i] for i in rng.permutation(len(FAULTS))]
     return tuple(
@@ -345,18 +266,7 @@ def black_boxes(seed: int) -> tuple[BlackBox, ...]:
 
 @lru_cache(maxsize=8)
 def faultless_boxes(seed: int) -> tuple[BlackBox, ...]:
-    """Return the black boxes of two robots without a fault: N twists to the end, K is kicked over.
-
-    Parameters
-    ----------
-    seed : int
-        Seed; other seeds give other boxes.
-
-    Returns
-    -------
-    tuple of BlackBox
-        The boxes.
-    """
+    """Return black boxes of two robots without a fault: N twists to the end, K is kicked over."""
     return tuple(case.record() for case in faultless_cases(seed))
 
 

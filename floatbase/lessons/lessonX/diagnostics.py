@@ -16,39 +16,12 @@ _MIN_SLIP_SPEED = 0.3
 
 
 def accelerations(box: BlackBox) -> Array:
-    """Return the acceleration q̈ in each control step except the last: the change of v over time.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-
-    Returns
-    -------
-    ndarray, shape (n - 1, nv)
-        The acceleration, as in v [m/s², rad/s²].
-    """
+    """Return the acceleration q̈ in each control step except the last: the change of v over time."""
     return np.asarray(np.diff(box.v, axis=0) / np.diff(box.time)[:, None])
 
 
 def required_forces(box: BlackBox) -> Array:
-    """Return M q̈ + h - Jᵀ λ with the measured q̈ and λ: what else must have acted on the robot.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-
-    Returns
-    -------
-    ndarray, shape (n - 1, nv)
-        The last d columns are the motor torques [N·m]. The first six, in the base frame [N, N·m],
-        are zero as long as nothing else touches the robot.
-
-    Notes
-    -----
-    [FBR]_, eq. (7).
-    """
+    """Return M q̈ + h - Jᵀ λ with the measured q̈ and λ: what else must have acted on the robot."""
     found = []
     for i, qdd in enumerate(accelerations(box)):
         eom = box.equations(i)
@@ -81,42 +54,13 @@ def lagged(orders: npt.ArrayLike, period: float, ms: float) -> Array:
 
 
 def foot_centres(box: BlackBox, i: int | np.integer[Any]) -> Array:
-    """Return the centres of the spherical feet in row i.
-
-    The centres are one radius above the ground, whatever the ground's normal.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-    i : int
-        The row.
-
-    Returns
-    -------
-    ndarray, shape (4, 3)
-        The centres in the world frame [m].
-    """
+    """Return the centres of the spherical feet in row i."""
     state = box.state(i)
     return np.array([state.point(foot.frame, foot.centre) for foot in box.robot.feet])
 
 
 def ground_normal(box: BlackBox) -> Array:
-    """Return the normal of the plane through the feet.
-
-    The result is the mean over the rows in the first 0.1 s in which all four feet are loaded. If
-    there are none, the first row counts.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        The unit normal in the world frame.
-    """
+    """Return the normal of the plane through the feet."""
     rows = np.flatnonzero(box.time - box.time[0] < 0.1)
     bears = [
         i for i in rows if np.linalg.norm(box.measured[i].reshape(-1, 3), axis=1).min() > _MIN_LOAD

@@ -48,11 +48,7 @@ _RIGHT = Verdict(True, "")
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Number that is evidence.
-
-    off: its tolerance. known: hint -> the number of this mistake, and the comment on it. otherwise:
-    comment on other numbers.
-    """
+    """Number that is evidence."""
 
     right: float
     off: float
@@ -61,40 +57,14 @@ class _Evidence:
 
 
 def named_fault(line: str) -> str:
-    """Return the fault that a line names first, or "nothing"; "" if there is none.
-
-    Parameters
-    ----------
-    line : str
-        The line.
-
-    Returns
-    -------
-    str
-        Name of the fault.
-    """
+    """Return the fault that a line names first, or "nothing"; "" if there is none."""
     words = line.casefold()
     found = [(words.find(name), name) for name in (*FAULTS, NOTHING) if name in words]
     return min(found)[1] if found else ""
 
 
 def judge_line(case: Case, box: BlackBox, line: str) -> Verdict:
-    """Judge a line about a case: a fault and its evidence.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    box : BlackBox
-        Black box of the case.
-    line : str
-        The line.
-
-    Returns
-    -------
-    Verdict
-        The comment; it is empty if the line is right.
-    """
+    """Judge a line about a case: a fault and its evidence."""
     said, fault = named_fault(line), case.injected_fault.kind or NOTHING
     if not said:
         return Verdict(False, f"name one of {', '.join(FAULTS)}, and its evidence.", "no_fault")
@@ -273,10 +243,7 @@ _NUMBERS: dict[str, Callable[[Case, BlackBox], _Evidence]] = {
 
 
 def _judge_number(fault: str, x: float, evidence: _Evidence) -> Verdict:
-    """Judge a number as evidence.
-
-    If it is wrong, the hint is that of the nearest known mistake.
-    """
+    """Judge a number as evidence."""
     if abs(x - evidence.right) <= evidence.off:
         return _RIGHT
     apart = {hint: (abs(x - wrong), abs(wrong)) for hint, (wrong, _) in evidence.known.items()}

@@ -14,19 +14,7 @@ _END = "<!-- end of lessons -->\n"
 
 
 def lesson_table(folder: Path = NOTEBOOKS) -> str:
-    """Write the table of lessons as Markdown: number, title, equations.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the notebooks, whose names start with their number, as in
-        02_equations_of_motion.ipynb.
-
-    Returns
-    -------
-    str
-        The table.
-    """
+    """Write the table of lessons as Markdown: number, title, equations."""
     lines = ["| | lesson | equations |", "|---|---|---|"]
     for path in sorted(folder.glob("*.ipynb")):
         number, title = path.name.split("_")[0], title_of(path).split(" · ")[-1]

@@ -21,20 +21,7 @@ _WORD = re.compile(r"[^\W\d_]{2,}|\b[aAI]\b")
 
 
 def lesson_minutes(path: Path) -> int:
-    """Compute how long a lesson takes, from its text, code, predictions, pictures and exercises.
-
-    Folded text ("Going further"), folded cells with claims, and formulas do not count.
-
-    Parameters
-    ----------
-    path : Path
-        A notebook.
-
-    Returns
-    -------
-    int
-        Time in minutes, rounded up to a multiple of 5.
-    """
+    """Compute how long a lesson takes, from its text, code, predictions, pictures and exercises."""
     counts = lesson_counts(path)
     minutes = (
         counts["words"] / WORDS_PER_MINUTE

@@ -34,17 +34,7 @@ _SKIPPED_PACKAGES = ("viewer", "lessons", "playground")  # packages that show an
 
 @dataclass(frozen=True)
 class Entry:
-    """A public name that implements equations.
-
-    Parameters
-    ----------
-    path : str
-        Package and name, such as "dynamics.forces_from_torques".
-    equations : tuple of str
-        Numbers of the equations, such as "(9)".
-    tests : tuple of str
-        Tests that use the name, as "file::test".
-    """
+    """A public name that implements equations."""
 
     path: str
     equations: tuple[str, ...]
@@ -52,11 +42,7 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """List every public name whose docstring cites an equation or an appendix, with its tests.
-
-    A test of a class names the class or a function that returns it. A test of a member names both
-    the member and its class.
-    """
+    """List every public name whose docstring cites an equation or an appendix, with its tests."""
     named = _tests_by_name()
     found = []
     for path, docstring, makers in _public_objects():

@@ -19,21 +19,7 @@ class Section(NamedTuple):
 
 
 class Formula(NamedTuple):
-    """An equation of the course text.
-
-    Parameters
-    ----------
-    number : str
-        "(9)" or "App. A".
-    section : str
-        Number of its section.
-    title : str
-        Title of a few words.
-    latex : str
-        The formula without its number.
-    meaning : str
-        An explanation with its symbols, as Markdown.
-    """
+    """An equation of the course text."""
 
     number: str
     section: str

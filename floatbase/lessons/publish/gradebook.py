@@ -40,17 +40,7 @@ _RESULT = {"right": "passed", "wrong": "failed", "·": "failed", "to be read": "
 
 @dataclass(frozen=True)
 class Policy:
-    """What an assignment asks for.
-
-    Parameters
-    ----------
-    lessons : tuple of str
-        Lessons whose exercises count; all lessons if empty.
-    due : datetime, optional
-        When it is due. Without it, nothing is late.
-    late_days : int
-        Days after that on which a file still counts.
-    """
+    """What an assignment asks for."""
 
     lessons: tuple[str, ...] = ()
     due: datetime | None = None
@@ -82,13 +72,7 @@ class Policy:
 
 
 def lessons_with_exercises(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the lessons of these names, such as "01", "1" or "c".
-
-    Raises
-    ------
-    InputError
-        If a lesson does not exist or has no exercises.
-    """
+    """Return the lessons of these names, such as "01", "1" or "c"."""
     known = {name.split(".")[0] for name in all_exercises()}
     found = tuple(map(lesson_name, names))
     if unknown := [name for name in found if name not in known]:
@@ -108,38 +92,7 @@ def write_gradebook(
     column: str,
     policy: Policy,
 ) -> list[str]:
-    """Write a CSV file that Canvas or Moodle imports.
-
-    A row of the roster gets the points of the student's last file that is not too late. Students
-    without such a file are left out, so that their grades stay as they are. An empty cell would
-    delete a grade, and Moodle reads it as 0 in a new column.
-
-    Parameters
-    ----------
-    kind : {"canvas", "moodle"}
-        The gradebook.
-    submissions : sequence of Submission
-        The graded files.
-    roster : Path
-        CSV file that the gradebook exported. Files are matched by id, or by name if they have none.
-    table : Path
-        Where to write.
-    column : str
-        Name of the assignment in the gradebook. A column of that name in the roster keeps its full
-        name, such as "Lesson 01 (4711)".
-    policy : Policy
-        What counts.
-
-    Returns
-    -------
-    list of str
-        One line for each file that was left out, and for each student with several late days.
-
-    Raises
-    ------
-    InputError
-        If the roster is not an export of that gradebook, or if a file cannot be read or written.
-    """
+    """Write a CSV file that Canvas or Moodle imports."""
     header, rows = _read_roster(kind, roster)
     kept = [name for name in _COLUMNS[kind] if name in header]
     full = next((name for name in header if _is_column(name, column)), column)
@@ -241,21 +194,7 @@ def write_gradescope_results(
     policy: Policy | None = None,
     own_numbers: bool = False,
 ) -> None:
-    """Grade what one student submitted to Gradescope, and write its results.json.
-
-    Parameters
-    ----------
-    files : iterable of Path
-        The submitted files; one of them must be a file of `hand_in`.
-    target : Path
-        Where to write, /autograder/results/results.json at Gradescope.
-    metadata : Path, optional
-        Gradescope's submission_metadata.json, which tells the student, the time and the due date.
-    policy : Policy, optional
-        Lessons that count, and late days. The due date comes from `metadata`.
-    own_numbers : bool, optional
-        Whether to judge by the numbers of the student's id.
-    """
+    """Grade what one student submitted to Gradescope, and write its results.json."""
     policy = policy or Policy()
     known = _read_metadata(metadata)
     due = time_of(str(known["assignment"].get("due_date"))) if known else policy.due
@@ -361,22 +300,7 @@ cd "$place/source"
 
 
 def write_autograder(folder: Path, *, policy: Policy, own_numbers: bool = False) -> None:
-    """Write the folder whose contents, zipped, are an autograder of Gradescope.
-
-    Parameters
-    ----------
-    folder : Path
-        A new folder.
-    policy : Policy
-        Lessons that count, and late days. Gradescope tells the due date.
-    own_numbers : bool, optional
-        Whether to judge by the numbers of each student's id.
-
-    Raises
-    ------
-    InputError
-        If the folder exists and is not empty.
-    """
+    """Write the folder whose contents, zipped, are an autograder of Gradescope."""
     from floatbase.lessons.publish.package import copy_package
 
     copy_package(folder)

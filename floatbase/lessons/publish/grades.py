@@ -40,19 +40,7 @@ _FORMULA_STARTS = tuple(
 
 @dataclass(frozen=True)
 class ExerciseResult:
-    """Result of one exercise of one learner.
-
-    Parameters
-    ----------
-    exercise : str
-        Name of the exercise.
-    tries : int
-        Number of tries.
-    result : {"right", "wrong", "to be read", "·"}
-        "to be read" for code, which only the learner's own check has judged; "·" if not tried.
-    feedback : str
-        Feedback of the check, or the code to be read.
-    """
+    """Result of one exercise of one learner."""
 
     exercise: str
     tries: int = 0
@@ -62,25 +50,7 @@ class ExerciseResult:
 
 @dataclass(frozen=True)
 class Submission:
-    """Grades of one file of `hand_in`.
-
-    Parameters
-    ----------
-    file : str
-        Name of the file.
-    name : str
-        Name of the learner.
-    id : str
-        Id of the learner in the class, or "".
-    time : str
-        Time at which the file was written.
-    results : tuple of ExerciseResult
-        Result of every exercise.
-    predicted : int
-        Number of predictions.
-    inventory : dict
-        Answers to the concept inventory, by time.
-    """
+    """Grades of one file of `hand_in`."""
 
     file: str
     name: str
@@ -92,28 +62,7 @@ class Submission:
 
 
 def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
-    """Judge again every answer of a file that `hand_in` wrote.
-
-    The results that the file claims do not count, and none of its code is run.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    own_numbers : bool, optional
-        Whether to judge by the numbers that `own_numbers` gives to the id in the file. A file
-        without an id is judged by the numbers of the lessons.
-
-    Returns
-    -------
-    Submission
-        The grades.
-
-    Raises
-    ------
-    InputError
-        If `hand_in` did not write the file.
-    """
+    """Judge again every answer of a file that `hand_in` wrote."""
     found = _read(Path(path))
     student = _one_line(found.get("id") or "").strip()
     return Submission(
@@ -187,31 +136,7 @@ def grade_files(
     before: datetime | None = None,
     own_numbers: bool = False,
 ) -> tuple[list[Submission], int]:
-    """Judge files in their order, and report those that `hand_in` did not write.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-    latest : bool
-        Whether to keep only the last file of each id, or of each name where there is no id.
-    before : datetime, optional
-        Leave out files that were written later, or that do not say when.
-    own_numbers : bool
-        Whether to judge by the numbers of each student's id; see `grade_file`.
-
-    Returns
-    -------
-    submissions : list of Submission
-        The grades.
-    unread : int
-        Number of files that could not be read.
-
-    Raises
-    ------
-    InputError
-        If no file is left.
-    """
+    """Judge files in their order, and report those that `hand_in` did not write."""
     submissions, unread = [], 0
     for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
@@ -294,13 +219,7 @@ def _printable(code: str) -> str:
 
 
 def write_table(submissions: Sequence[Submission], path: Path) -> None:
-    """Write a row per learner and exercise as CSV.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written, or if an existing file is not such a table.
-    """
+    """Write a row per learner and exercise as CSV."""
     rows = [
         (one.file, one.name, one.time, m.exercise, m.result, m.tries, m.feedback)
         for one in submissions

@@ -42,11 +42,7 @@ def with_solutions(notebook: Any) -> Any:
 
 
 def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
-    """Run all cells in a new kernel in `folder`, in place; an error in a cell is raised.
-
-    `settings` are further environment variables of the kernel. FLOATBASE_HOME is a new folder, so
-    that the notebook's answers do not count as a learner's progress.
-    """
+    """Run all cells in a new kernel in `folder`, in place; an error in a cell is raised."""
     from nbclient import NotebookClient
 
     quiet = [
@@ -61,23 +57,7 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
 
 
 def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[str]:
-    """Write lessons with a solution in place of each exercise, and an explanation below it.
-
-    A file that was edited after an earlier call is kept, and the new text is saved beside it as
-    NAME.solved.new.ipynb.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write; it is created if it does not exist.
-    sources : sequence of Path
-        The lessons; the default is the whole course.
-
-    Returns
-    -------
-    list of str
-        One line for each file that was changed.
-    """
+    """Write lessons with a solution in place of each exercise, and an explanation below it."""
     import nbformat
     from nbformat.v4 import new_markdown_cell
 

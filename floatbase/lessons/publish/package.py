@@ -46,23 +46,7 @@ _Change: TypeAlias = tuple[ast.stmt | ast.expr, str]  # part of a module, and wh
 
 
 def lesson_paths(lessons: Sequence[str]) -> dict[str, Path]:
-    """Return the notebook of each lesson, by its name.
-
-    Parameters
-    ----------
-    lessons : sequence of str
-        Names of lessons, such as "01" or "C"; "1" and "c" are understood.
-
-    Returns
-    -------
-    dict of str to Path
-        Name and path of each lesson, in order.
-
-    Raises
-    ------
-    InputError
-        If there is no such lesson.
-    """
+    """Return the notebook of each lesson, by its name."""
     known = {path.name.split("_")[0]: path for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
     names = [lesson_name(name) for name in lessons]
     if unknown := [name for name in names if name not in known]:
@@ -71,13 +55,7 @@ def lesson_paths(lessons: Sequence[str]) -> dict[str, Path]:
 
 
 def copy_package(folder: Path) -> None:
-    """Copy what `pip install` needs to a new folder: no tests and nothing that was built.
-
-    Raises
-    ------
-    InputError
-        If the folder exists and is not empty.
-    """
+    """Copy what `pip install` needs to a new folder: no tests and nothing that was built."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} exists already. Choose a new folder: --to FOLDER.")
     unwanted = shutil.ignore_patterns("__pycache__", "node_modules", "test", assignment.FILE.name)
@@ -95,32 +73,7 @@ def write_assignment(
     until: str = "",
     with_solutions: bool = False,
 ) -> None:
-    """Write a package for students with some lessons, and without solutions.
-
-    The folder holds the package, these lessons without outputs, lesson 00, the Makefile and the
-    configuration of a JupyterHub.
-    Solutions and explanations of all exercises are removed. The checks stay, because students need
-    them: a check computes the right value in a different way from the solution. The functions with
-    which lesson C continues after an unsolved exercise are encoded.
-
-    Parameters
-    ----------
-    folder : Path
-        A new folder.
-    lessons : sequence of str
-        Names of the assigned lessons, such as "01".
-    teacher : str, optional
-        From whom students get the solutions; `reveal` prints it.
-    until : str, optional
-        When students get the solutions; `reveal` prints it.
-    with_solutions : bool, optional
-        Whether to leave the solutions in the package.
-
-    Raises
-    ------
-    InputError
-        If there is no such lesson, or if the folder exists and is not empty.
-    """
+    """Write a package for students with some lessons, and without solutions."""
     paths = lesson_paths(lessons)
     paths = lesson_paths([_FIRST_LESSON]) | paths
     copy_package(folder)
@@ -202,10 +155,7 @@ def _encoded(text: str, functions: Sequence[str]) -> str:
 
 
 def _without_unused(text: str, words: Counter[str]) -> str:
-    """Remove what nothing uses: imported names, and functions and constants of a module.
-
-    `words` counts the words of the whole course.
-    """
+    """Remove what nothing uses: imported names, and functions and constants of a module."""
     here = Counter(_WORD.findall(text))
     replaced: list[_Change] = []
     for node in ast.parse(text).body:

@@ -28,13 +28,7 @@ _NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 
 class Pictures:
-    """The pictures of a site.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of pictures.js in the built site. The files are written to `pictures` inside it.
-    """
+    """The pictures of a site."""
 
     def __init__(self, folder: Path):
         self._folder = folder / _FOLDER
@@ -75,11 +69,7 @@ class Pictures:
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _shared_files(self) -> dict[str, list[bytes]]:
-        """Collect large commands that several pictures use: name of a file -> commands.
-
-        One file is shared by all robots. Each robot has one file for the commands that most of its
-        pictures use, and one file for the rest.
-        """
+        """Collect large commands that several pictures use: name of a file -> commands."""
         pictures = [
             (set(description["names"]), set(commands))
             for description, commands in self._placed.values()

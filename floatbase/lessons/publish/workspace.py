@@ -32,30 +32,7 @@ _RUN_CELL_KEYS = {
 
 
 def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> list[str]:
-    """Copy new lessons to the learner's folder, and update those that were not edited.
-
-    A lesson that the learner has not edited is replaced if the course has a newer version. An
-    edited lesson stays, and the newer version is saved beside it as NAME.new.ipynb, or
-    NAME.new2.ipynb if the learner has edited that file too, and so on. Outputs do not count as
-    edits.
-
-    Parameters
-    ----------
-    folder : Path
-        Lessons of the course.
-    mine : Path, optional
-        The learner's copies; the default is `folder`/my.
-
-    Returns
-    -------
-    list of str
-        One line for each file that was changed or could not be changed.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be created, or if the course is not installed: a wheel has no lessons.
-    """
+    """Copy new lessons to the learner's folder, and update those that were not edited."""
     if not folder.is_dir():
         raise InputError(
             f"There are no lessons in {folder}. Install floatbase from its repository with `pip "
@@ -95,10 +72,7 @@ def _failure(name: str, error: OSError) -> str:
 
 
 def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
-    """Save the course's text under the first name that is free or holds an unedited copy.
-
-    Returns a line that says what happened, or none if the learner already has this version.
-    """
+    """Save the course's text under the first name that is free or holds an unedited copy."""
     present, last = _digest(copy.name, text), record.get(copy.name)
     beside = (copy.with_suffix(f".new{n if n > 1 else ''}{copy.suffix}") for n in count(1))
     target, message = copy, f"{copy.name}: updated"

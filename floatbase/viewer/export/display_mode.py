@@ -13,11 +13,5 @@ MIMEBUNDLES: dict[str, Callable[..., dict[str, Any]]] = {}
 
 
 def display_mode() -> str:
-    """Return the display mode from the environment variable FLOATBASE_VIEWER.
-
-    Returns
-    -------
-    str
-        "live", the default; "static" for scenes that need no kernel; or a key of `MIMEBUNDLES`.
-    """
+    """Return the display mode from the environment variable FLOATBASE_VIEWER."""
     return os.environ.get(VARIABLE) or "live"

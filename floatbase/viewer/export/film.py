@@ -66,23 +66,7 @@ _SEEK_JS = """t => {
 
 
 def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
-    """Check the width and height of a film; video formats require even numbers.
-
-    Parameters
-    ----------
-    size : array_like, shape (2,)
-        Width and height [pixels].
-
-    Returns
-    -------
-    tuple of int
-        Width and height [pixels].
-
-    Raises
-    ------
-    InputError
-        If a number is odd or not from 100 to 4000.
-    """
+    """Check the width and height of a film; video formats require even numbers."""
     width, height = (
         int(n) if n % 2.0 == 0.0 else 0 for n in as_array("size", size, (2,), "pixels")
     )
@@ -95,22 +79,7 @@ def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
 
 
 def capture(page: str, target: Path, size: tuple[int, int]) -> None:
-    """Write the recording in a page as .mp4 or .gif, or its first picture as .png.
-
-    Parameters
-    ----------
-    page : str
-        HTML of a page with a scene.
-    target : Path
-        File to write; its extension determines the format.
-    size : tuple of int
-        Width and height [pixels]; see `checked_size`.
-
-    Raises
-    ------
-    ViewerError
-        If the browser or a package is missing, or if the recording is too long.
-    """
+    """Write the recording in a page as .mp4 or .gif, or its first picture as .png."""
     # the new file is created first, so that `OSError` is raised now instead of after the work;
     # playwright refuses a thread with an event loop, such as a notebook's
     with whole_file(target, keep_link=True) as part, ThreadPoolExecutor(1) as thread:

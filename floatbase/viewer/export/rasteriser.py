@@ -23,17 +23,7 @@ Pixels = npt.NDArray[np.float32]
 
 
 class Camera(NamedTuple):
-    """A perspective camera.
-
-    Parameters
-    ----------
-    eye, target : ndarray, shape (3,)
-        Position of the camera, and the point that it looks at, in the world frame [m].
-    angle : float
-        Vertical field of view [degrees].
-    size : tuple of int
-        Width and height of the image [pixels].
-    """
+    """A perspective camera."""
 
     eye: Array
     target: Array
@@ -41,19 +31,7 @@ class Camera(NamedTuple):
     size: tuple[int, int]
 
     def project(self, points: Array) -> Array:
-        """Project points to the image.
-
-        Parameters
-        ----------
-        points : ndarray, shape (n, 3)
-            Points in the world frame [m].
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Distance from the left and from the top of the image [pixels], and distance along the
-            view [m].
-        """
+        """Project points to the image."""
         forward = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right = (
@@ -73,11 +51,7 @@ class Camera(NamedTuple):
 
 
 class _Mesh(NamedTuple):
-    """A mesh.
-
-    `vertices` and `normals` have shape (n, 3), `faces` (m, 3), and `colours` (n, 3), from 0 to 1,
-    without light.
-    """
+    """A mesh."""
 
     vertices: Array
     normals: Array
@@ -86,11 +60,7 @@ class _Mesh(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """Pixels covered by triangles.
-
-    `at` is the index of a pixel, row by row. `depth` is negative inverse distance [1/m]; less is
-    nearer. `colour` has shape (n, 3).
-    """
+    """Pixels covered by triangles."""
 
     at: npt.NDArray[np.int64]
     depth: Pixels
@@ -98,17 +68,7 @@ class _Samples(NamedTuple):
 
 
 def draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
-    """Draw opaque meshes, then translucent ones from far to near, then items always on top.
-
-    Parameters
-    ----------
-    items : sequence of Item
-        The meshes.
-    camera : Camera
-        The camera.
-    canvas : ndarray, shape (height, width, 3)
-        The image, RGB from 0 to 1, dimensionless; it is changed in place.
-    """
+    """Draw opaque meshes, then translucent ones from far to near, then items always on top."""
     pixels, depth = (
         canvas.reshape(-1, 3),
         np.full(canvas.shape[0] * canvas.shape[1], 0.0, dtype=np.float32),
@@ -216,11 +176,7 @@ def _split(
 def _rasterised(
     corners: Pixels, start: npt.NDArray[np.int64], sides: tuple[int, int], size: tuple[int, int]
 ) -> _Samples:
-    """Return the pixels in triangles.
-
-    `corners` has shape (n, 3, 6): position, depth and colour. `start` and `sides` describe a box
-    around each triangle, in pixels.
-    """
+    """Return the pixels in triangles."""
     (ax, ay), (bx, by), (cx, cy) = (corners[:, i, :2].T for i in range(3))
     area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
     area = np.where(area == 0.0, np.float32(np.nan), area)  # edge-on: it covers no pixel
@@ -250,10 +206,7 @@ def _rasterised(
 def _linear_function(
     at_start: Pixels, along_x: Pixels, along_y: Pixels, area: Pixels, across: Pixels, down: Pixels
 ) -> Pixels:
-    """Evaluate a linear function on boxes of pixels, shape (n, tall, wide).
-
-    The function is given by its value at the first pixel of each box and by its slopes.
-    """
+    """Evaluate a linear function on boxes of pixels, shape (n, tall, wide)."""
     first, x, y = (part[:, None] / area[:, None] for part in (at_start, along_x, along_y))
     return (first + y * down)[:, :, None] + (x * across)[:, None, :]
 
@@ -287,18 +240,7 @@ _TYPES = {
 
 
 def unpacked(packed: dict[str, Any]) -> Any:
-    """Unpack the numbers of an attribute that `threejs` packed.
-
-    Parameters
-    ----------
-    packed : dict
-        The packed attribute.
-
-    Returns
-    -------
-    ndarray, shape (n, itemSize)
-        The numbers.
-    """
+    """Unpack the numbers of an attribute that `threejs` packed."""
     return np.frombuffer(packed["array"].data, _TYPES[packed["type"]]).reshape(
         -1, packed["itemSize"]
     )

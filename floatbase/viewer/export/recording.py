@@ -39,17 +39,7 @@ _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """Pictures in time.
-
-    Parameters
-    ----------
-    first : Picture
-        Every item that ever appears, as it first appears.
-    command : Update
-        The command that moves the items.
-    duration : float
-        Duration [s].
-    """
+    """Pictures in time."""
 
     first: Picture
     command: protocol.Update
@@ -58,13 +48,7 @@ class Animation:
 
 @dataclass(frozen=True, eq=False)
 class _ItemHistory:
-    """One item in n pictures.
-
-    `item` is the item as it first appears. `present`, shape (n,), tells which pictures show the
-    item. `matrices` has shape (n, 4, 4), `colours` (n, 4) or is None. Where the item is not
-    present, matrices and colours are those of the last picture before that shows it, else of the
-    first.
-    """
+    """One item in n pictures."""
 
     item: Item
     present: npt.NDArray[np.bool_]
@@ -79,31 +63,7 @@ def animate(
     speed: float = 1.0,
     paused: bool = False,
 ) -> Animation:
-    """Make an animation of pictures.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Times [s]; picture i is shown from `times[i]` on.
-    pictures : sequence of Picture
-        n pictures, items by path.
-    root : str
-        Path below which all items lie.
-    speed : float, optional
-        Playback speed, dimensionless; 1 is real time.
-    paused : bool, optional
-        Whether playback waits until the reader presses play.
-
-    Returns
-    -------
-    Animation
-        The animation.
-
-    Raises
-    ------
-    InputError
-        If there are no pictures, or if `times` has a different length.
-    """
+    """Make an animation of pictures."""
     if (
         not isinstance(pictures, Sequence)
         or not all(isinstance(picture, dict) for picture in pictures)
@@ -133,25 +93,7 @@ def animate(
 
 
 def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
-    """Choose the rows of a rollout to draw: the first, the last, and `rate` per second between.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Times of all rows [s].
-    rate : float
-        Rows per second [1/s].
-
-    Returns
-    -------
-    ndarray
-        Indices of the rows.
-
-    Raises
-    ------
-    InputError
-        If `times` is empty.
-    """
+    """Choose the rows of a rollout to draw: the first, the last, and `rate` per second between."""
     t, rate = (
         as_array("times", times, (None,), "s"),
         as_positive("rate", rate, "1/s", maximum=_MAX_RATE),
@@ -165,22 +107,7 @@ def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
 
 
 def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
-    """Remove motion that is shorter than a stride from positions; straight paths do not change.
-
-    Each result is a weighted mean over about one second around its time.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Times, evenly spaced [s].
-    places : array_like, shape (n, 3)
-        Positions in the world frame [m].
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Smoothed positions in the world frame [m].
-    """
+    """Remove motion that is shorter than a stride from positions; straight paths do not change."""
     t, x = as_array("times", times, (None,), "s"), as_array("places", places, (None, 3), "m")
     if len(x) != len(t):
         raise InputError(
@@ -198,40 +125,14 @@ def smoothed(times: npt.ArrayLike, places: npt.ArrayLike) -> Array:
 
 
 def as_rollout(rollout: Rollout) -> Rollout:
-    """Return the rollout, after checking its type.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        The rollout.
-
-    Returns
-    -------
-    Rollout
-        The rollout.
-    """
+    """Return the rollout, after checking its type."""
     from floatbase.simulation import Rollout  # loads the physics, which pictures do not need
 
     return as_instance("rollout", rollout, Rollout)
 
 
 def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array] | None:
-    """Find the push that acts at a row of a rollout; if there are several, the newest.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        The rollout.
-    row : int
-        Index of the row.
-    linger : float, optional
-        Time that a push is still shown after its end [s].
-
-    Returns
-    -------
-    tuple or None
-        Frame, and force in the world frame, shape (3,) [N]; None if no push acts.
-    """
+    """Find the push that acts at a row of a rollout; if there are several, the newest."""
     now = float(as_rollout(rollout).time[as_integer("row", row, -len(rollout), len(rollout) - 1)])
     linger = as_positive("linger", linger, "s", allow_zero=True)
     for push in sorted(rollout.pushes, key=lambda push: push.start, reverse=True):
@@ -241,20 +142,7 @@ def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array
 
 
 def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
-    """Select the contacts whose forces act at points; the others cannot be drawn.
-
-    Parameters
-    ----------
-    contacts : Contacts
-        All contacts.
-
-    Returns
-    -------
-    contacts : Contacts
-        The contacts whose forces act at points.
-    columns : ndarray of bool, shape (k,)
-        Which entries of λ are theirs.
-    """
+    """Select the contacts whose forces act at points; the others cannot be drawn."""
     as_instance("contacts", contacts, Contacts)
     drawn = np.array([isinstance(c, FrictionContact) for c in contacts], dtype=bool)
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
@@ -264,39 +152,12 @@ def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.b
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
-    """Find the swing feet at a row of a rollout: contacts that the controller does not use then.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        The rollout.
-    row : int
-        Index of the row.
-
-    Returns
-    -------
-    frozenset of str
-        Names of the feet.
-    """
+    """Find the swing feet at a row of a rollout: contacts that the controller does not use then."""
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 
 def joint_limits_at(rollout: Rollout, row: int) -> dict[str, Any]:
-    """Return the options that draw the joint limits of the controller at a row of a rollout.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        The rollout.
-    row : int
-        Index of the row.
-
-    Returns
-    -------
-    dict
-        Options `joint_limits` and `qdd` of a picture. No option if the controller had no joint
-        limits or no plan; the picture then shows how near the limits of the URDF are.
-    """
+    """Return the options that draw the joint limits of the controller at a row of a rollout."""
     limits, rows = as_rollout(rollout).joint_limits, rollout.planned_qdd
     if limits is None or rows is None:
         return {}
@@ -370,10 +231,7 @@ def _packed_floats(values: Array) -> umsgpack.Ext:
 
 
 def _quaternions(rotations: Array) -> Array:
-    """Return rotations (n, 3, 3) as quaternions x y z w, shape (n, 4).
-
-    Of q and -q, the one nearer to the previous quaternion is returned.
-    """
+    """Return rotations (n, 3, 3) as quaternions x y z w, shape (n, 4)."""
     from scipy.spatial.transform import Rotation
 
     quaternions = Rotation.from_matrix(rotations).as_quat()

@@ -45,22 +45,7 @@ _COLOURS = 256
 
 
 def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
-    """Draw a picture as a PNG file, with its scene's camera, background, title and legend.
-
-    Parameters
-    ----------
-    picture : Picture
-        The picture.
-    scene : Scene
-        The scene with the settings.
-    height : int
-        Height of the picture in the page [pixels].
-
-    Returns
-    -------
-    bytes
-        The PNG file.
-    """
+    """Draw a picture as a PNG file, with its scene's camera, background, title and legend."""
     size = SUPERSAMPLING * round(_ASPECT * _SCALE * height), SUPERSAMPLING * round(_SCALE * height)
     background = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
     canvas, camera = _background(size, background), _camera(picture, scene, size)
@@ -76,18 +61,7 @@ def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
 
 
 def side_by_side(files: Sequence[bytes]) -> bytes:
-    """Join several PNG files of pictures from left to right.
-
-    Parameters
-    ----------
-    files : sequence of bytes
-        The PNG files.
-
-    Returns
-    -------
-    bytes
-        The joined PNG file.
-    """
+    """Join several PNG files of pictures from left to right."""
     images = [Image.open(io.BytesIO(file)).convert("RGB") for file in files]
     whole = Image.new(
         "RGB",
@@ -100,21 +74,7 @@ def side_by_side(files: Sequence[bytes]) -> bytes:
 
 
 def with_thumbnail(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Add an image to a stored widget, for readers that cannot show widgets.
-
-    Parameters
-    ----------
-    bundle : dict or tuple
-        Mimebundle of the widget, as `_repr_mimebundle_` returns it.
-    *pictures : Widget
-        Widgets of viewers. Those that hold a copy of a scene as HTML (see `Viewer.widget`) are
-        stored as that copy.
-
-    Returns
-    -------
-    tuple of dict
-        Data and metadata.
-    """
+    """Add an image to a stored widget, for readers that cannot show widgets."""
     data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
     scenes = [picture.value for picture in pictures if not hasattr(picture, "thumbnail")]
     if scenes:

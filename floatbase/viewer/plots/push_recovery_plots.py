@@ -198,10 +198,7 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
 def _picture(
     directions: Array, curves: list[_Curve], middle: Array, feet: Array, scale: float | None
 ) -> Picture:
-    """Draw curves over directions [rad] around a point, shape (3,), on the ground below it.
-
-    The ground is where the feet stand, shape (n, 3) [m].
-    """
+    """Draw curves over directions [rad] around a point, shape (3,), on the ground below it."""
     centre = np.array([*middle[:2], feet[:, 2].mean() + _HEIGHT_ABOVE_GROUND])
     span = float(np.linalg.norm((feet - centre)[:, :2], axis=1).max())
     largest = max(float(values.max()) for _, values, _, _ in curves)
@@ -277,11 +274,7 @@ def _closed(values: Array) -> Array:
 
 
 def _loop(centre: Array, corners: Array, radius: float, colour: RGB) -> Item:
-    """Draw a closed line around `centre`, shape (3,), in the world frame [m].
-
-    `corners` are relative to the centre, shape (n, 3) [m]; `radius` is half the width of the line
-    [m].
-    """
+    """Draw a closed line around `centre`, shape (3,), in the world frame [m]."""
     ends = np.roll(corners, -1, axis=0)
     rods = [
         geometry.cylinder(a, b, radius, 8)

@@ -359,10 +359,7 @@ def _contact_names(rollout: Rollout) -> tuple[str, ...]:
 
 
 def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
-    """Return the normal force of each contact and time, shape (contacts, n) [N].
-
-    The force of a flat foot is the sum over its corners.
-    """
+    """Return the normal force of each contact and time, shape (contacts, n) [N]."""
     points, starts = (
         _normal(rollout, forces),
         np.cumsum(

@@ -14,17 +14,7 @@ from floatbase.viewer.scene.shapes import Picture
 
 
 class ConeShape(NamedTuple):
-    """Shape of friction cones: round or polyhedral.
-
-    Parameters
-    ----------
-    facets : int or None
-        Number of facets of the friction polyhedra; None draws round cones.
-    inner_approximation : bool
-        Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
-    facet_rotation : float
-        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
-    """
+    """Shape of friction cones: round or polyhedral."""
 
     facets: int | None
     inner_approximation: bool
@@ -34,28 +24,7 @@ class ConeShape(NamedTuple):
 def cone_picture(
     shape: ConeShape, position: Array, normal: Array, mu: float, height: float, force: Array | None
 ) -> Picture:
-    """Draw a cone or polyhedron in a colour that shows whether the force is inside.
-
-    Parameters
-    ----------
-    shape : ConeShape
-        Shape of the cone.
-    position : ndarray, shape (3,)
-        Contact point in the world frame [m].
-    normal : ndarray, shape (3,)
-        Unit normal of the ground in the world frame.
-    mu : float
-        Friction coefficient [-].
-    height : float
-        Height of the drawn cone [m].
-    force : ndarray, shape (3,), or None
-        Contact force in the world frame [N]. Without one, the cone is faint and grey.
-
-    Returns
-    -------
-    Picture
-        The cone, with a rim if the force is outside.
-    """
+    """Draw a cone or polyhedron in a colour that shows whether the force is inside."""
     key = (tuple(normal.tolist()), mu)
     status: str
     made: Picture

@@ -14,15 +14,7 @@ from floatbase.viewer.scene.colours import MEASURED, PLANNED, RGB
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Contact forces at n points in the world frame [N].
-
-    Parameters
-    ----------
-    measured : ndarray, shape (n, 3), or None
-        Measured forces [N].
-    planned : ndarray, shape (n, 3), or None
-        Planned forces [N].
-    """
+    """Contact forces at n points in the world frame [N]."""
 
     measured: Array | None
     planned: Array | None
@@ -41,27 +33,7 @@ class Forces:
 def as_point_forces(
     name: str, value: npt.ArrayLike | None, contacts: Contacts | None
 ) -> Array | None:
-    """Check forces, and arrange them as one row per contact point.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for error messages.
-    value : array_like, shape (3 n,) or (n, 3), or None
-        Forces in the world frame [N].
-    contacts : Contacts or None
-        Contacts with n points.
-
-    Returns
-    -------
-    ndarray, shape (n, 3), or None
-        The forces [N].
-
-    Raises
-    ------
-    InputError
-        If forces are given without contacts, or if their number does not match the contact points.
-    """
+    """Check forces, and arrange them as one row per contact point."""
     if value is None:
         return None
     if contacts is None:

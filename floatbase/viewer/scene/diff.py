@@ -10,16 +10,7 @@ ROOT = "/meshcat/"
 
 
 class DiffRenderer:
-    """Draws whole pictures into a window by sending only what changes.
-
-    Items that the next picture does not contain are removed. `picture` is what the window shows
-    now.
-
-    Parameters
-    ----------
-    window : Window
-        Window to draw into.
-    """
+    """Draws whole pictures into a window by sending only what changes."""
 
     def __init__(self, window: Window):
         self.window = window
@@ -28,20 +19,7 @@ class DiffRenderer:
         self._settings: dict[protocol.Key, bytes] = {}
 
     def draw(self, picture: Picture, *settings: protocol.Update) -> int:
-        """Show this picture and nothing else.
-
-        Parameters
-        ----------
-        picture : Picture
-            Items to draw, path -> item.
-        *settings : Update
-            Settings of the page, as for `set`, sent in the same frame.
-
-        Returns
-        -------
-        int
-            Number of commands sent; all go into one frame.
-        """
+        """Show this picture and nothing else."""
         picture = with_normal_paths(picture)
         updates = [protocol.delete(ROOT)] if self._interrupted else []
         old: Picture = {} if self._interrupted else self.picture
@@ -66,25 +44,13 @@ class DiffRenderer:
         return len(updates)
 
     def set(self, *updates: protocol.Update) -> None:
-        """Send those settings of the page that have changed, such as background, camera or title.
-
-        Parameters
-        ----------
-        *updates : Update
-            Settings to send.
-        """
+        """Send the settings of the page that have changed, such as background, camera or title."""
         new_settings = self._unsent(updates)
         if new_settings:
             self.force_set(*new_settings)
 
     def force_set(self, *updates: protocol.Update) -> None:
-        """Send settings of the page even if unchanged, because the user may have altered them.
-
-        Parameters
-        ----------
-        *updates : Update
-            Settings to send.
-        """
+        """Send settings of the page even if unchanged, because the user may have altered them."""
         self.window.put(updates)
         self._settings.update(updates)
 
@@ -94,10 +60,7 @@ class DiffRenderer:
 
 
 def _can_become(old: Item, new: Item | None) -> bool:
-    """Return whether the item at a path can change into `new`.
-
-    An item that loses its colour is drawn anew, because no command removes a colour.
-    """
+    """Return whether the item at a path can change into `new`."""
     return new is not None and (old.colour is None or new.colour is not None)
 
 

@@ -36,17 +36,7 @@ _SEGMENTS = 24  # of a swing path
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """Style of the marks of a gait.
-
-    Parameters
-    ----------
-    size : float
-        Size of the robot [m].
-    ground : Plane, Planes or Terrain
-        Ground on which the marks lie.
-    colour : tuple of float
-        RGB of the zero-moment point, in contrast to the page's background.
-    """
+    """Style of the marks of a gait."""
 
     size: float
     ground: DrawnGround = LEVEL
@@ -54,25 +44,7 @@ class Style:
 
 
 def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
-    """Draw the current plan of a walk.
-
-    The picture shows footholds, swing paths, the capture point at its current position, and the
-    planned zero-moment point.
-
-    Parameters
-    ----------
-    walk : Walk
-        Behaviour. Nothing is drawn before its first control step.
-    state : State
-        Current state of the robot.
-    style : Style
-        Style of the marks.
-
-    Returns
-    -------
-    Picture
-        The marks, path -> item.
-    """
+    """Draw the current plan of a walk."""
     if as_instance("walk", walk, Walk).plan is None:
         return {}
     assert walk.plan is not None and walk.time is not None
@@ -86,26 +58,7 @@ def walk_overlay(walk: Walk, state: State, style: Style) -> Picture:
 
 
 def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Picture:
-    """Draw a stored step as it was planned when its stance began.
-
-    The capture point is drawn where it is at time t.
-
-    Parameters
-    ----------
-    step : StepPlan
-        An entry of `walk.history`.
-    t : float
-        Time [s].
-    state : State
-        State of the robot at that time.
-    style : Style
-        Style of the marks.
-
-    Returns
-    -------
-    Picture
-        The marks, path -> item.
-    """
+    """Draw a stored step as it was planned when its stance began."""
     marks = _capture_point_and_zmp(
         as_instance("step", step, StepPlan).plan, as_number("t", t, "s"), state, style
     )
@@ -113,37 +66,13 @@ def step_overlay(step: StepPlan, t: float, state: State, style: Style) -> Pictur
 
 
 def step_at(steps: Sequence[StepPlan], t: float) -> StepPlan | None:
-    """Find the step of a walk that contains a time.
-
-    Parameters
-    ----------
-    steps : sequence of StepPlan
-        Steps in the order of time.
-    t : float
-        Time [s].
-
-    Returns
-    -------
-    StepPlan or None
-        The step, or None before the first one.
-    """
+    """Find the step of a walk that contains a time."""
     i = bisect_right(steps, as_number("t", t, "s") + 1e-9, key=lambda step: step.time)
     return steps[i - 1] if i else None
 
 
 def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
-    """Check a collection of steps.
-
-    Parameters
-    ----------
-    steps : iterable of StepPlan
-        Steps, as `walk.history`.
-
-    Returns
-    -------
-    list of StepPlan
-        The steps.
-    """
+    """Check a collection of steps."""
     try:
         steps = list(steps)
     except TypeError:
@@ -172,10 +101,7 @@ def _footholds_and_swings(
     state: State,
     size: float,
 ) -> Picture:
-    """Draw an outline at each foothold, and the paths of the feet in the air.
-
-    `yaw_changes` holds the rotation of the robot until each foot lands [rad].
-    """
+    """Draw an outline at each foothold, and the paths of the feet in the air."""
     picture: Picture = {}
     forward_x, forward_y, _ = state.frame_pose("base").rotation[:, 0]
     yaw = float(np.arctan2(forward_y, forward_x))
@@ -200,11 +126,7 @@ def _foot(robot: Robot, name: str) -> Foot:
 
 
 def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
-    """Draw where a foot will stand.
-
-    `at` is the point below its centre, shape (3,), in the world frame [m]; `rotation` is the
-    heading of the robot, shape (3, 3).
-    """
+    """Draw where a foot will stand."""
     at = at + [0.0, 0.0, _HEIGHT_ABOVE_GROUND * size]
     if foot.corners is None:
         radius = max(2.0 * foot.radius, 0.04 * size)
@@ -225,11 +147,7 @@ def _offset_to_ground(foot: Foot, standing: State) -> Array:
 
 
 def _swing_path(swing: SwingPath, offset: Array) -> Item:
-    """Draw the path of a swing, displaced by an offset, shape (3,) [m].
-
-    One unit curve is stretched, so a path with a new target at each control step costs a matrix but
-    no new shape.
-    """
+    """Draw the path of a swing, displaced by an offset, shape (3,) [m]."""
     step_vector = swing.end - swing.start
     length = float(np.linalg.norm(step_vector))
     x = step_vector / length if length > _MIN_LENGTH else np.array([1.0, 0.0, 0.0])

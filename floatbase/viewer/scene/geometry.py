@@ -18,18 +18,7 @@ Mesh = tuple[Vertices, Faces]
 
 
 def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
-    """Merge several meshes into one.
-
-    Parameters
-    ----------
-    meshes : sequence of tuple
-        Vertices, shape (n, 3), and faces, shape (m, 3), of each mesh.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces of the merged mesh.
-    """
+    """Merge several meshes into one."""
     starts = np.cumsum([0] + [len(np.asarray(vertices)) for vertices, _ in meshes])
     faces = [np.asarray(part) + start for (_, part), start in zip(meshes, starts, strict=False)]
     vertices = [np.asarray(part) for part, _ in meshes]
@@ -37,22 +26,7 @@ def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
 
 
 def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
-    """Make a surface of revolution around the z axis.
-
-    Each piece of the profile has its own vertices, so that its edges look sharp.
-
-    Parameters
-    ----------
-    profile : sequence of tuple
-        Radius and height of each corner. A profile listed upwards faces outwards.
-    sides : int, optional
-        Number of sides of a circle.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make a surface of revolution around the z axis."""
     angles = 2.0 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
     bands = []
@@ -63,10 +37,7 @@ def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 2
 
 
 def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
-    """Return the faces between two circles.
-
-    `low` and `high` tell whether the lower and the upper circle have a radius above 0.
-    """
+    """Return the faces between two circles."""
     i = np.arange(sides)
     j = (i + 1) % sides
     up = np.stack([i, j, j + sides], axis=1) if low else np.zeros((0, 3), int)
@@ -75,20 +46,7 @@ def _band(sides: int, low: bool, high: bool) -> npt.NDArray[np.int64]:
 
 
 def sphere(radius: float, sides: int = 20) -> Mesh:
-    """Make a sphere around the origin.
-
-    Parameters
-    ----------
-    radius : float
-        Radius [m].
-    sides : int, optional
-        Number of sides of the sphere's equator.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make a sphere around the origin."""
     heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
     angles = 2.0 * np.pi * np.arange(sides) / sides
     rings = [
@@ -104,22 +62,7 @@ def sphere(radius: float, sides: int = 20) -> Mesh:
 
 
 def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 14) -> Mesh:
-    """Make a closed cylinder.
-
-    Parameters
-    ----------
-    start, end : array_like, shape (3,)
-        Centres of the two ends [m].
-    radius : float
-        Radius [m].
-    sides : int, optional
-        Number of sides of a circle.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make a closed cylinder."""
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
     vertices, faces = surface_of_revolution(
@@ -129,18 +72,7 @@ def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int
 
 
 def rotation_with_z_axis(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return a rotation whose z axis is a given direction.
-
-    Parameters
-    ----------
-    direction : array_like, shape (3,)
-        Unit vector.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        The rotation.
-    """
+    """Return a rotation whose z axis is a given direction."""
     x, y, z = np.asarray(direction, dtype=float)
     # Duff et al., Building an orthonormal basis, revisited (2017)
     sign = 1.0 if z >= 0 else -1.0
@@ -152,36 +84,14 @@ def rotation_with_z_axis(direction: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def convex_polygon(corners: npt.ArrayLike) -> Mesh:
-    """Make a flat convex polygon.
-
-    Parameters
-    ----------
-    corners : array_like, shape (n, 3)
-        Corners [m]. The polygon faces the side from which they run counter-clockwise.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make a flat convex polygon."""
     points = np.asarray(corners, dtype=np.float32)
     i = np.arange(1, len(points) - 1)
     return points, np.stack([np.zeros_like(i), i, i + 1], axis=1).astype(np.uint32)
 
 
 def pyramid(rays: npt.ArrayLike) -> Mesh:
-    """Make the sides of a pyramid with its tip at the origin; each side has its own vertices.
-
-    Parameters
-    ----------
-    rays : array_like, shape (n, 3)
-        Edges of the pyramid [m].
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make the sides of a pyramid with its tip at the origin; each side has its own vertices."""
     ends = np.asarray(rays, dtype=np.float32)
     return merged(
         [
@@ -192,24 +102,7 @@ def pyramid(rays: npt.ArrayLike) -> Mesh:
 
 
 def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:
-    """Make a part of a torus around the z axis.
-
-    Parameters
-    ----------
-    radius : float
-        Radius of the ring [m].
-    tube : float
-        Radius of the tube [m].
-    start, end : float
-        Angles where the part begins and ends [rad].
-    sides : int, optional
-        Number of pieces along the ring.
-
-    Returns
-    -------
-    tuple of ndarray
-        Vertices and faces.
-    """
+    """Make a part of a torus around the z axis."""
     around = np.linspace(start, end, sides + 1)
     across = 2.0 * np.pi * np.arange(10) / 10
     reach = radius + tube * np.cos(across)
@@ -222,17 +115,6 @@ def torus_arc(radius: float, tube: float, start: float, end: float, sides: int =
 
 
 def round_1_2_5(value: float) -> float:
-    """Round to 1, 2 or 5 times a power of ten.
-
-    Parameters
-    ----------
-    value : float
-        Positive number [-].
-
-    Returns
-    -------
-    float
-        The round number whose ratio to `value` is nearest to 1.
-    """
+    """Round to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda m: abs(np.log(m * power / value))) * power)

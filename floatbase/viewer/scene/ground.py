@@ -32,15 +32,7 @@ CAMERA_GRID = 0.5
 
 
 class Plane(NamedTuple):
-    """The points p with normal · p = offset.
-
-    Parameters
-    ----------
-    normal : tuple of float
-        Unit normal in the world frame, pointing upwards, three numbers.
-    offset : float
-        Distance from the origin along the normal [m].
-    """
+    """The points p with normal · p = offset."""
 
     normal: tuple[float, float, float]
     offset: float = 0.0
@@ -51,37 +43,12 @@ class Plane(NamedTuple):
         return (self,)
 
     def height(self, point: Array) -> float:
-        """Return the height of the plane below or above a point.
-
-        Parameters
-        ----------
-        point : ndarray, shape (3,)
-            Point in the world frame [m].
-
-        Returns
-        -------
-        float
-            z coordinate of the plane [m].
-        """
+        """Return the height of the plane below or above a point."""
         x, y, z = self.normal
         return (self.offset - x * float(point[0]) - y * float(point[1])) / z
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """Draw the grid of the plane.
-
-        Parameters
-        ----------
-        colour : tuple of float
-            RGB of the lines.
-        around : ndarray, shape (3,), optional
-            Point around which the grid extends at least 3 m, in the world frame [m]. By default,
-            the origin.
-
-        Returns
-        -------
-        Item
-            The lines.
-        """
+        """Draw the grid of the plane."""
         i, j = (
             (0, 0)
             if around is None
@@ -91,61 +58,21 @@ class Plane(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Several planes that are solid below, such as the two sides of a valley.
-
-    At each point, the highest plane is the visible ground.
-
-    Parameters
-    ----------
-    planes : tuple of Plane
-        The planes.
-    """
+    """Several planes that are solid below, such as the two sides of a valley."""
 
     planes: tuple[Plane, ...]
 
     def height(self, point: Array) -> float:
-        """Return the height of the ground below or above a point.
-
-        Parameters
-        ----------
-        point : ndarray, shape (3,)
-            Point in the world frame [m].
-
-        Returns
-        -------
-        float
-            z coordinate of the ground [m].
-        """
+        """Return the height of the ground below or above a point."""
         return max(plane.height(point) for plane in self.planes)
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """Draw the visible parts of all grids, around the origin.
-
-        Parameters
-        ----------
-        colour : tuple of float
-            RGB of the lines.
-        around : ndarray, shape (3,), optional
-            Ignored.
-
-        Returns
-        -------
-        Item
-            The lines.
-        """
+        """Draw the visible parts of all grids, around the origin."""
         return _visible_lines(self, colour)
 
 
 class Terrain(NamedTuple):
-    """Planes with boxes on them, such as steps.
-
-    Parameters
-    ----------
-    base : Plane or Planes
-        The planes.
-    boxes : tuple of tuple
-        x0, x1, y0, y1 and top of each box, in the world frame [m].
-    """
+    """Planes with boxes on them, such as steps."""
 
     base: Plane | Planes
     boxes: tuple[tuple[float, float, float, float, float], ...]
@@ -156,37 +83,13 @@ class Terrain(NamedTuple):
         return self.base.planes
 
     def height(self, point: Array) -> float:
-        """Return the height of the ground below or above a point.
-
-        Parameters
-        ----------
-        point : ndarray, shape (3,)
-            Point in the world frame [m].
-
-        Returns
-        -------
-        float
-            z coordinate of the highest plane or box there [m].
-        """
+        """Return the height of the ground below or above a point."""
         x, y = float(point[0]), float(point[1])
         tops = (top for x0, x1, y0, y1, top in self.boxes if x0 <= x <= x1 and y0 <= y <= y1)
         return max([self.base.height(point), *tops])
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
-        """Draw the grid of the planes.
-
-        Parameters
-        ----------
-        colour : tuple of float
-            RGB of the lines.
-        around : ndarray, shape (3,), optional
-            Point around which the grid extends, as for the planes.
-
-        Returns
-        -------
-        Item
-            The lines.
-        """
+        """Draw the grid of the planes."""
         return self.base.lines(colour, around)
 
 
@@ -195,22 +98,7 @@ LEVEL = Plane((0.0, 0.0, 1.0))
 
 
 def displacement(ground: DrawnGround, start: Array, end: Array) -> Array:
-    """Return the displacement between two positions that follows the ground up or down.
-
-    Boxes count as ramps, so that a camera that follows does not jump.
-
-    Parameters
-    ----------
-    ground : Plane, Planes or Terrain
-        The ground.
-    start, end : ndarray, shape (3,)
-        Positions in the world frame [m].
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Horizontal displacement and change of the ground's height [m].
-    """
+    """Return the displacement between two positions that follows the ground up or down."""
     x, y = (end - start)[:2]
     return np.array([x, y, _smooth_height(ground, end) - _smooth_height(ground, start)])
 
@@ -229,41 +117,12 @@ def _smooth_height(ground: DrawnGround, point: Array) -> float:
 
 
 def blocks(ground: DrawnGround, colour: RGB) -> Picture:
-    """Draw the boxes of the ground, with their edges.
-
-    Parameters
-    ----------
-    ground : Plane, Planes or Terrain
-        The ground.
-    colour : tuple of float
-        RGB of the boxes.
-
-    Returns
-    -------
-    Picture
-        Faces and edges; nothing for a ground without boxes.
-    """
+    """Draw the boxes of the ground, with their edges."""
     return _blocks(ground, colour) if isinstance(ground, Terrain) else {}
 
 
 def plane_under(normals: Array, positions: Array) -> Plane:
-    """Return the slope on which contact points stand.
-
-    The result is level ground through the origin if there are no points, if the normals differ, if
-    the points do not lie in one plane, or if they stand on a wall.
-
-    Parameters
-    ----------
-    normals : ndarray, shape (n, 3)
-        Unit normals in the world frame.
-    positions : ndarray, shape (n, 3)
-        Contact points in the world frame [m].
-
-    Returns
-    -------
-    Plane
-        The slope.
-    """
+    """Return the slope on which contact points stand."""
     if not len(normals) or np.ptp(normals, axis=0).max() > 1e-6 or normals[0, 2] < MIN_VERTICAL:
         return LEVEL
     heights = positions @ normals[0]
@@ -339,11 +198,7 @@ def _face(corner: Array, side: Array, other_side: Array) -> geometry.Mesh:
 
 
 def _parts_above(plane: Plane, ends: Array) -> Array:
-    """Return the parts of lines that lie above a plane.
-
-    `ends` has shape (n, 2, 3), in the world frame [m]. The result has the same form, with at most n
-    lines.
-    """
+    """Return the parts of lines that lie above a plane."""
     clear = ends @ np.array(plane.normal) - plane.offset
     seen = clear.max(axis=1) > 0.0
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]

@@ -18,22 +18,7 @@ _SUBSCRIPT_SCALE = 0.68  # size of a subscript, as a fraction of that of the tex
 
 
 def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
-    """Render a line of text.
-
-    Parameters
-    ----------
-    text : str
-        The text. Braces make a subscript: "f{c}".
-    plate : bool
-        Whether a plate lies behind the text.
-    colour : tuple of float
-        RGB of the text.
-
-    Returns
-    -------
-    ndarray, shape (height, width, 2)
-        Grey value and opacity of each pixel, 0 to 255.
-    """
+    """Render a line of text."""
     # re.split with a group returns text and subscripts alternately
     parts = [(part, i % 2 == 1) for i, part in enumerate(re.split(r"\{([^}]*)\}", text)) if part]
     widths = [font(is_subscript).getlength(part) for part, is_subscript in parts]
@@ -56,21 +41,7 @@ def text_image(text: str, plate: bool, colour: RGB) -> npt.NDArray[np.uint8]:
 
 @cache
 def font(is_subscript: bool = False) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Load the font of the labels.
-
-    The font is matplotlib's DejaVu Sans, which has Greek letters and mathematical symbols. Without
-    matplotlib, it is Pillow's default font.
-
-    Parameters
-    ----------
-    is_subscript : bool, optional
-        Whether to return the smaller font of subscripts.
-
-    Returns
-    -------
-    ImageFont
-        The font.
-    """
+    """Load the font of the labels."""
     size = FONT_SIZE * (_SUBSCRIPT_SCALE if is_subscript else 1.0)
     spec = find_spec("matplotlib")
     if spec is not None and spec.submodule_search_locations:

@@ -16,21 +16,7 @@ _CONE_KINDS: dict[RGBA | None, str] = {
 
 
 def kinds(picture: Picture) -> set[str]:
-    """Find which kinds of `LEGEND` a picture shows.
-
-    The kind of an item is the first part of its path. Those of friction cones contain their status,
-    such as "idle cone" for a cone without a force; a highlighted facet is an "active cone".
-
-    Parameters
-    ----------
-    picture : Picture
-        The picture.
-
-    Returns
-    -------
-    set of str
-        The kinds.
-    """
+    """Find which kinds of `LEGEND` a picture shows."""
     found = set()
     for path, item in picture.items():
         kind, *rest = path.strip("/").split("/")
@@ -46,24 +32,7 @@ def kinds(picture: Picture) -> set[str]:
 def command(
     shown: frozenset[str], ghost_name: str, text: RGB, user_entries: tuple[Entry, ...] = ()
 ) -> protocol.Update:
-    """Make the command for a legend.
-
-    Parameters
-    ----------
-    shown : frozenset of str
-        Kinds of items in the picture.
-    ghost_name : str
-        Name of the ghost in the legend.
-    text : tuple of float
-        RGB of items that have the colour of text.
-    user_entries : tuple, optional
-        Kind, colour and meaning of user-defined entries, listed after those of `LEGEND`.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Make the command for a legend."""
     colours = dict.fromkeys(("push", "multiplier", "zmp"), text)
     items = [
         [

@@ -20,25 +20,7 @@ _RADIUS = 0.075  # fraction of the robot's size
 def limit_rings(
     state: State, limits: JointLimits, qdd: npt.ArrayLike | None, size: float
 ) -> Picture:
-    """Draw a ring at each joint that is near a position limit, or whose limit is active.
-
-    Parameters
-    ----------
-    state : State
-        State of the robot.
-    limits : JointLimits
-        Limits of its joints.
-    qdd : array_like, shape (nv,), or None
-        Accelerations that the controller planned in this state [rad/s² or m/s²]. A limit is active
-        if a joint's acceleration is at its bound. None for no plan.
-    size : float
-        Size of the robot [m].
-
-    Returns
-    -------
-    Picture
-        Rings below the paths "active_limit" and "near_limit".
-    """
+    """Draw a ring at each joint that is near a position limit, or whose limit is active."""
     robot = state.robot
     near = limits.near(state, NEAR)
     active = np.zeros_like(near) if qdd is None else limits.reached(state, qdd)

@@ -274,10 +274,7 @@ def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
 
 @lru_cache(maxsize=64)
 def _unit_curled_arrow(colour: RGB, on_top: bool) -> Shape:
-    """Return three quarters of a ring of radius 1 around z with three heads.
-
-    One of the heads is visible from any side.
-    """
+    """Return three quarters of a ring of radius 1 around z with three heads."""
     end = 1.5 * np.pi - 0.3
     ring = geometry.torus_arc(1.0, 0.055, 0.0, end)
     heads = [_arrow_head(angle) for angle in (end / 3.0, 2.0 * end / 3.0, end)]
@@ -293,11 +290,7 @@ def _arrow_head(angle: float) -> geometry.Mesh:
 
 @lru_cache(maxsize=64)
 def _outlined_arrow(colour: RGB, outline: RGB, slenderness: int) -> Shape:
-    """Return the unit arrow, drawn over a wider one.
-
-    `slenderness` is its length divided by the radius of its shaft. The faces of a mesh on top are
-    drawn in order, so the outline comes first.
-    """
+    """Return the unit arrow, drawn over a wider one."""
     (_, _), (shaft, _), (_, neck), (head, _), (_, tip) = ARROW
     opening = head / (slenderness * (tip - neck))  # of the head, as it is drawn
     back = OUTLINE / slenderness

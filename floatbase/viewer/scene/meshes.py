@@ -25,19 +25,7 @@ from floatbase.viewer.scene.colours import ROBOT
 
 @dataclass(frozen=True, eq=False)
 class JointMesh:
-    """Mesh that moves with one joint.
-
-    Parameters
-    ----------
-    joint : int
-        Index of the joint in the Pinocchio model.
-    vertices : ndarray, shape (n, 3)
-        Vertices in the joint's frame [m].
-    faces : ndarray, shape (m, 3)
-        Indices of the vertices of each triangle.
-    colours : ndarray, shape (n, 3)
-        RGB of each vertex, 0 to 255.
-    """
+    """Mesh that moves with one joint."""
 
     joint: int
     vertices: npt.NDArray[np.float32]
@@ -46,19 +34,7 @@ class JointMesh:
 
 
 def robot_meshes(robot: Robot) -> list[JointMesh]:
-    """Find the meshes of a robot.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    list of JointMesh
-        One mesh for each joint that moves something visible. Fixed parts belong to joint 0, the
-        world.
-    """
+    """Find the meshes of a robot."""
     asset = _mesh_file(robot.urdf, robot.joint_names)
     if asset is not None:
         return _merged_by_joint(
@@ -76,24 +52,7 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
 
 
 def appearance_digest(urdf: str, moving: Collection[str]) -> str:
-    """Compute a digest of everything in a URDF that light meshes are made from.
-
-    The digest covers the visuals of the links, and how links are welded together. Positions of
-    moving joints and joints to the link "world" do not count, because a robot looks the same with
-    joints locked and without that link.
-
-    Parameters
-    ----------
-    urdf : str
-        Text of the URDF.
-    moving : collection of str
-        Names of the joints that move in the robot of the light meshes.
-
-    Returns
-    -------
-    str
-        The digest.
-    """
+    """Compute a digest of everything in a URDF that light meshes are made from."""
     root, visuals = ElementTree.fromstring(urdf), ElementTree.Element("looks")
     visuals.extend(root.findall("material"))
     for link in root.findall("link"):
@@ -132,10 +91,7 @@ Part = tuple[str, npt.NDArray[np.float32], npt.NDArray[np.uint32], npt.NDArray[n
 
 @lru_cache(maxsize=8)
 def _mesh_parts(asset: Path) -> list[Part]:
-    """Return joint name, vertices, faces and colours of each part in a file.
-
-    assets/build_meshes.py describes the file.
-    """
+    """Return joint name, vertices, faces and colours of each part in a file."""
     parts = []
     with np.load(asset) as file:
         data = {name: file[name] for name in file.files}
@@ -155,11 +111,7 @@ def _joint_meshes(
     faces: npt.NDArray[np.uint32],
     colours: npt.NDArray[np.uint8],
 ) -> list[JointMesh]:
-    """Return one part as the mesh of its joint, or of the parent joint if the joint is locked.
-
-    A part whose joint is not in the model gives nothing. Parts of the world and of the base move
-    with a floating base and are fixed otherwise.
-    """
+    """Return one part as the mesh of its joint, or of the parent joint if the joint is locked."""
     model = robot.model
     if joint in ("universe", "root_joint"):
         return [JointMesh(1 if robot.is_floating else 0, vertices, faces, colours)]

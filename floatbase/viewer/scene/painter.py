@@ -36,29 +36,7 @@ MIN_FORCE = 1e-3  # fraction of the robot's weight: a smaller force is neither d
 
 @dataclass(frozen=True, eq=False)
 class Painter:
-    """Makes pictures of a robot, without drawing them on a page.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    requested_scale : float or None
-        Length of a drawn force [m/N]; None for a length that suits the robot.
-    facets : int or None
-        Number of facets of the friction polyhedra; None draws round cones.
-    inner_approximation : bool
-        Whether the polyhedra lie inside the cones, as for `FrictionPolyhedron`.
-    facet_rotation : float
-        Rotation of the facets about the normal [rad], as for `FrictionPolyhedron`.
-    ground : Plane, Planes, Terrain or None
-        Ground; None for the plane on which the contacts stand.
-    line_colour : tuple of float
-        RGB of the lines on the ground.
-    text_colour : tuple of float
-        RGB of text.
-    background_colour : tuple of float
-        RGB of the background.
-    """
+    """Makes pictures of a robot, without drawing them on a page."""
 
     robot: Robot
     requested_scale: float | None
@@ -78,31 +56,7 @@ class Painter:
         planned: npt.ArrayLike | None = None,
         **options: Unpack[PictureKeywords],
     ) -> Picture:
-        """Make the picture of a state.
-
-        Parameters
-        ----------
-        state : State
-            State of the robot.
-        contacts : Contacts, optional
-            Contacts to draw.
-        forces : array_like, shape (3 n,) or (n, 3), optional
-            Measured forces at the n contact points, in the world frame [N].
-        planned : array_like, shape (3 n,) or (n, 3), optional
-            Planned forces at the n contact points, in the world frame [N].
-        **options
-            Fields of `PictureOptions`.
-
-        Returns
-        -------
-        Picture
-            Items to draw, path -> item.
-
-        Raises
-        ------
-        InputError
-            If the state belongs to a different robot, or if the forces do not match the contacts.
-        """
+        """Make the picture of a state."""
         for name in sorted(options.keys() - PictureOptions.__dataclass_fields__.keys()):
             raise unknown_name("option of a picture", name, PictureOptions.__dataclass_fields__)
         chosen = PictureOptions(**options)
@@ -159,20 +113,7 @@ class Painter:
         return picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
-        """Return a painter with other facets or another ground.
-
-        The new painter shares what this one has computed for the robot.
-
-        Parameters
-        ----------
-        **changes
-            Fields of `Painter` to replace.
-
-        Returns
-        -------
-        Painter
-            The new painter.
-        """
+        """Return a painter with other facets or another ground."""
         other = replace(self, **changes)
         computed = {"standing", "box", "feet_box", "size", "scale", "_meshes", "_shapes"}
         computed |= {"_ghost_shapes", "_scale_bars", "_joint_limits"}
@@ -181,13 +122,7 @@ class Painter:
         return other
 
     def ground_only(self) -> Picture:
-        """Make a picture of the ground alone.
-
-        Returns
-        -------
-        Picture
-            The ground.
-        """
+        """Make a picture of the ground alone."""
         ground = self.drawn_ground
         return {"ground": ground.lines(self.line_colour)} | blocks(ground, self.line_colour)
 
@@ -214,10 +149,7 @@ class Painter:
 
     @cached_property
     def feet_box(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of a box around the standing robot's feet, world frame [m].
-
-        The box includes the cones. For a robot without feet, it is the box of the whole robot.
-        """
+        """Lowest and highest corner of a box around the standing robot's feet, world frame [m]."""
         feet = [(foot, self.standing.frame_pose(foot.frame)) for foot in self.robot.feet]
         points = [
             pose.act(p)
@@ -241,11 +173,7 @@ class Painter:
 
     @cached_property
     def scale(self) -> float:
-        """Length of a drawn force [m/N].
-
-        Unless it was requested, it is 1, 2 or 5 times a power of ten, such that the weight is drawn
-        about twice as long as the height of the centre of mass.
-        """
+        """Length of a drawn force [m/N]."""
         if self.requested_scale is not None:
             return self.requested_scale
         return geometry.round_1_2_5(
@@ -255,21 +183,7 @@ class Painter:
         )
 
     def cone_height(self, contacts: Contacts) -> float:
-        """Return the height of the friction cones.
-
-        The height corresponds to 1.5 times the normal force at rest. It is reduced where the cones
-        would hide the robot, or where cones at the corners of one foot would meet.
-
-        Parameters
-        ----------
-        contacts : Contacts
-            Contacts of the robot.
-
-        Returns
-        -------
-        float
-            Height [m].
-        """
+        """Return the height of the friction cones."""
         height = min(
             self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size
         )
@@ -359,10 +273,7 @@ class Painter:
         return (MIN_FORCE * self.robot.weight) ** 2
 
     def _labels(self, state: State, contacts: Contacts, positions: Array) -> Picture:
-        """Draw the name of each contact, on the side away from the robot.
-
-        The corners of a flat foot are numbered as well.
-        """
+        """Draw the name of each contact, on the side away from the robot."""
         picture: Picture = {}
         for contact in contacts.friction_contacts:
             rows = [list(contacts.point_names).index(name) for name in contact.point_names]
@@ -429,11 +340,7 @@ class Painter:
         return {}
 
     def _scale_bar_on(self, ground: DrawnGround) -> Picture:
-        """Draw a bar on the ground that shows the length of about a quarter of the weight.
-
-        The bar is to the left of the feet. For a tall robot it starts behind the robot, because the
-        picture shows little ground in front.
-        """
+        """Draw a bar on the ground that shows the length of about a quarter of the weight."""
         force = geometry.round_1_2_5(self.robot.weight / 4)
         low, high = self.box
         length = self.scale * force
@@ -453,20 +360,7 @@ class Painter:
         self.check_robot("state", as_instance("state", state, State).robot)
 
     def check_robot(self, what: str, robot: Robot) -> None:
-        """Check that something belongs to this robot.
-
-        Parameters
-        ----------
-        what : str
-            Name of the thing that is checked, for the message.
-        robot : Robot
-            Robot to which it belongs.
-
-        Raises
-        ------
-        InputError
-            If the robot has another name or, as with joints locked, other joints.
-        """
+        """Check that something belongs to this robot."""
         identities = [(one.name, one.is_floating, one.joint_names) for one in (self.robot, robot)]
         if identities[0] != identities[1]:
             raise InputError(

@@ -38,23 +38,7 @@ _FLOAT32 = np.dtype(
 
 
 def encode(command: Mapping[str, Any]) -> Update:
-    """Encode a command.
-
-    Parameters
-    ----------
-    command : dict
-        Command as plain data.
-
-    Returns
-    -------
-    Update
-        Key and bytes of the command.
-
-    Raises
-    ------
-    ViewerError
-        If the type of the command is unknown.
-    """
+    """Encode a command."""
     kind = command.get("type")
     if kind not in TYPES:
         raise ViewerError(f"Unknown viewer command {kind!r}. Known commands: {', '.join(TYPES)}.")
@@ -65,22 +49,7 @@ def encode(command: Mapping[str, Any]) -> Update:
 
 
 def set_transform(path: str, matrix: Array) -> Update:
-    """Place an object by a homogeneous transform.
-
-    Most commands are of this type, so they are packed by hand.
-
-    Parameters
-    ----------
-    path : str
-        Path of the object.
-    matrix : ndarray, shape (4, 4)
-        Transform relative to its parent.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Place an object by a homogeneous transform."""
     key, head = _transform_head(path)
     numbers = np.empty(16, _FLOAT32)
     numbers["code"] = 0xCA
@@ -97,40 +66,12 @@ def _transform_head(path: str) -> tuple[Key, bytes]:
 
 
 def set_property(path: str, name: str, value: Any) -> Update:
-    """Set a property of an object.
-
-    Parameters
-    ----------
-    path : str
-        Path of the object.
-    name : str
-        Name of the property, such as `visible`, `scale` or `color`.
-    value
-        New value.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Set a property of an object."""
     return encode({"type": "set_property", "path": path, "property": name, "value": value})
 
 
 def set_object(path: str, packed: bytes) -> Update:
-    """Put an object at a path.
-
-    Parameters
-    ----------
-    path : str
-        Path of the object.
-    packed : bytes
-        Object for three.js in MessagePack; see `threejs.Shape`.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Put an object at a path."""
     path = normal_path(path)
     return (path, "set_object", ""), b"\x83\xa4type\xaaset_object\xa4path" + _text(
         path
@@ -144,65 +85,18 @@ def _text(text: str) -> bytes:
 
 
 def delete(path: str) -> Update:
-    """Remove a path and everything below it.
-
-    Parameters
-    ----------
-    path : str
-        Path to remove.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Remove a path and everything below it."""
     return encode({"type": "delete", "path": path})
 
 
 def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> Update:
-    """Point the camera at a target.
-
-    It is a custom command, because meshcat's camera node cannot move the point around which the
-    mouse rotates the view.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Position of the camera in the world frame [m].
-    target : array_like, shape (3,)
-        Point to look at, in the world frame [m].
-    angle : float
-        Vertical field of view [degrees].
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Point the camera at a target."""
     eye, at = (_to_threejs(point) for point in (position, target))
     return encode({"type": "set_camera", "position": eye, "target": at, "fov": angle})
 
 
 def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bool) -> Update:
-    """Let the camera follow an object at a constant height above the ground.
-
-    Parameters
-    ----------
-    node : str
-        Path of the object; "" for none.
-    start : array_like, shape (3,)
-        Position of the object when the camera was set, in the world frame [m].
-    begin : array_like, shape (3,)
-        Displacement of that position from the standing position [m]. The scale bar is displaced by
-        it, too.
-    smooth : bool
-        Whether the camera lags a little, so that it does not shake with the object.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Let the camera follow an object at a constant height above the ground."""
     at, moved = _to_threejs(start), _to_threejs(begin)
     return encode(
         {
@@ -219,38 +113,14 @@ def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bo
 def set_ground(
     planes: Iterable[tuple[npt.ArrayLike, float]], boxes: Iterable[Sequence[float]] = ()
 ) -> Update:
-    """Define the ground above which a following camera keeps its height.
-
-    Parameters
-    ----------
-    planes : iterable of tuple
-        Unit normal, shape (3,), in the world frame, pointing upwards, and offset [m] of each plane.
-    boxes : iterable of sequence, optional
-        x0, x1, y0, y1 and top of each box, in the world frame [m].
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Define the ground above which a following camera keeps its height."""
     in_threejs = [{"normal": _to_threejs(normal), "offset": offset} for normal, offset in planes]
     bounds = [[float(bound) for bound in box] for box in boxes]
     return encode({"type": "set_ground", "path": "", "planes": in_threejs, "boxes": bounds})
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
-    """Define the views that the page offers.
-
-    Parameters
-    ----------
-    views : dict
-        Name -> position, target and angle, as for `set_camera`.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Define the views that the page offers."""
     named = {
         name: {"position": _to_threejs(eye), "target": _to_threejs(at), "fov": fov}
         for name, (eye, at, fov) in views.items()
@@ -259,94 +129,30 @@ def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -
 
 
 def page_command(kind: str, **values: Any) -> Update:
-    """Make a command that concerns the page and no object, such as set_title or set_legend.
-
-    Parameters
-    ----------
-    kind : str
-        Type of the command.
-    **values
-        Contents of the command.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Make a command that concerns the page and no object, such as set_title or set_legend."""
     return encode({"type": kind, "path": "", **values})
 
 
 def no_animation() -> Update:
-    """End an animation: all objects return to where they were before it.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """End an animation: all objects return to where they were before it."""
     return encode(
         {"type": "set_animation", "path": "", "animations": [], "options": {"play": False}}
     )
 
 
 def end_animation() -> list[Update]:
-    """End the animation before the next picture is drawn.
-
-    A busy page may receive this command, the next picture and the next animation in one frame. The
-    command therefore occurs twice. One has the key of the animation, which the next animation
-    overwrites. The other has its own key, so that the old animation ends before the picture is
-    drawn and cannot undo it.
-
-    Returns
-    -------
-    list of Update
-        The commands.
-    """
+    """End the animation before the next picture is drawn."""
     key, command = no_animation()
     return [(key, command), ((key[0], key[1], "end"), command)]
 
 
 def set_control(name: str, **kind: Any) -> Update:
-    """Add a control to the page's panel.
-
-    The control is a slider if it has value, min, max and step; a menu if it has choices and the
-    index of the chosen one; a check box if its value is a bool; otherwise a button. See panel.js.
-
-    Parameters
-    ----------
-    name : str
-        Name of the control.
-    **kind
-        Properties of the control.
-
-    Returns
-    -------
-    Update
-        The command.
-    """
+    """Add a control to the page's panel."""
     return encode({"type": "set_control", "name": name, **kind})
 
 
 def checked_control_value(command: dict[str, Any], value: Any) -> Any:
-    """Check the value that a page reports for a control, and limit it to the control's range.
-
-    Parameters
-    ----------
-    command : dict
-        Command of the control, decoded.
-    value
-        Reported value.
-
-    Returns
-    -------
-    float, int, bool or None
-        The value; None for a button.
-
-    Raises
-    ------
-    ViewerError
-        If such a control cannot have this value. The viewer's own page never sends one.
-    """
+    """Check the value that a page reports for a control, and limit it to the control's range."""
     if "value" not in command:
         return None
     is_switch = isinstance(command["value"], bool)
@@ -373,52 +179,19 @@ def _to_threejs(point: npt.ArrayLike) -> list[float]:
 
 @lru_cache(maxsize=4096)  # a picture has some fifty paths, which stay the same
 def normal_path(path: str) -> str:
-    """Return the path with one leading slash and no empty parts.
-
-    Parameters
-    ----------
-    path : str
-        Path of an object.
-
-    Returns
-    -------
-    str
-        The normalized path.
-    """
+    """Return the path with one leading slash and no empty parts."""
     return "/" + "/".join(part for part in path.split("/") if part)
 
 
 def frame(commands: Iterable[bytes]) -> bytes:
-    """Pack several commands into one message, which the page draws at once.
-
-    Parameters
-    ----------
-    commands : iterable of bytes
-        Encoded commands.
-
-    Returns
-    -------
-    bytes
-        Each command after its length (4 bytes, little-endian).
-    """
+    """Pack several commands into one message, which the page draws at once."""
     return b"".join(
         part for command in commands for part in (struct.pack("<I", len(command)), command)
     )
 
 
 def unframe(data: bytes) -> list[bytes]:
-    """Unpack the commands of a message, the inverse of `frame`.
-
-    Parameters
-    ----------
-    data : bytes
-        Message.
-
-    Returns
-    -------
-    list of bytes
-        Encoded commands.
-    """
+    """Unpack the commands of a message, the inverse of `frame`."""
     commands, at = [], 0
     while at < len(data):
         (length,) = struct.unpack_from("<I", data, at)

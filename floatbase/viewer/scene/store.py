@@ -13,13 +13,7 @@ from floatbase.viewer.scene.protocol import Key, Update, checked_control_value, 
 
 
 class Scene:
-    """Newest command of each key, with the number of the change that stored it.
-
-    A page that has received change n is updated by `since(n)`, whatever it has missed. Any thread
-    may write. A change is one assignment under a lock, so an interrupt during a write loses at most
-    that write. There is no loop directly under the lock: Python 3.12 and 3.13 leave the lock locked
-    if an interrupt comes where a loop jumps back from an `if`.
-    """
+    """Newest command of each key, with the number of the change that stored it."""
 
     def __init__(self) -> None:
         self.newest = 0
@@ -28,43 +22,12 @@ class Scene:
         self._entries: dict[Key, tuple[int, bytes]] = {}
 
     def put(self, updates: Iterable[Update]) -> int:
-        """Store updates; readers see all of them or none.
-
-        Parameters
-        ----------
-        updates : iterable of Update
-            Keys and commands.
-
-        Returns
-        -------
-        int
-            Number of the last change.
-        """
+        """Store updates; readers see all of them or none."""
         with self._lock:
             return self._store(updates)
 
     def set_control_value(self, name: object, value: Any, page: str) -> Any:
-        """Store the value that a page reports for a control, so that all pages show it.
-
-        Parameters
-        ----------
-        name : str
-            Name of the control.
-        value
-            Reported value.
-        page : str
-            Name of the page, by which it recognizes its own report.
-
-        Returns
-        -------
-        float, int, bool or None
-            The value, limited to the control's range.
-
-        Raises
-        ------
-        ViewerError
-            If there is no such control, or if it cannot have such a value.
-        """
+        """Store the value that a page reports for a control, so that all pages show it."""
         control = self.command(("/", "set_control", name)) if isinstance(name, str) else None
         if control is None:
             raise ViewerError(f"There is no control {name!r}.")
@@ -76,20 +39,7 @@ class Scene:
         return value
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
-        """Return the commands stored after a change.
-
-        Parameters
-        ----------
-        number : int
-            Number of that change.
-
-        Returns
-        -------
-        newest : int
-            Number of the newest change.
-        commands : list of bytes
-            The commands, in order.
-        """
+        """Return the commands stored after a change."""
         with self._lock:
             newest, entries = self.newest, list(self._entries.values())
         return newest, [
@@ -97,52 +47,21 @@ class Scene:
         ]
 
     def command(self, key: Key) -> dict[str, Any] | None:
-        """Return the decoded command of a key.
-
-        Parameters
-        ----------
-        key : tuple of str
-            Path, type and property.
-
-        Returns
-        -------
-        dict or None
-            The command, or None if there is none.
-        """
+        """Return the decoded command of a key."""
         with self._lock:
             entry = self._entries.get(key)
         return None if entry is None else umsgpack.unpackb(entry[1])
 
     def commands(self) -> dict[Key, dict[str, Any]]:
-        """Return the scene as decoded commands.
-
-        Returns
-        -------
-        dict
-            Key -> command.
-        """
+        """Return the scene as decoded commands."""
         return {key: umsgpack.unpackb(command) for key, command in self._sorted_entries()}
 
     def file_commands(self) -> list[bytes]:
-        """Return the commands that a file can hold.
-
-        Commands of the panel are left out, because they need a program that responds.
-
-        Returns
-        -------
-        list of bytes
-            The commands.
-        """
+        """Return the commands that a file can hold."""
         return [command for _, command in self.file_entries()]
 
     def file_entries(self) -> list[tuple[Key, bytes]]:
-        """Return keys and commands of `file_commands`.
-
-        Returns
-        -------
-        list of tuple
-            Keys and commands.
-        """
+        """Return keys and commands of `file_commands`."""
         return [
             entry
             for entry in self._sorted_entries()
@@ -178,10 +97,7 @@ class Scene:
         return self.newest
 
     def _drop_below(self, path: str, number: int) -> None:
-        """Drop the entries below `path` that the deletion `number` makes void.
-
-        Deletions that all pages have received are dropped, too.
-        """
+        """Drop the entries below `path` that the deletion `number` makes void."""
         below = "/" if path == "/" else path + "/"
         for key, (when, _) in list(self._entries.items()):
             is_void = when < number and (key[0] == path or key[0].startswith(below))
@@ -191,8 +107,5 @@ class Scene:
 
 
 def _is_deletion(key: Key) -> bool:
-    """Return whether the entry deletes one of our objects.
-
-    The page's own grid and axes have other paths; their deletion must be sent to new pages.
-    """
+    """Return whether the entry deletes one of our objects."""
     return key[1] == "delete" and key[0].startswith("/meshcat")

@@ -34,17 +34,7 @@ _TYPES = {
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A three.js object as plain data.
-
-    The object in the data is named "shape", by which animations find its material.
-
-    Parameters
-    ----------
-    data : dict
-        The object in the JSON format of three.js.
-    name : str
-        Name or text of the shape.
-    """
+    """A three.js object as plain data."""
 
     data: dict[str, Any]
     name: str = ""
@@ -85,18 +75,7 @@ def _object(
 
 
 def colour_number(colour: RGB) -> int:
-    """Convert a colour to the number 0xrrggbb.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB, from 0 to 1.
-
-    Returns
-    -------
-    int
-        The number.
-    """
+    """Convert a colour to the number 0xrrggbb."""
     red, green, blue = (round(255 * part) for part in colour)
     return (red << 16) + (green << 8) + blue
 
@@ -114,37 +93,7 @@ def mesh(
     hide_back: bool = False,
     name: str = "",
 ) -> Shape:
-    """Make a mesh of triangles.
-
-    Parameters
-    ----------
-    vertices : array_like, shape (n, 3)
-        Vertices [m]. Vertices are sent as 16-bit integers, in units of 1/32767 of the largest
-        coordinate.
-    faces : array_like, shape (m, 3)
-        Indices of the vertices.
-    colour : tuple of float, optional
-        RGB of the whole mesh.
-    colours : array_like, shape (n, 3), optional
-        RGB of each vertex, 0 to 255. By default, the mesh has one colour.
-    opacity : float, optional
-        Opacity [-]: 0 is invisible, 1 is opaque.
-    flat : bool, optional
-        Whether each triangle has one shade, so that edges look sharp.
-    lit : bool, optional
-        Whether the mesh is shaded by light.
-    on_top : bool, optional
-        Whether the mesh is drawn on top of objects in front of it.
-    hide_back : bool, optional
-        Whether a translucent mesh hides its own far side.
-    name : str, optional
-        Name of the shape.
-
-    Returns
-    -------
-    Shape
-        The mesh.
-    """
+    """Make a mesh of triangles."""
     points = np.asarray(vertices, dtype=np.float64)
     step = max(float(np.abs(points).max(initial=0.0)), 1e-9) / 32767
     attributes = {"position": _array("Int16Array", np.round(points / step), 3)}
@@ -170,22 +119,7 @@ def mesh(
 
 
 def lines(points: npt.ArrayLike, colour: RGB, opacity: float = 1.0) -> Shape:
-    """Make m line segments, one pixel wide.
-
-    Parameters
-    ----------
-    points : array_like, shape (2 m, 3)
-        Start and end of each segment [m].
-    colour : tuple of float
-        RGB.
-    opacity : float, optional
-        Opacity, from 0 to 1 [-].
-
-    Returns
-    -------
-    Shape
-        The lines.
-    """
+    """Make m line segments, one pixel wide."""
     attributes = {"position": _array("Float32Array", points, 3)}
     material = {
         "type": "LineBasicMaterial",
@@ -203,26 +137,7 @@ def label(
     colour: RGB = (0.13, 0.13, 0.13),
     on_top: bool = True,
 ) -> Shape:
-    """Make text that always faces the viewer.
-
-    Parameters
-    ----------
-    text : str
-        The text. Braces make a subscript: "f{c}".
-    height : float
-        Height of the letters [m].
-    plate : bool, optional
-        Whether a plate lies behind the text.
-    colour : tuple of float, optional
-        RGB of the text.
-    on_top : bool, optional
-        Whether the text is drawn on top of objects in front of it.
-
-    Returns
-    -------
-    Shape
-        The text.
-    """
+    """Make text that always faces the viewer."""
     image_data = text_image(text, plate, colour)
     tall, wide = image_data.shape[:2]
     image = {

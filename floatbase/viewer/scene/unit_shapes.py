@@ -28,37 +28,13 @@ ARROW = (
 
 @lru_cache(maxsize=64)
 def arrow(colour: RGB, opacity: float) -> Shape:
-    """Return an arrow along z of length 1 whose shaft has radius 1.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-    opacity : float
-        Opacity, from 0 to 1 [-].
-
-    Returns
-    -------
-    Shape
-        The arrow.
-    """
+    """Return an arrow along z of length 1 whose shaft has radius 1."""
     return threejs.mesh(*geometry.surface_of_revolution(ARROW), colour, opacity=opacity)
 
 
 @lru_cache(maxsize=64)
 def cylinder(colour: RGB) -> Shape:
-    """Return a rod along z of length 1 and radius 1.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-
-    Returns
-    -------
-    Shape
-        The rod.
-    """
+    """Return a rod along z of length 1 and radius 1."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], 14),
         colour,
@@ -67,18 +43,7 @@ def cylinder(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=64)
 def disc(colour: RGB) -> Shape:
-    """Return a disc around z of radius 1 and thickness 1, centred at the origin.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-
-    Returns
-    -------
-    Shape
-        The disc.
-    """
+    """Return a disc around z of radius 1 and thickness 1, centred at the origin."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, -0.5), (1.0, -0.5), (1.0, 0.5), (0.0, 0.5)], 32),
         colour,
@@ -87,32 +52,13 @@ def disc(colour: RGB) -> Shape:
 
 @lru_cache(maxsize=64)
 def sphere(colour: RGB, on_top: bool = False) -> Shape:
-    """Return a ball of radius 1.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-    on_top : bool, optional
-        Whether the ball is drawn on top of objects in front of it.
-
-    Returns
-    -------
-    Shape
-        The ball.
-    """
+    """Return a ball of radius 1."""
     return threejs.mesh(*geometry.sphere(1.0), colour, on_top=on_top)
 
 
 @lru_cache(maxsize=1)
 def cone() -> Shape:
-    """Return a cone around z of height 1 with its tip at the origin and a mouth of radius 1.
-
-    Returns
-    -------
-    Shape
-        The cone.
-    """
+    """Return a cone around z of height 1 with its tip at the origin and a mouth of radius 1."""
     return threejs.mesh(
         *geometry.surface_of_revolution([(0.0, 0.0), (1.0, 1.0)], 48),
         (1.0, 1.0, 1.0),
@@ -122,24 +68,7 @@ def cone() -> Shape:
 
 @lru_cache(maxsize=64)
 def polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation: float) -> Shape:
-    """Return a friction polyhedron around z of height 1 with its tip at the origin.
-
-    Parameters
-    ----------
-    mu : float
-        Friction coefficient [-].
-    facets : int
-        Number of facets.
-    inner_approximation : bool
-        Whether the polyhedron lies inside the round cone.
-    facet_rotation : float
-        Rotation of the facets about z [rad].
-
-    Returns
-    -------
-    Shape
-        The polyhedron.
-    """
+    """Return a friction polyhedron around z of height 1 with its tip at the origin."""
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -152,24 +81,7 @@ def polyhedron(mu: float, facets: int, inner_approximation: bool, facet_rotation
 def polygonal_rim(
     mu: float, facets: int, inner_approximation: bool, facet_rotation: float
 ) -> Shape:
-    """Return the rim of `polyhedron`.
-
-    Parameters
-    ----------
-    mu : float
-        Friction coefficient [-].
-    facets : int
-        Number of facets.
-    inner_approximation : bool
-        Whether the polyhedron lies inside the round cone.
-    facet_rotation : float
-        Rotation of the facets about z [rad].
-
-    Returns
-    -------
-    Shape
-        The rim.
-    """
+    """Return the rim of `polyhedron`."""
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -182,33 +94,14 @@ def polygonal_rim(
 
 @lru_cache(maxsize=1)
 def round_rim() -> Shape:
-    """Return the rim of `cone`.
-
-    Returns
-    -------
-    Shape
-        The rim.
-    """
+    """Return the rim of `cone`."""
     vertices, faces = geometry.torus_arc(1.0, _RIM, 0.0, 2.0 * np.pi)
     return threejs.mesh(vertices + np.array([0.0, 0.0, 1.0], dtype=np.float32), faces, PATCH)
 
 
 @lru_cache(maxsize=8)
 def ring(colour: RGB, thick: bool) -> Shape:
-    """Return a ring around z of radius 1 that is drawn on top of objects in front of it.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-    thick : bool
-        Whether the ring is twice as thick.
-
-    Returns
-    -------
-    Shape
-        The ring.
-    """
+    """Return a ring around z of radius 1 that is drawn on top of objects in front of it."""
     mesh = geometry.torus_arc(1.0, 0.2 if thick else 0.1, 0.0, 2.0 * np.pi)
     return threejs.mesh(*mesh, colour, on_top=True)
 
@@ -217,26 +110,7 @@ def ring(colour: RGB, thick: bool) -> Shape:
 def facet(
     mu: float, facets: int, inner_approximation: bool, facet_rotation: float, facet: int
 ) -> Shape:
-    """Return one facet of `polyhedron`; facet i lies between rays i - 1 and i.
-
-    Parameters
-    ----------
-    mu : float
-        Friction coefficient [-].
-    facets : int
-        Number of facets.
-    inner_approximation : bool
-        Whether the polyhedron lies inside the round cone.
-    facet_rotation : float
-        Rotation of the facets about z [rad].
-    facet : int
-        Index of the facet.
-
-    Returns
-    -------
-    Shape
-        The facet.
-    """
+    """Return one facet of `polyhedron`; facet i lies between rays i - 1 and i."""
     rays = FrictionPolyhedron(
         np.array([0.0, 0.0, 1.0]), mu, facets, inner_approximation, facet_rotation
     ).rays
@@ -246,57 +120,17 @@ def facet(
 
 @lru_cache(maxsize=256)
 def label(text: str, height: float, plate: bool, colour: RGB, on_top: bool = True) -> Shape:
-    """Return an object that shows text.
-
-    Parameters
-    ----------
-    text : str
-        The text. Braces make a subscript: "f{c}".
-    height : float
-        Height of the letters [m].
-    plate : bool
-        Whether a plate lies behind the text.
-    colour : tuple of float
-        RGB of the text.
-    on_top : bool, optional
-        Whether it is drawn on top of objects in front of it.
-
-    Returns
-    -------
-    Shape
-        The text.
-    """
+    """Return an object that shows text."""
     return threejs.label(text, height, plate, colour, on_top)
 
 
 @lru_cache(maxsize=256)
 def polygon(corners: tuple[tuple[float, ...], ...], colour: RGB, opacity: float) -> Shape:
-    """Return a flat convex polygon.
-
-    Parameters
-    ----------
-    corners : tuple of tuple
-        Corners, three coordinates each [m].
-    colour : tuple of float
-        RGB.
-    opacity : float
-        Opacity, from 0 to 1 [-].
-
-    Returns
-    -------
-    Shape
-        The polygon.
-    """
+    """Return a flat convex polygon."""
     return threejs.mesh(*geometry.convex_polygon(corners), colour, opacity=opacity, lit=False)
 
 
 @lru_cache(maxsize=1)
 def invisible_point() -> Shape:
-    """Return an invisible object.
-
-    Returns
-    -------
-    Shape
-        The object.
-    """
+    """Return an invisible object."""
     return threejs.lines(np.zeros((2, 3)), PATCH)

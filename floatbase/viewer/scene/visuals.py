@@ -29,19 +29,7 @@ DARK = (0.2, 0.2, 0.2)  # colour of a material whose texture is missing
 
 @dataclass(frozen=True, eq=False)
 class VisualMesh:
-    """One piece of a robot.
-
-    Parameters
-    ----------
-    joint : int
-        Index of the joint that moves it, in the Pinocchio model.
-    colour : ndarray, shape (3,)
-        RGB, from 0 to 1.
-    mesh : Trimesh
-        Triangles in the joint's frame [m].
-    source : str
-        Name of its file.
-    """
+    """One piece of a robot."""
 
     joint: int
     colour: npt.NDArray[np.float64]
@@ -50,23 +38,7 @@ class VisualMesh:
 
 
 def urdf_visuals(robot: Robot) -> list[VisualMesh]:
-    """Read all visuals of a robot's URDF.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    list of VisualMesh
-        One piece for each material.
-
-    Raises
-    ------
-    ImportError
-        If trimesh is not installed.
-    """
+    """Read all visuals of a robot's URDF."""
     import trimesh  # noqa: F401  raises at once if it is missing
 
     folders = [str(folder) for folder in robot.package_dirs]
@@ -99,10 +71,7 @@ def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
 
 
 def _scene(path: Path) -> trimesh.Scene:
-    """Read the meshes in a file.
-
-    If pycollada finds none because a texture is missing, the file is read without textures.
-    """
+    """Read the meshes in a file."""
     import trimesh
 
     scene = trimesh.load_scene(path)

@@ -41,60 +41,27 @@ class Host(Protocol):
 
 
 class Channel:
-    """A way to send frames to one page.
-
-    `max_in_flight` is the number of frames that may be sent but not yet drawn by the page.
-    `min_interval` is the minimum time between two frames [s]; with 0, the server sets the pace.
-    """
+    """A way to send frames to one page."""
 
     max_in_flight = 1
     min_interval = 0.0
 
     @property
     def answers_since(self) -> float | None:
-        """Time from which the page's answers arrive [s]; None while they are delayed.
-
-        While they are delayed, frames are sent every `UNANSWERED_INTERVAL`, as long as fewer than
-        `MAX_UNANSWERED` bytes are unanswered.
-        """
+        """Time from which the page's answers arrive [s]; None while they are delayed."""
         return 0.0
 
     def send_frame(self, number: int, data: bytes) -> None:
-        """Send a frame.
-
-        Parameters
-        ----------
-        number : int
-            Number of the frame.
-        data : bytes
-            The frame; see `protocol.frame`.
-        """
+        """Send a frame."""
         raise NotImplementedError
 
     def close_page(self, reason: str) -> None:
-        """Disconnect the page. The page may connect again as a new one.
-
-        Parameters
-        ----------
-        reason : str
-            Reason for the page.
-        """
+        """Disconnect the page. The page may connect again as a new one."""
         raise NotImplementedError
 
 
 class Connection:
-    """The connection to one page.
-
-    Changes that occur while frames are in flight share the next frame. `sent` is the number of the
-    newest change of the host's scene that was sent to the page.
-
-    Parameters
-    ----------
-    host : Host
-        The server.
-    channel : Channel
-        Way to the page.
-    """
+    """The connection to one page."""
 
     def __init__(self, host: Host, channel: Channel):
         self.host, self.channel = host, channel
@@ -111,15 +78,7 @@ class Connection:
             self.host.clients.remove(self)
 
     def receive(self, message: str | bytes) -> None:
-        """Handle a message from the page.
-
-        Unknown messages are ignored, because any program on this machine can connect.
-
-        Parameters
-        ----------
-        message : str or bytes
-            The message, JSON.
-        """
+        """Handle a message from the page."""
         try:
             answer = json.loads(message)
         except (ValueError, RecursionError):
@@ -156,13 +115,7 @@ class Connection:
             )
 
     def next_frame(self) -> float:
-        """Send the changes that the page has not received, if a frame may be sent now.
-
-        Returns
-        -------
-        float
-            Time after which to try again [s]; infinite if there is no need.
-        """
+        """Send the changes that the page has not received, if a frame may be sent now."""
         now = time.monotonic()
         wait = self._wait(now)
         if wait > 0.0:

@@ -9,11 +9,7 @@ from typing import Any
 
 
 class CellEvents:
-    """Whether a notebook cell is running; outside IPython, none ever is.
-
-    `is_running` tells whether a cell runs now, `ended_at` when the last one ended, in the time of
-    `time.monotonic` [s].
-    """
+    """Whether a notebook cell is running; outside IPython, none ever is."""
 
     def __init__(self) -> None:
         shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
@@ -43,14 +39,5 @@ class CellEvents:
 
 
 def receive_during_cells(widget: Any) -> None:
-    """Let a new widget receive messages while a cell runs, where the notebook uses subshells.
-
-    ipykernel 7.4 delivers a page's messages to the thread that opened the widget, instead of the
-    thread that the page requests.
-
-    Parameters
-    ----------
-    widget : Widget
-        The new widget.
-    """
+    """Let a new widget receive messages while a cell runs, where the notebook uses subshells."""
     getattr(widget.comm, "__dict__", {}).pop("_reply_subshell_id", None)

@@ -33,22 +33,7 @@ _MAX_PAGES = 50  # of one display; a page that closed silently is dropped after 
 
 
 class NotebookWidget(anywidget.AnyWidget):
-    """One display of a window's scene.
-
-    `is_live` tells whether this is the newest display. An earlier one shows the thumbnail.
-
-    Parameters
-    ----------
-    server : Server
-        Server of the window.
-    name : str
-        What the picture shows, for screen readers.
-    height : int
-        Height of the picture [pixels].
-    thumbnail : bytes, optional
-        A PNG of the scene when the display opens; empty for none. The image is shown until the page
-        has drawn, where no page can draw, and after a newer display has opened.
-    """
+    """One display of a window's scene."""
 
     _esm = pages.asset("widget.js")
     version = traitlets.Unicode().tag(sync=True)
@@ -70,10 +55,7 @@ class NotebookWidget(anywidget.AnyWidget):
 
 
 class _OutputPages:
-    """The pages of one widget.
-
-    Any thread may call `receive`; everything else runs in the server's thread.
-    """
+    """The pages of one widget."""
 
     def __init__(self, widget: NotebookWidget, server: Server):
         self._widget, self._server = weakref.ref(widget), weakref.ref(server)
@@ -162,13 +144,7 @@ class _OutputPages:
 
 
 class _WidgetChannel(Channel):
-    """The way to one page: messages that name the page, so that other pages ignore them.
-
-    `answers_wait` tells whether the page's messages are received only between cells. Where the
-    notebook sends them to a subshell of the kernel, they are received at once. `context` is that of
-    a message from the page; anything sent in it is an answer, so the page's next messages go the
-    same way.
-    """
+    """The way to one page: messages that name the page, so that other pages ignore them."""
 
     max_in_flight, min_interval = _MAX_IN_FLIGHT, FRAME_INTERVAL
     page: Connection

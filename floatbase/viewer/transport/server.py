@@ -25,17 +25,7 @@ MAX_MESSAGE_SIZE = 1 << 20  # bytes of a message from a page: the longest report
 
 
 class Server:
-    """The thread that serves one scene.
-
-    The thread has no reference to its `Window`, so a window without references can be
-    garbage-collected and stop it. `port` is the port that the server listens on; None until
-    `listen`, since a notebook needs none.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene to serve.
-    """
+    """The thread that serves one scene."""
 
     def __init__(self, scene: Scene):
         self.scene = scene
@@ -59,26 +49,12 @@ class Server:
         ready.wait()
 
     def listen(self, sockets: list[socket.socket]) -> None:
-        """Serve the page on sockets too.
-
-        Parameters
-        ----------
-        sockets : list of socket
-            Sockets that are bound to the same port.
-        """
+        """Serve the page on sockets too."""
         self.port = sockets[0].getsockname()[1]
         self.call(self._listen, sockets)
 
     def notify(self, number: int) -> None:
-        """Request that a change be sent; cheap while a wake-up is pending.
-
-        Any thread may call this.
-
-        Parameters
-        ----------
-        number : int
-            Number of the change.
-        """
+        """Request that a change be sent; cheap while a wake-up is pending."""
         if not self.clients:
             self.scene.sent_to_all = number
         elif self._requested <= self._sent:
@@ -99,15 +75,7 @@ class Server:
             self._thread.join(timeout=5.0)
 
     def call(self, function: Callable[..., Any], *args: Any) -> None:
-        """Call a function in the server's thread, where everything about pages happens.
-
-        Parameters
-        ----------
-        function : callable
-            The function.
-        *args
-            Its arguments.
-        """
+        """Call a function in the server's thread, where everything about pages happens."""
         with suppress(RuntimeError):  # the loop may have closed since the caller checked
             self._loop.call_soon_threadsafe(function, *args)
 
@@ -143,15 +111,7 @@ class Server:
         await asyncio.gather(*rest, return_exceptions=True)
 
     def flush(self, wait: float = 0.0) -> None:
-        """Send a frame, at least `FRAME_INTERVAL` after the last one.
-
-        Only the server's thread may call this.
-
-        Parameters
-        ----------
-        wait : float, optional
-            Minimum delay [s].
-        """
+        """Send a frame, at least `FRAME_INTERVAL` after the last one."""
         when = max(self._last_flush + FRAME_INTERVAL, self._loop.time() + wait)
         if self._timer is not None:
             if self._timer.when() <= when:

@@ -27,25 +27,7 @@ ADDRESS = "127.0.0.1"
 
 
 class Window:
-    """A meshcat window in this process.
-
-    Any thread may draw, and an interrupt while it draws does no harm. The window stores the scene:
-    a page that opens late receives all of it, and a page that reads slowly receives the newest
-    value of everything. Neither costs more memory. The window closes with `close()`, when there is
-    no reference to it any more, and when Python exits.
-
-    Parameters
-    ----------
-    port : int, optional
-        Port to listen on from the start; 0 takes a free port when `port` or `web_url` is first
-        read. So a window that is only displayed in notebooks opens no port, and no other user of
-        the machine can reach it.
-
-    Raises
-    ------
-    ViewerError
-        If the port is already in use.
-    """
+    """A meshcat window in this process."""
 
     def __init__(self, port: int = 0):
         self.scene = Scene()
@@ -59,10 +41,7 @@ class Window:
 
     @property
     def port(self) -> int:
-        """Port that the window listens on; reading it opens one.
-
-        It raises `ViewerError` if the window is closed and never had a port.
-        """
+        """Port that the window listens on; reading it opens one."""
         with self._opening:
             if self._server.port is None:
                 self._check_open("it has no page")
@@ -81,29 +60,7 @@ class Window:
         return f"http://{ADDRESS}:{self.port}/"
 
     def widget(self, name: str, height: int, thumbnail: bytes = b"") -> NotebookWidget:
-        """Make a display for a notebook, which needs no port.
-
-        The display is live until the next one is made; then it shows its thumbnail.
-
-        Parameters
-        ----------
-        name : str
-            What the picture shows.
-        height : int
-            Height of the picture [pixels].
-        thumbnail : bytes, optional
-            A PNG of the picture.
-
-        Returns
-        -------
-        NotebookWidget
-            The display.
-
-        Raises
-        ------
-        ViewerError
-            If anywidget is not installed.
-        """
+        """Make a display for a notebook, which needs no port."""
         try:  # loads ipywidgets, which no script needs
             from floatbase.viewer.transport.notebook_widget import NotebookWidget
         except ImportError as error:
@@ -129,29 +86,12 @@ class Window:
         return self._finalizer.alive
 
     def put(self, updates: Iterable[protocol.Update]) -> None:
-        """Draw several updates in one frame.
-
-        Parameters
-        ----------
-        updates : iterable of Update
-            Keys and commands; see `protocol`.
-
-        Raises
-        ------
-        ViewerError
-            If the window is closed.
-        """
+        """Draw several updates in one frame."""
         self._check_open("nothing can be drawn")
         self._server.notify(self.scene.put(updates))
 
     def on_control(self, callback: Callable[[str, Any], None] | None) -> None:
-        """Set the function that is called when the reader uses a control.
-
-        Parameters
-        ----------
-        callback : callable or None
-            Called as `callback(name, value)` in the window's thread; None for nothing.
-        """
+        """Set the function that is called when the reader uses a control."""
         self._server.on_control = callback
 
     def close(self) -> None:

@@ -26,90 +26,37 @@ DIST = Path(__file__).with_name("dist")
 
 @cache
 def viewer_code() -> bytes:
-    """Return meshcat's viewer, one JavaScript file; vendor/README.md documents its origin.
-
-    Returns
-    -------
-    bytes
-        The code.
-    """
+    """Return meshcat's viewer, one JavaScript file; vendor/README.md documents its origin."""
     return Path(__file__).with_name("vendor").joinpath("meshcat.min.js").read_bytes()
 
 
 @cache
 def live_page() -> str:
-    """Return the page that a window serves.
-
-    Returns
-    -------
-    str
-        HTML of the page.
-    """
+    """Return the page that a window serves."""
     return _page("live", '<script src="main.min.js"></script>')
 
 
 def file_page(commands: Iterable[bytes], title: str = "floatbase") -> str:
-    """Return a page with the viewer (0.3 MB) and a scene, which needs neither server nor network.
-
-    Parameters
-    ----------
-    commands : iterable of bytes
-        Commands of the scene, as `Scene.file_commands` returns them.
-    title : str, optional
-        Title of the page.
-
-    Returns
-    -------
-    str
-        HTML of the page.
-    """
+    """Return a page with the viewer (0.3 MB) and a scene, which needs no server or network."""
     scene = _embedded_data("scene", protocol.frame(commands))
     return _page("file", _embedded_viewer_code() + scene, title)
 
 
 @cache
 def embedded_page(code: str) -> str:
-    """Return a page for a frame inside another page, which gives it scenes.
-
-    Parameters
-    ----------
-    code : str
-        Address of meshcat's viewer.
-
-    Returns
-    -------
-    str
-        HTML of the page.
-    """
+    """Return a page for a frame inside another page, which gives it scenes."""
     return _page("frame", f'<script src="{html.escape(code)}"></script>')
 
 
 @cache
 def notebook_page() -> str:
-    """Return a page for a frame in a notebook, which gives it meshcat and a port to the kernel.
-
-    Returns
-    -------
-    str
-        HTML of the page.
-    """
+    """Return a page for a frame in a notebook, which gives it meshcat and a port to the kernel."""
     return _page("notebook")
 
 
 @cache
 def robot_page(robots: tuple[str, ...]) -> str:
-    """Return the page with a live robot. It loads its other files from its own folder.
-
-    Parameters
-    ----------
-    robots : tuple of str
-        Names of the robots to choose from; the first is the default.
-
-    Returns
-    -------
-    str
-        HTML of the page.
-    """
+    """Return the page with a live robot. It loads its other files from its own folder."""
     scripts = '<script src="meshcat.js"></script><script src="robot.js"></script>'
     page = _page("robot", scripts, "live robot", {"robots": robots})
     return page.replace("<body>", '<body class="robot">')
@@ -117,18 +64,7 @@ def robot_page(robots: tuple[str, ...]) -> str:
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a built file.
-
-    Parameters
-    ----------
-    name : str
-        Name of the file in `dist`.
-
-    Returns
-    -------
-    str
-        The text.
-    """
+    """Return the text of a built file."""
     return (DIST / name).read_text(encoding="utf-8")
 
 

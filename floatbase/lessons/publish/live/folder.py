@@ -35,13 +35,7 @@ floatbase-robot {{ height: 60vh; margin: 1em 0; }}</style>
 
 
 def install_mujoco() -> Path | None:
-    """Install MuJoCo for JavaScript from npm, as the lock file says, if it is not installed.
-
-    Returns
-    -------
-    Path or None
-        Its folder, or None if npm is missing or fails.
-    """
+    """Install MuJoCo for JavaScript from npm, as the lock file says, if it is not installed."""
     if not (_MUJOCO / "mujoco.wasm").is_file():
         npm = shutil.which("npm")
         if npm is None:
@@ -53,20 +47,7 @@ def install_mujoco() -> Path | None:
 
 
 def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
-    """Write the folder of the live robots.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write.
-    names : tuple of str, optional
-        The robots; the first is the default.
-
-    Raises
-    ------
-    InputError
-        If MuJoCo for JavaScript is not installed and cannot be.
-    """
+    """Write the folder of the live robots."""
     mujoco = install_mujoco()
     if mujoco is None:
         raise InputError(
@@ -104,18 +85,7 @@ def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
 
 
 def stripped(module: bytes) -> bytes:
-    """Return a WebAssembly module without its custom sections, which do not affect what it does.
-
-    Parameters
-    ----------
-    module : bytes
-        The module.
-
-    Returns
-    -------
-    bytes
-        The shorter module.
-    """
+    """Return a WebAssembly module without its custom sections, which do not affect what it does."""
     kept, at = [module[:_HEADER_SIZE]], _HEADER_SIZE
     while at < len(module):
         begin, size, shift = at, 0, 0

@@ -53,23 +53,7 @@ _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
 def robot_data(robot: Robot) -> dict[str, Any]:
-    """Return a robot and the problems of its stances as data for the page's engine.
-
-    Parameters
-    ----------
-    robot : Robot
-        A floating-base robot with feet that stands on level ground.
-
-    Returns
-    -------
-    dict
-        Plain lists and numbers, for JSON. Floating-point numbers keep all their digits.
-
-    Raises
-    ------
-    InputError
-        If the robot has a fixed base or joints without limits.
-    """
+    """Return a robot and the problems of its stances as data for the page's engine."""
     if not robot.is_floating or robot.nq != robot.nv + 1:
         raise InputError(
             f"{robot.name} has a fixed base, or joints without limits. The page needs a floating "
@@ -122,20 +106,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
 
 
 def robot_json(robot: Robot, more: Mapping[str, Any] | None = None) -> str:
-    """Return `robot_data` as JSON text that JavaScript reads, infinite numbers included.
-
-    Parameters
-    ----------
-    robot : Robot
-        A floating-base robot with feet that stands on level ground.
-    more : mapping, optional
-        Further data.
-
-    Returns
-    -------
-    str
-        The text.
-    """
+    """Return `robot_data` as JSON text that JavaScript reads, infinite numbers included."""
     text = json.dumps(robot_data(robot) | dict(more or {}), separators=(",", ":"))
     # JSON has no infinity, but JavaScript reads a number that is too large as one
     return text.replace("Infinity", "1e999")
@@ -149,28 +120,7 @@ def controller(
     torque_fraction: float = 1.0,
     mismatch: ModelMismatch | None = None,
 ) -> WholeBodyController:
-    """Make the controller that the page runs, in Python.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    mu : float, optional
-        Assumed friction coefficient [-].
-    lifted : str, optional
-        Name of a foot that is lifted; None to stand on all feet.
-    facets : int, optional
-        Number of facets of the friction polyhedra.
-    torque_fraction : float, optional
-        Fraction of the torque limits that is used [-].
-    mismatch : ModelMismatch, optional
-        Difference between the assumed and the exact eq. (7). By default, there is none.
-
-    Returns
-    -------
-    WholeBodyController
-        The controller.
-    """
+    """Make the controller that the page runs, in Python."""
     standing = robot.standing()
     tasks: list[Any] = list(fb.standing_tasks(standing))
     if lifted is not None:
@@ -231,10 +181,7 @@ def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str
 
 
 def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]) -> dict[str, Any]:
-    """Return the problem arrays of a controller, and the places of what controls change.
-
-    stance: called with a friction coefficient; returns the contacts.
-    """
+    """Return the problem arrays of a controller, and the places of what controls change."""
     compiled = made.compiled
     assert compiled is not None  # all of its objects are built in
     sizes, ints, floats = pack_problem(made.problem, compiled.layout)
@@ -268,10 +215,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
 
 
 def _row_names(made: WholeBodyController) -> list[tuple[str, str, int]]:
-    """Return kind, owner and number of the rows that the tick numbers, as `Inequalities` has them.
-
-    Rows beyond the last one here do not occur in these problems.
-    """
+    """Return kind, owner and number of the tick's rows, as `Inequalities` has them."""
     labels = force_rows(made.contacts, made.limits)[1]
     rows = [
         (label.kind, label.owner, int(str(label).split()[-1]) if label.kind == "friction" else 0)
@@ -341,18 +285,7 @@ def _target_places(made: WholeBodyController) -> dict[str, Any]:
 
 
 def gaits(robot: Robot) -> dict[str, Gait]:
-    """Return the gaits of a robot in the page, by name, none if it has no four point feet.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    dict of str to Gait
-        The gaits; they start when the weight has had time to shift.
-    """
+    """Return the gaits of a robot in the page, by name, none if it has no four point feet."""
     if len(robot.feet) != 4:
         return {}
     return {

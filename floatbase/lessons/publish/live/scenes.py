@@ -24,22 +24,7 @@ IMAGE_HEIGHT = 480  # pixels
 
 
 def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
-    """Return the scene of a standing robot, an image of it, and what a page needs to move it.
-
-    Parameters
-    ----------
-    robot : Robot
-        A robot with feet.
-
-    Returns
-    -------
-    scene : bytes
-        A frame of commands for the viewer, compressed with gzip.
-    image : bytes
-        PNG of the standing robot.
-    drawing : dict
-        Paths and sizes, for JSON.
-    """
+    """Return the scene of a standing robot, an image of it, and what a page needs to move it."""
     view = fb.Viewer(robot)
     try:
         standing, contacts = robot.standing(), Contacts.feet(robot, 0.7)

@@ -87,23 +87,7 @@ def is_current() -> bool:
 
 
 def build(module: Path = MODULE) -> int:
-    """Compile the tick to WebAssembly, and write the module and the digest of its sources.
-
-    Parameters
-    ----------
-    module : Path
-        Where to write the module. The digest is written beside it.
-
-    Returns
-    -------
-    int
-        Size of the module [bytes].
-
-    Raises
-    ------
-    InputError
-        If the linker or the C library for WebAssembly is missing.
-    """
+    """Compile the tick to WebAssembly, and write the module and the digest of its sources."""
     program, libc = linker(), library()
     if program is None or libc is None:
         raise InputError(
@@ -176,10 +160,7 @@ def _write_objects(paths: list[Path]) -> None:
 
 
 def _wasm_code(function: Any, arguments: tuple[Any, ...], entry: str) -> str:
-    """Return LLVM's intermediate code of a function for arguments of these types.
-
-    Nothing in it is special about the processor. entry: name of the function that is exported.
-    """
+    """Return LLVM's intermediate code of a function for arguments of these types."""
     import numba
 
     from floatbase.control.tick import jit

@@ -39,15 +39,7 @@ def printed_results(cells: Iterable[Any]) -> dict[str, str]:
 
 
 def prediction_form(source: str, results: dict[str, str]) -> Any | None:
-    """Return the form of a prediction as a cell, or None if its result is not known.
-
-    Parameters
-    ----------
-    source : str
-        Source of the cell with `predict`.
-    results : dict of str to str
-        The results of the lesson, from `printed_results`.
-    """
+    """Return the form of a prediction as a cell, or None if its result is not known."""
     name, given = predict_call(source)
     data = answer_data(name, results.get(name, ""), **given)
     text = f"{name}, your prediction. You can make it in {_LINK}."
@@ -57,22 +49,7 @@ def prediction_form(source: str, results: dict[str, str]) -> Any | None:
 def answer_data(
     name: str, printed: str, choices: Sequence[str] = (), unit: str = "", count: int = 1
 ) -> dict[str, Any] | None:
-    """Return what a page needs to ask for a prediction and to judge it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the prediction.
-    printed : str
-        The result that the lesson prints.
-    choices, unit, count
-        As for `predict`.
-
-    Returns
-    -------
-    dict or None
-        The data, or None if the result cannot be read.
-    """
+    """Return what a page needs to ask for a prediction and to judge it."""
     result = _read_result(printed, choices, unit, count)
     if result is None:
         return None
@@ -94,13 +71,7 @@ def _read_result(printed: str, choices: Sequence[str], unit: str, count: int) ->
 
 
 def exercise_form(exercise: Exercise) -> Any | None:
-    """Return the form of an exercise as a cell, or None if its answer is not a few numbers.
-
-    Parameters
-    ----------
-    exercise : Exercise
-        The exercise.
-    """
+    """Return the form of an exercise as a cell, or None if its answer is not a few numbers."""
     judge = exercise.judge.judge if isinstance(exercise.judge, ShapeJudge) else exercise.judge
     if not isinstance(judge, NumericJudge):
         return None

@@ -49,30 +49,7 @@ _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
-    """Build the site.
-
-    Parameters
-    ----------
-    folder : Path
-        Where to write.
-    lessons : sequence of Path, optional
-        The lessons to include; the default is the whole course.
-    stored : bool
-        Whether to use the stored outputs of the notebooks instead of running them.
-
-    Returns
-    -------
-    Path
-        The first page.
-
-    Raises
-    ------
-    InputError
-        If a lesson does not exist, or if the folder holds a file of the same name as a page that
-        an earlier build did not write.
-    FloatbaseError
-        If Sphinx reports a warning or an error.
-    """
+    """Build the site."""
     known = sorted(NOTEBOOKS.glob("*.ipynb"))
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
     for path in shown:

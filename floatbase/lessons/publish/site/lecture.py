@@ -30,17 +30,7 @@ _WHY = re.compile(r"\*\*Why\??\*\*:? *")
 
 
 class LectureQuestion(NamedTuple):
-    """Question for a lecture, with its answer.
-
-    Parameters
-    ----------
-    question : Question
-        The question.
-    result : str
-        The result that the lesson prints.
-    reason : str
-        The paragraph after the result in the lesson, in Markdown.
-    """
+    """Question for a lecture, with its answer."""
 
     question: Question
     result: str

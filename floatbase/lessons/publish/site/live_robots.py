@@ -12,20 +12,7 @@ _HEIGHT = "26rem"
 
 
 class LessonRobot(NamedTuple):
-    """A live robot in a lesson.
-
-    Parameters
-    ----------
-    name : str
-        Name of the robot.
-    attributes : dict
-        Attributes of the element, as the page *Embed* lists them.
-    text : str
-        What to try, in Markdown.
-    panel_call : str, optional
-        Call in the code cell whose recording the robot replaces once it is live. By default, the
-        robot is at the end of the lesson.
-    """
+    """A live robot in a lesson."""
 
     name: str
     attributes: dict[str, str]
@@ -75,36 +62,12 @@ LESSON_ROBOTS = {
 
 
 def robot_script(static: str) -> str:
-    """Return the element that loads the script of live robots.
-
-    Parameters
-    ----------
-    static : str
-        Address of the site's static files, relative to the page.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Return the element that loads the script of live robots."""
     return f'<script src="{static}{LIVE_FOLDER}/floatbase-live.js"></script>'
 
 
 def robot_element(robot: LessonRobot, instead: str = "") -> str:
-    """Return the element of a live robot.
-
-    Parameters
-    ----------
-    robot : LessonRobot
-        The robot.
-    instead : str, optional
-        HTML that is shown until the robot is live; by default a sentence.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Return the element of a live robot."""
     attributes = {"name": robot.name} | robot.attributes
     written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
     style = f"display: block; margin: 1rem 0; {'min-' if instead else ''}height: {_HEIGHT}"
@@ -114,15 +77,7 @@ def robot_element(robot: LessonRobot, instead: str = "") -> str:
 
 
 def add_robot(notebook: Any, number: str) -> None:
-    """Add the live robot of a lesson, in place: over its push panel, or at its end.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        The lesson, prepared for the site.
-    number : str
-        Number of the lesson.
-    """
+    """Add the live robot of a lesson, in place: over its push panel, or at its end."""
     robot = LESSON_ROBOTS[number]
     if robot.panel_call:
         (cell,) = (cell for cell in notebook.cells if robot.panel_call in cell.source)

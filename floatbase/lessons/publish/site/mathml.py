@@ -52,11 +52,7 @@ def visit_displaymath(writer: Any, node: Any) -> None:
 
 
 def write_font(pages: Iterable[str], target: Path) -> None:
-    """Write the part of STIX Two Math that the formulas of the pages use.
-
-    Brackets grow around matrices only in a font made for formulas, and few machines have one. The
-    package ziamath contains this font.
-    """
+    """Write the part of STIX Two Math that the formulas of the pages use."""
     formulas = (formula for page in pages for formula in _MATHML.findall(page))
     letters = {
         letter for formula in formulas for letter in html.unescape(re.sub("<[^>]*>", "", formula))

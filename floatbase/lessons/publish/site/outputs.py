@@ -49,16 +49,7 @@ class PicturePlacer(Protocol):
 
 
 def run_lessons(lessons: Iterable[Path], cache: Path) -> dict[Path, Any]:
-    """Run lessons and return path -> notebook with outputs. Unchanged lessons are not run again.
-
-    Parameters
-    ----------
-    lessons : iterable of Path
-        The lessons.
-    cache : Path
-        Folder of earlier runs, created if necessary. File names contain a digest of the lesson and
-        of the package.
-    """
+    """Run lessons and return path -> notebook with outputs. Unchanged lessons are not run again."""
     cache.mkdir(parents=True, exist_ok=True)
     source = _digest_of_package()
     files = {
@@ -102,17 +93,7 @@ def _digest(data: bytes) -> str:
 
 
 def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
-    """Prepare a lesson for Sphinx, in place.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        The lesson with outputs.
-    pictures : PicturePlacer
-        Receives the 3-D pictures.
-    lessons : mapping
-        Number -> address of each lesson.
-    """
+    """Prepare a lesson for Sphinx, in place."""
     about, heading = _description(notebook), ""
     results = printed_results(cell for cell in notebook.cells if cell.cell_type == "code")
     for i, cell in enumerate(notebook.cells):

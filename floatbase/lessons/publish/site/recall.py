@@ -25,19 +25,7 @@ _NOTE = "Questions from earlier lessons come back here and in the live lesson."
 
 
 def recall_data(lessons: Iterable[Path]) -> dict[str, Any]:
-    """Return the questions that may be asked again, and the rule that decides when.
-
-    Parameters
-    ----------
-    lessons : iterable of Path
-        The lessons of the site.
-
-    Returns
-    -------
-    dict
-        "rule" with pauses in hours, and "questions" by name. A question has texts in HTML, the
-        answers that count as right, and the address of its lesson, if it is on the site.
-    """
+    """Return the questions that may be asked again, and the rule that decides when."""
     addresses = {path.name.split("_")[0]: f"lessons/{path.stem}.html" for path in lessons}
     printed: dict[str, str] = {}
     for path in NOTEBOOKS.glob("*.ipynb"):
@@ -77,13 +65,7 @@ def _texts(question: Question) -> dict[str, str]:
 
 
 def recall_box(static: str) -> str:
-    """Return the box that asks the questions that are due, as HTML.
-
-    Parameters
-    ----------
-    static : str
-        Address of the site's static files, as seen from the page.
-    """
+    """Return the box that asks the questions that are due, as HTML."""
     return f'<script src="{static}{SCRIPT}"></script>\n{element_html("recall", {}, _NOTE)}'
 
 

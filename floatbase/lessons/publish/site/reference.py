@@ -97,11 +97,7 @@ def _entry(address: str, value: Any) -> str:
 def link_equations(
     app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
 ) -> None:
-    """Link equation numbers of a docstring (Sphinx's event autodoc-process-docstring).
-
-    Napoleon reads "Inertia matrix: …" of a property as a type and a description, so a property is
-    parsed again as a method.
-    """
+    """Link equation numbers of a docstring (Sphinx's event autodoc-process-docstring)."""
     if what in ("property", "attribute"):
         text = prepare_docstring(inspect.getdoc(value) or "")
         lines[:] = NumpyDocstring(text, app.config, app, "method", name, value, options).lines()

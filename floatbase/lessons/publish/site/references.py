@@ -49,15 +49,7 @@ def target_of(match: re.Match[str]) -> str:
 
 
 def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
-    """Add links to equations and lessons; links to lessons that are not on the site become text.
-
-    Parameters
-    ----------
-    markdown : str
-        The text.
-    lessons : mapping
-        Number -> address, such as "05" -> "05_centre_of_mass.ipynb".
-    """
+    """Add links to equations and lessons; links to lessons that are not on the site become text."""
     names = {Path(address).name for address in lessons.values()}
 
     def link(match: re.Match[str]) -> str:
