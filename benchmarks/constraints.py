@@ -15,17 +15,13 @@ QPs. Only the contact Jacobians are those of the package, which the tests compar
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-from collections.abc import Callable, Iterable, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import harness
 import clarabel
 import numpy as np
 import pinocchio as pin
@@ -42,129 +38,16 @@ from floatbase.objectives import (
     RelativePoseTask,
 )
 
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from finite_differences import residual
+
 ROBOTS = ("go2", "solo12", "hyq", "anymal_kinova", "talos")
-MU, STEP = 0.7, 2e-3  # friction; s, of finite differences
+MU = 0.7
 TIGHT, TOLERANCE = 1e-11, 1e-9  # Clarabel's; of rows that levels of priorities share
 STRICT = 1e-7  # fraction of the slope: smaller multipliers may be rounding
 REQUIRED = 1e-6  # fraction of the strongest motor's limit
 Array = np.ndarray
 Row = tuple[Array, Array]  # A and b of A x - b, or G and h of G x <= h
-
-
-# tasks by finite differences ----------------------------------------------------------------------
-
-
-class Kinematics:
-    """Pinocchio's kinematics along q(t) = q ⊕ (v t + q̈ t² / 2)."""
-
-    def __init__(self, state: fb.State):
-        self.robot, self.model = state.robot, state.robot.model
-        self.data, self.q, self.v = self.model.createData(), np.array(state.q), np.array(state.v)
-
-    def at(self, t: float, qdd: Array) -> tuple[Array, Array]:
-        """Return q and the velocity at t."""
-        q = pin.integrate(self.model, self.q, t * self.v + 0.5 * t * t * qdd)
-        return q, self.v + t * qdd
-
-    def pose(self, frame: str, q: Array) -> pin.SE3:
-        """Return the pose of a frame."""
-        pin.framesForwardKinematics(self.model, self.data, q)
-        return self.data.oMf[self.robot.frame_id(frame)].copy()
-
-    def com(self, q: Array) -> Array:
-        """Return the centre of mass."""
-        return pin.centerOfMass(self.model, self.data, q).copy()
-
-    def angular_momentum(self, q: Array, v: Array) -> Array:
-        """Return the angular momentum about the centre of mass, world axes."""
-        return pin.computeCentroidalMomentum(self.model, self.data, q, v).angular.copy()
-
-    def derivatives(self, moved: Callable[[Array], Array], qdd: Array) -> tuple[Array, Array]:
-        """Return first and second derivative of a displacement along the path, extrapolated."""
-        found = []
-        for h in (STEP, 0.5 * STEP):
-            ahead, behind = (moved(self.at(t, qdd)[0]) for t in (h, -h))
-            found.append(((ahead - behind) / (2.0 * h), (ahead + behind) / h**2))
-        return tuple((4.0 * fine - coarse) / 3.0 for coarse, fine in zip(*found, strict=True))
-
-    def rate(self, value: Callable[[Array, Array], Array], qdd: Array) -> Array:
-        """Return the derivative of a function of q and v along the path, extrapolated."""
-        coarse, fine = (
-            (value(*self.at(h, qdd)) - value(*self.at(-h, qdd))) / (2.0 * h)
-            for h in (STEP, 0.5 * STEP)
-        )
-        return (4.0 * fine - coarse) / 3.0
-
-
-def angle_between(R: Array, target: Array) -> Array:
-    """Return the rotation vector from one orientation to another."""
-    return pin.log3(R @ target.T)
-
-
-def acceleration(at: Kinematics, task: Any, qdd: Array) -> Array:
-    """Return the residual of a task on q̈, by finite differences."""
-    if isinstance(task, AngularMomentumTask):
-        momentum = at.angular_momentum(at.q, at.v)
-        return at.rate(at.angular_momentum, qdd) + task.kd * (momentum - task.momentum)
-    if isinstance(task, AxisTask):
-        axis, d = np.array(task.axis), np.array(task.direction)
-        axis, d = axis / np.linalg.norm(axis), d / np.linalg.norm(d)
-        n = at.pose(task.frame, at.q).rotation @ axis
-        speed, change = at.derivatives(lambda q: at.pose(task.frame, q).rotation @ axis - n, qdd)
-        e = np.cross(d, n)
-        e *= np.arctan2(np.linalg.norm(e), d @ n) / np.linalg.norm(e)
-        feedback = task.kp * e + task.kd * np.cross(n, speed)
-        return np.cross(n, change) + feedback - n * (n @ feedback)
-    if isinstance(task, fb.PostureTask):
-        error = pin.difference(at.model, np.array(task.q), at.q)[6:]
-        return qdd[6:] + task.kp * error + task.kd * at.v[6:]
-    moved, error = displacement(at, task)
-    speed, change = at.derivatives(moved, qdd)
-    return change + task.kp * error + task.kd * speed
-
-
-def displacement(at: Kinematics, task: Any) -> tuple[Callable[[Array], Array], Array]:
-    """Return the displacement from the state as a function of q, and the error in the state."""
-    if isinstance(task, fb.CoMTask):
-        start = at.com(at.q)
-        return lambda q: at.com(q) - start, start - task.position
-    if isinstance(task, RelativePoseTask):
-
-        def pose(q: Array) -> pin.SE3:
-            return at.pose(task.reference, q).actInv(at.pose(task.frame, q))
-
-        first, goal = pose(at.q), np.array(task.pose)
-        error = np.r_[first.translation - goal[:3, 3], angle_between(first.rotation, goal[:3, :3])]
-
-        def moved(q: Array) -> Array:
-            now = pose(q)
-            return np.r_[
-                now.translation - first.translation, angle_between(now.rotation, first.rotation)
-            ]
-
-        return moved, error
-    first = at.pose(task.frame, at.q)
-    if isinstance(task, fb.OrientationTask):
-        error = angle_between(first.rotation, np.array(task.rotation))
-        return lambda q: angle_between(at.pose(task.frame, q).rotation, first.rotation), error
-    start = first.translation
-    return lambda q: at.pose(task.frame, q).translation - start, start - task.position
-
-
-def residual(state: fb.State, eom: Any, task: Any) -> Row:
-    """Return A and b of the residual A y + b of a task on its block y of (q̈, τ, λ)."""
-    if task.block == "tau":
-        return np.eye(state.robot.d), np.zeros(state.robot.d)
-    if isinstance(task, CentreOfPressureTask):
-        arms = eom.contacts.positions(state) - task.position
-        moment = np.hstack([pin.skew(arm)[:2] for arm in arms])
-        return moment, np.zeros(2)
-    if task.block == "forces":
-        return np.eye(eom.k), np.zeros(eom.k)
-    at, zero = Kinematics(state), np.zeros(state.robot.nv)
-    b = acceleration(at, task, zero)
-    columns = [acceleration(at, task, unit) - b for unit in np.eye(state.robot.nv)]
-    return np.column_stack(columns), b
 
 
 # the independent QP -------------------------------------------------------------------------------
@@ -177,7 +60,7 @@ class Independent:
     state: fb.State
     contacts: fb.Contacts
     torque_limits: Array
-    inequalities: list[tuple[slice, Row, float]] = field(default_factory=list)
+    inequalities: list[tuple[Array, Array, Array]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         robot, k = self.state.robot, self.contacts.k
@@ -195,37 +78,35 @@ class Independent:
         A, b = self.eom.A, self.eom.b
         self.A = np.block([[M, -S, -self.eom.J.T], [A, np.zeros((len(A), d + k))]])
         self.b = np.r_[-h, b]
-        facets, at = np.zeros((4 * k // 3, k)), MU / np.sqrt(2.0)
-        for i in range(k // 3):
-            facets[4 * i : 4 * i + 4, 3 * i : 3 * i + 3] = [
-                [1, 0, -at], [0, 1, -at], [-1, 0, -at], [0, -1, -at],
-            ]  # fmt: skip
-        self.add("forces", facets, np.zeros(len(facets)))
+        at = MU / np.sqrt(2.0)
+        cone = [[1, 0, -at], [0, 1, -at], [-1, 0, -at], [0, -1, -at]]
+        self.add("forces", np.kron(np.eye(k // 3), cone), np.zeros(4 * k // 3))
         self.add("tau", np.vstack([np.eye(d), -np.eye(d)]), np.tile(self.torque_limits, 2))
 
     def add(self, block: str, G: Array, h: Array, weight: float = np.inf) -> None:
         """Add inequalities on a block, hard or with the weight of their violation."""
-        self.inequalities.append((self.blocks[block], (G, h), weight))
+        self.inequalities.append((self.placed(block, G), h, np.full(len(h), weight)))
 
-    def cost(self, tasks: Iterable[Any]) -> tuple[Array, Array, list[Row]]:
+    def placed(self, block: str, part: Array) -> Array:
+        """Return rows on a block as rows on x."""
+        rows = np.zeros((len(part), self.n))
+        rows[:, self.blocks[block]] = part
+        return rows
+
+    def cost(self, tasks: Iterable[Any]) -> tuple[Array, Array, Array]:
         """Return H and g of a sum of tasks, and the rows of the tasks in x."""
         H, g, rows = np.zeros((self.n, self.n)), np.zeros(self.n), []
         for task in tasks:
             A, b = residual(self.state, self.eom, task)
-            part = np.zeros((len(A), self.n))
-            part[:, self.blocks[task.block]] = A
-            H, g = H + task.weight * part.T @ part, g + task.weight * part.T @ b
-            rows.append((part, b))
-        return H, g, rows
+            rows.append(self.placed(task.block, A))
+            H += task.weight * rows[-1].T @ rows[-1]
+            g += task.weight * rows[-1].T @ b
+        return H, g, np.vstack(rows)
 
     def solve(self, levels: Sequence[Sequence[Any]]) -> Array | None:
         """Return x of the last of several levels, or None if there is none."""
-        G = np.zeros((sum(len(h) for _, (_, h), _ in self.inequalities), self.n))
-        h, weights, row = np.zeros(len(G)), np.zeros(len(G)), 0
-        for block, (part, bound), weight in self.inequalities:
-            G[row : row + len(part), block], h[row : row + len(part)] = part, bound
-            weights[row : row + len(part)] = weight
-            row += len(part)
+        parts, bounds, all_weights = zip(*self.inequalities, strict=True)
+        G, h, weights = np.vstack(parts), np.concatenate(bounds), np.concatenate(all_weights)
         soft = np.flatnonzero(np.isfinite(weights))
         E = np.zeros((len(G), len(soft)))
         E[soft, np.arange(len(soft))] = -1.0
@@ -241,10 +122,9 @@ class Independent:
             if found is None:
                 return None
             x, strict = x + found[0], found[1]
-            for part, _ in rows:  # later levels keep what this one reached
-                A = np.vstack([A, np.pad(part, ((0, 0), (0, len(soft))))])
-            # a row with a positive multiplier is active at every optimum of the level
-            A = np.vstack([A, G[strict]])
+            # later levels keep what this one reached; an inequality with a positive multiplier is
+            # active at every optimum of the level
+            A = np.vstack([A, np.pad(rows, ((0, 0), (0, len(soft)))), G[strict]])
             G, h = G[~strict], np.maximum(h, G @ x + TOLERANCE)[~strict]
         return x[: self.n]
 
@@ -335,14 +215,11 @@ def task_of(kind: str, state: fb.State, rng: np.random.Generator) -> Any:
     if kind == "orientation":
         return fb.OrientationTask(one, rotation @ state.frame_pose(one).rotation, **gains)
     if kind == "frame":
-        return fb.FrameTask(
-            one, state.frame_pose(one).translation + rng.normal(0.0, 0.1, 3), **gains
-        )
+        target = state.frame_pose(one).translation + rng.normal(0.0, 0.1, 3)
+        return fb.FrameTask(one, target, **gains)
     if kind == "posture":
-        q = pin.integrate(
-            robot.model, np.array(state.q), np.r_[np.zeros(6), rng.normal(0.0, 0.2, robot.d)]
-        )
-        return fb.PostureTask(q, **gains)
+        away = np.r_[np.zeros(6), rng.normal(0.0, 0.2, robot.d)]
+        return fb.PostureTask(state.integrate(away), **gains)
     if kind == "relative pose":
         pose = state.frame_pose(other).actInv(state.frame_pose(one))
         goal = pin.SE3(rotation @ pose.rotation, pose.translation + rng.normal(0.0, 0.1, 3))
@@ -473,8 +350,6 @@ KINDS = (*TASKS, "joint limits", "soft rows", "priorities", "capture point")
 class Result:
     """What the problems of one kind on one robot showed."""
 
-    kind: str
-    robot: str
     problems: int = 0
     active: int = 0  # with an active inequality
     infeasible: int = 0
@@ -482,20 +357,10 @@ class Result:
     residual: float = 0.0  # largest relative difference of a task from finite differences
     differences: list[float] = field(default_factory=list)  # of torques, fraction of the limit
 
-    def row(self) -> str:
-        """Return the row of the table."""
-        worst = max(self.differences, default=0.0)
-        over = sum(x > REQUIRED for x in self.differences)
-        task = f"{self.residual:.0e}" if self.kind in TASKS else "–"
-        return (
-            f"| {self.kind} | {self.robot} | {self.problems} | {self.active} | {self.infeasible} "
-            f"| {self.verdicts} | {task} | {worst:.0e} | {over} |"
-        )
-
 
 def compare(kind: str, robot: fb.Robot, seeds: Iterable[int]) -> Result:
     """Solve random problems with both backends and independently."""
-    result = Result(kind, robot.name)
+    result = Result()
     backends = ("reference",) if kind == "priorities" else ("compiled", "reference")
     largest = float(np.max(robot.torque_limits[np.isfinite(robot.torque_limits)]))
     for seed in seeds:
@@ -516,50 +381,51 @@ def compare(kind: str, robot: fb.Robot, seeds: Iterable[int]) -> Result:
             tau = x[problem.independent.blocks["tau"]]
             result.differences.append(float(np.max(np.abs(command.tau - tau))) / largest)
         if kind in TASKS:
-            task = problem.levels[0][0]
-            ours, (A, b) = (
-                task.residual(problem.independent.eom),
-                residual(problem.state, problem.independent.eom, task),
-            )
-            for mine, theirs in ((ours.A, A), (ours.b, b)):
+            task, eom = problem.levels[0][0], problem.independent.eom
+            ours, expected = task.residual(eom), residual(problem.state, eom, task)
+            for mine, theirs in zip((ours.A, ours.b), expected, strict=True):
                 gap = np.max(np.abs(mine - theirs)) / (1.0 + np.max(np.abs(theirs)))
                 result.residual = max(result.residual, float(gap))
     return result
 
 
-HEADER = (
-    "| kind | robot | problems | with active limits | infeasible | different verdicts | "
-    "task, largest difference | torques, largest difference | above 1e-6 |\n" + "|---" * 9 + "|"
-)
+def rows(kinds: Iterable[str], seeds: Sequence[int]) -> Iterator[list[object]]:
+    """Compare every robot, and return the rows of the table."""
+    for kind in kinds:
+        for name in ROBOTS:
+            found = compare(kind, fb.load(name), seeds)
+            counts = [found.problems, found.active, found.infeasible, found.verdicts]
+            task = f"{found.residual:.0e}" if kind in TASKS else "–"
+            worst = f"{max(found.differences, default=0.0):.0e}"
+            yield [kind, name, *counts, task, worst, sum(x > REQUIRED for x in found.differences)]
 
 
 def main() -> None:
     """Parse the command line, compare, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--problems", type=int, default=500, help="problems of each kind")
+    parser = harness.command_line(
+        __doc__, problems=(500, "problems of each kind"), seed=(0, "first seed")
+    )
     parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
-    parser.add_argument("--seed", type=int, default=0, help="first seed")
     arguments = parser.parse_args()
-    lines = [HEADER]
-    print(HEADER, flush=True)
     each = -(-arguments.problems // len(ROBOTS))
-    for kind in arguments.kinds:
-        for name in ROBOTS:
-            seeds = range(arguments.seed, arguments.seed + each)
-            lines.append(compare(kind, fb.load(name), seeds).row())
-            print(lines[-1], flush=True)
+    table = harness.table(
+        "kind | robot | problems | with active limits | infeasible | different verdicts | task, "
+        "largest difference | torques, largest difference | above 1e-6",
+        rows(arguments.kinds, range(arguments.seed, arguments.seed + each)),
+    )
     if arguments.problems >= 500 and tuple(arguments.kinds) == KINDS:
-        packages = ", ".join(f"{name} {version(name)}" for name in ("pin", "clarabel", "numpy"))
-        page = [
-            "# Constraints and tasks against independent QPs", "",
-            f"`python benchmarks/constraints.py`, with {packages}.", "",
-            "Each problem has a random state and random targets. Both backends solve it (strict",
-            "priorities: the reference backend). The QP for comparison is written from Pinocchio's",
-            "quantities, with rows of tasks from finite differences, and solved by Clarabel.",
-            "Differences of torques are fractions of the strongest motor's limit.", "",
-            *lines, "",
-        ]  # fmt: skip
-        Path(__file__).with_suffix(".md").write_text("\n".join(page))
+        packages = harness.versions("pin", "clarabel", "numpy")
+        harness.write(
+            __file__,
+            "Constraints and tasks against independent QPs",
+            f"`python benchmarks/constraints.py`, with {packages}.",
+            "Each problem has a random state and random targets. Both backends solve it (strict\n"
+            "priorities: the reference backend). The QP for comparison is written from\n"
+            "Pinocchio's quantities, with rows of tasks from finite differences, and solved by\n"
+            "Clarabel. "
+            "Differences of torques are fractions of the strongest motor's limit.",
+            table,
+        )
 
 
 if __name__ == "__main__":

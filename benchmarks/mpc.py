@@ -10,21 +10,19 @@ The control period is 2 ms. Times are processor times of the thread.
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
+import re
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import harness
 import clarabel
 import daqp
 import numpy as np
 import pinocchio as pin
+from harness import tilt, velocity, walker
 from scipy import sparse
 
 import floatbase as fb
@@ -41,15 +39,7 @@ JUMPS = {  # the largest height and distance of ten jumps
     "anymal_kinova": (0.20, 0.20),
 }
 Make = Callable[[fb.Robot, fb.Contacts, float], Walk]
-
-
-def robot_of(name: str) -> tuple[fb.Robot, fb.Contacts]:
-    options: dict[str, Any] = {}
-    if name == "anymal_c":
-        feet = ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]
-        options = {"feet": feet, "foot_radius": 0.02}
-    robot = fb.load(name, **options)
-    return robot, fb.Contacts.feet(robot, mu=0.6)
+Rows = Iterator[list[str]]
 
 
 def quick(robot: fb.Robot) -> Gait:
@@ -67,10 +57,6 @@ CONTROLLERS: dict[str, Make] = {
 }
 
 
-def tilt(run: Rollout) -> float:
-    return float(np.rad2deg(np.arccos(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2)).max()))
-
-
 def load(run: Rollout, begin: float) -> tuple[float, float]:
     """Return the root mean square and the largest torque, as fractions of the limits."""
     fraction = np.abs(run.tau[run.time >= begin] / run.robot.torque_limits)
@@ -83,16 +69,9 @@ def quiet(make: Make, robot: fb.Robot, contacts: fb.Contacts, v: float) -> Walk:
         return make(robot, contacts, v)
 
 
-def speeds() -> Iterator[str]:
-    yield "## Speed, tilt and torque"
-    yield ""
-    yield "Speed of the last second, largest tilt, and torque as a fraction of the limits (rms and"
-    yield "largest) in the last second. (x) is the speed to which the steps are limited."
-    yield ""
-    yield "| robot | desired | " + " | ".join(CONTROLLERS) + " |"
-    yield "|---|---|" + "---|" * len(CONTROLLERS)
+def speed_rows() -> Rows:
     for name in ROBOTS:
-        robot, contacts = robot_of(name)
+        robot, contacts = walker(name)
         for v in SPEEDS:
             cells = []
             for make in CONTROLLERS.values():
@@ -102,27 +81,17 @@ def speeds() -> Iterator[str]:
                 if run.outcome != "completed":
                     cells.append(f"{run.outcome} at {run.time[-1]:.1f} s")
                     continue
-                last = np.searchsorted(run.time, duration - 1.0)
-                reached = (run.com[-1, 0] - run.com[last, 0]) / (run.time[-1] - run.time[last])
-                rms, peak = load(run, run.time[last])
+                reached = velocity(run, duration - 1.0)[0]
+                rms, peak = load(run, duration - 1.0)
                 limited = walk.speed_fraction < 1.0
                 limit = f" ({walk.speed_fraction * v:.2f})" if limited else ""
                 cells.append(f"{reached:.2f}{limit} m/s, {tilt(run):.1f}°, {rms:.2f}, {peak:.2f}")
-            print(name, v, *cells, sep=" | ", flush=True)
-            yield f"| {name} | {v:g} m/s | " + " | ".join(cells) + " |"
+            yield [name, f"{v:g} m/s", *cells]
 
 
-def pushes(n: int) -> Iterator[str]:
-    yield "## Pushes"
-    yield ""
-    yield f"{n} pushes of 0.1 s on the base, in random directions and at random times of a trot"
-    yield "(swing 0.25 s) at 0.3 m/s. Each changes the velocity by 0.5 to 1.5 m/s. The same pushes"
-    yield "for both controllers; survived, and mean of the largest tilts of the survivors."
-    yield ""
-    yield "| robot | `Walk` | `MPC` |"
-    yield "|---|---|---|"
+def push_rows(n: int) -> Rows:
     for name in ROBOTS:
-        robot, contacts = robot_of(name)
+        robot, contacts = walker(name)
         cells = []
         for kind in (Walk, MPC):
             rng, tilts = np.random.default_rng(SEED), []
@@ -136,8 +105,7 @@ def pushes(n: int) -> Iterator[str]:
                 if run.outcome == "completed":
                     tilts.append(tilt(run))
             cells.append(f"{len(tilts)} of {n}, {np.mean(tilts):.1f}°" if tilts else f"0 of {n}")
-        print(name, *cells, sep=" | ", flush=True)
-        yield f"| {name} | " + " | ".join(cells) + " |"
+        yield [name, *cells]
 
 
 class Timed:
@@ -157,38 +125,25 @@ class Timed:
         return command
 
 
-def horizons() -> Iterator[str]:
-    yield "## Time per control step and length of the horizon"
-    yield ""
-    yield "go2 trots at 0.5 m/s. The horizon has n intervals of 30 ms and is solved every 20 ms."
-    yield "Median, mean and 99 % quantile of a control step."
-    yield ""
-    yield "| | median | mean | 99 % | speed | tilt |"
-    yield "|---|---|---|---|---|---|"
-    robot, contacts = robot_of("go2")
-    makes: dict[str, Callable[[], Walk]] = {
-        "`Walk`": lambda: Walk(robot, contacts, Gait.trot(robot, start=0.2), (0.5, 0.0))
-    }
+def horizon_rows() -> Rows:
+    robot, contacts = walker("go2")
+    gait = Gait.trot(robot, start=0.2)
+    walks = {"`Walk`": Walk(robot, contacts, gait, (0.5, 0.0))}
     for n in HORIZONS:
-        makes[f"`MPC`, n = {n}"] = lambda n=n: MPC(
-            robot, contacts, Gait.trot(robot, start=0.2), (0.5, 0.0), n=n
-        )
-    for label, make in makes.items():
-        timed = Timed(make())
+        walks[f"`MPC`, n = {n}"] = MPC(robot, contacts, gait, (0.5, 0.0), n=n)
+    for label, walk in walks.items():
+        timed = Timed(walk)
         run = fb.rollout(fb.Simulation(robot), timed, 3.0, control_period=PERIOD)
         times = 1e6 * np.array(timed.times[100:])
-        last = np.searchsorted(run.time, 2.0)
-        reached = (run.com[-1, 0] - run.com[last, 0]) / (run.time[-1] - run.time[last])
-        numbers = f"{np.median(times):.0f} | {times.mean():.0f} | {np.quantile(times, 0.99):.0f} µs"
-        yield (
-            f"| {label} | {numbers.replace(' |', ' µs |')} | {reached:.2f} m/s | {tilt(run):.1f}° |"
-        )
+        numbers = np.median(times), times.mean(), np.quantile(times, 0.99)
+        cells = [f"{number:.0f} µs" for number in numbers]
+        yield [label, *cells, f"{velocity(run, 2.0)[0]:.2f} m/s", f"{tilt(run):.1f}°"]
 
 
 def recorded(n: int) -> list[Any]:
     """Return the problems of a flying trot, (horizon, arguments) each."""
     found: list[Any] = []
-    robot, contacts = robot_of("go2")
+    robot, contacts = walker("go2")
     walk = MPC(robot, contacts, Gait.flying_trot(robot, start=0.2), (0.5, 0.0), n=n)
     solve = HorizonQP.solve
 
@@ -204,60 +159,40 @@ def recorded(n: int) -> list[Any]:
     return found
 
 
-def solvers() -> Iterator[str]:
-    yield "## Solvers"
-    yield ""
-    problems = recorded(10)
-    rng = np.random.default_rng(SEED)
-    worst = 0.0
+def difference_rows() -> Rows:
+    problems, rng, worst = recorded(10), np.random.default_rng(SEED), 0.0
     for i in range(200):
         horizon, (x, *rest) = problems[i % len(problems)]
         x = x + rng.normal(size=12) * np.repeat([0.1, 0.05, 0.5, 0.3], 3)
-        difference = (
-            horizon.solve(x, *rest).forces[rest[2]].ravel()
-            - fb.solve(horizon.qp(x, *rest), "cvxpy").x
-        )
-        worst = max(worst, float(np.abs(difference).max()) / (horizon.mass * horizon.gravity))
-    yield "Over 200 horizons of go2 at random states, the forces differ from those of Clarabel by"
-    yield f"at most {worst:.0e} of the weight. Times to solve the quadratic program of a flying"
-    yield "trot, without assembling it:"
-    yield ""
-    yield "| n | variables | DAQP | Clarabel |"
-    yield "|---|---|---|---|"
+        found = horizon.solve(x, *rest).forces[rest[2]].ravel()
+        difference = np.abs(found - fb.solve(horizon.qp(x, *rest), "cvxpy").x).max()
+        worst = max(worst, float(difference) / (horizon.mass * horizon.gravity))
+    yield ["200", f"{worst:.0e}"]
+
+
+def solver_rows() -> Rows:
     for n in HORIZONS:
-        times: dict[str, list[float]] = {"daqp": [], "clarabel": []}
+        times = []
         for horizon, arguments in recorded(n)[10:60]:
             qp = horizon.qp(*arguments)
             H, g, G, h = (np.array(a) for a in (qp.H, qp.g, qp.G, qp.h))
-            P, C = sparse.csc_matrix(np.triu(H)), sparse.csc_matrix(G)
             senses, none = np.zeros(len(h), dtype=np.int32), np.full(len(h), -1e30)
-
-            def by_daqp(H=H, g=g, G=G, h=h, none=none, senses=senses) -> None:
-                daqp.solve(H, g, G, h, none, senses)
-
-            def by_clarabel(P=P, g=g, C=C, h=h) -> None:
-                settings = clarabel.DefaultSettings()
-                settings.verbose = False
-                cones = [clarabel.NonnegativeConeT(len(h))]
-                clarabel.DefaultSolver(P, g, C, h, cones, settings).solve()
-
-            for label, solve in zip(times, (by_daqp, by_clarabel), strict=True):
-                begin = time.thread_time()
-                solve()
-                times[label].append(time.thread_time() - begin)
-        medians = " | ".join(f"{1e3 * np.median(each):.2f} ms" for each in times.values())
-        yield f"| {n} | {len(g)} | {medians} |"
+            P, C = sparse.csc_matrix(np.triu(H)), sparse.csc_matrix(G)
+            by_daqp = harness.work(daqp.solve, H, g, G, h, none, senses)
+            times.append((by_daqp, harness.work(by_clarabel, P, g, C, h)))
+        yield [f"{n}", f"{len(g)}", *(f"{1e3 * each:.2f} ms" for each in np.median(times, axis=0))]
 
 
-def jumps() -> Iterator[str]:
-    yield "## Jumps"
-    yield ""
-    yield "Ten jumps of each robot: commanded against reached height and distance."
-    yield ""
-    yield "| robot | height, m | distance, m | completed | height error | distance error | tilt |"
-    yield "|---|---|---|---|---|---|---|"
+def by_clarabel(P: Any, g: np.ndarray, G: Any, h: np.ndarray) -> None:
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    cones = [clarabel.NonnegativeConeT(len(h))]
+    clarabel.DefaultSolver(P, g, G, h, cones, settings).solve()
+
+
+def jump_rows() -> Rows:
     for name, (height, distance) in JUMPS.items():
-        robot, contacts = robot_of(name)
+        robot, contacts = walker(name)
         errors, tilts, completed = [], [], 0
         for h in np.linspace(0.05, height, 5):
             for d in (0.0, distance):
@@ -269,10 +204,8 @@ def jumps() -> Iterator[str]:
                 errors.append((rise - h, feet[-1] - feet[0] - d))
                 tilts.append(tilt(run))
         up, ahead = 1e3 * np.abs(errors).max(axis=0)
-        yield (
-            f"| {name} | 0.05 to {height:g} | 0 and {distance:g} | {completed} of 10 | "
-            f"≤ {up:.0f} mm | ≤ {ahead:.0f} mm | ≤ {max(tilts):.0f}° |"
-        )
+        commanded = [f"0.05 to {height:g}", f"0 and {distance:g}", f"{completed} of 10"]
+        yield [name, *commanded, f"≤ {up:.0f} mm", f"≤ {ahead:.0f} mm", f"≤ {max(tilts):.0f}°"]
 
 
 def momentum_errors(run: Rollout, rows: list[int]) -> tuple[float, float, float]:
@@ -296,19 +229,9 @@ def momentum_errors(run: Rollout, rows: list[int]) -> tuple[float, float, float]
     )
 
 
-def flights() -> Iterator[str]:
-    yield "## Flight and prediction"
-    yield ""
-    yield "MuJoCo against the closed form while no foot touches the ground: largest differences."
-    yield "The velocity of the centre of mass is compared with free fall, and the angular"
-    yield "momentum with a constant. The energy of the centre of mass is given as a height. Its"
-    yield "error is that of the integration: in a time t, a step of 1 ms lowers the centre of mass"
-    yield "by g t · 0.5 ms, which is 1.4 mm in 286 ms."
-    yield ""
-    yield "| robot | flight | velocity | angular momentum | energy |"
-    yield "|---|---|---|---|---|"
+def flight_rows() -> Rows:
     for name in ("go2", "solo12", "anymal_kinova"):
-        robot, contacts = robot_of(name)
+        robot, contacts = walker(name)
         jump = Jump(robot, contacts, 0.1, start=0.1)
         trot = MPC(robot, contacts, flying(robot), (0.5, 0.0))
         for label, controller, begin in (
@@ -323,33 +246,26 @@ def flights() -> Iterator[str]:
             first = free.index(True)
             last = first + free[first:].index(False)
             v, L, h = momentum_errors(run, list(range(first, last)))
-            yield (
-                f"| {name} | {label}, {1e3 * (run.time[last] - run.time[first]):.0f} ms | "
-                f"{1e3 * v:.1f} mm/s | {L:.4f} kg·m²/s | {1e3 * h:.2f} mm |"
-            )
-    yield ""
-    yield "Error of the horizon's prediction 100 ms ahead (5 intervals of 20 ms), against MuJoCo:"
-    yield "largest and root mean square, of the position of the centre of mass and of its velocity."
-    yield ""
-    yield "| robot | gait, 0.5 m/s | position | velocity |"
-    yield "|---|---|---|---|"
+            flight = f"{label}, {1e3 * (run.time[last] - run.time[first]):.0f} ms"
+            yield [name, flight, f"{1e3 * v:.1f} mm/s", f"{L:.4f} kg·m²/s", f"{1e3 * h:.2f} mm"]
+
+
+def prediction_rows() -> Rows:
     for name in ("go2", "solo12", "anymal_kinova"):
-        robot, contacts = robot_of(name)
+        robot, contacts = walker(name)
         for label, gait in (("trot", Gait.trot(robot, start=0.2)), ("flying trot", flying(robot))):
             walk = Predicting(robot, contacts, gait, (0.5, 0.0), n=15, dt=0.02)
             run = fb.rollout(fb.Simulation(robot), walk, 2.0, control_period=PERIOD)
-            velocity = np.gradient(run.com, run.time, axis=0)
+            velocities = np.gradient(run.com, run.time, axis=0)
             errors = [
-                [x[3:6] - run.com[i], x[9:12] - velocity[i]]
+                [x[3:6] - run.com[i], x[9:12] - velocities[i]]
                 for t, x in walk.predictions.items()
                 if t > 0.8 and (i := round((t + 0.1) / PERIOD)) < len(run)
             ]
             sizes = 1e3 * np.linalg.norm(errors, axis=2)
-            largest, rms = sizes.max(axis=0), np.sqrt((sizes**2).mean(axis=0))
-            yield (
-                f"| {name} | {label} | {largest[0]:.1f} mm, {rms[0]:.1f} mm | "
-                f"{largest[1]:.0f} mm/s, {rms[1]:.0f} mm/s |"
-            )
+            (far, fast), (far_rms, fast_rms) = sizes.max(axis=0), np.sqrt((sizes**2).mean(axis=0))
+            position, speed = f"{far:.1f} mm, {far_rms:.1f} mm", f"{fast:.0f} mm/s, {fast_rms:.0f}"
+            yield [name, label, position, f"{speed} mm/s"]
 
 
 class Predicting(MPC):
@@ -366,37 +282,86 @@ class Predicting(MPC):
         return command
 
 
+def sections(n: int) -> dict[str, list[tuple[str, str, Rows]]]:
+    """Return texts, headers and rows of all tables by the first word of their heading."""
+    return {
+        "speed": [(
+            "## Speed, tilt and torque\n\n"
+            "Speed of the last second, largest tilt, and torque as a fraction of the limits (rms\n"
+            "and largest) in the last second. (x) is the speed to which the steps are limited.",
+            "robot | desired | " + " | ".join(CONTROLLERS),
+            speed_rows(),
+        )],
+        "jumps": [(
+            "## Jumps\n\nTen jumps of each robot: commanded against reached height and distance.",
+            "robot | height, m | distance, m | completed | height error | distance error | tilt",
+            jump_rows(),
+        )],
+        "pushes": [(
+            f"## Pushes\n\n{n} pushes of 0.1 s on the base, in random directions and at random\n"
+            "times of a trot (swing 0.25 s) at 0.3 m/s. Each changes the velocity by 0.5 to\n"
+            "1.5 m/s. The same pushes for both controllers; survived, and mean of the largest\n"
+            "tilts of the survivors.",
+            "robot | `Walk` | `MPC`",
+            push_rows(n),
+        )],
+        "time": [(
+            "## Time per control step and length of the horizon\n\n"
+            "go2 trots at 0.5 m/s. The horizon has n intervals of 30 ms and is solved every\n"
+            "20 ms. Median, mean and 99 % quantile of a control step.",
+            " | median | mean | 99 % | speed | tilt",
+            horizon_rows(),
+        )],
+        "solvers": [(
+            "## Solvers\n\nForces of go2 at random states beside those of Clarabel:",
+            "horizons | largest difference, fraction of the weight",
+            difference_rows(),
+        ), (
+            "Times to solve the quadratic program of a flying trot, without assembling it:",
+            "n | variables | DAQP | Clarabel",
+            solver_rows(),
+        )],
+        "flight": [(
+            "## Flight and prediction\n\n"
+            "MuJoCo against the closed form while no foot touches the ground: largest\n"
+            "differences. The velocity of the centre of mass is compared with free fall, and the\n"
+            "angular momentum with a constant. The energy of the centre of mass is given as a\n"
+            "height. Its error is that of the integration: in a time t, a step of 1 ms lowers the\n"
+            "centre of mass by g t · 0.5 ms, which is 1.4 mm in 286 ms.",
+            "robot | flight | velocity | angular momentum | energy",
+            flight_rows(),
+        ), (
+            "Error of the horizon's prediction 100 ms ahead (5 intervals of 20 ms), against\n"
+            "MuJoCo: largest and root mean square, of the position of the centre of mass and of\n"
+            "its velocity.",
+            "robot | gait, 0.5 m/s | position | velocity",
+            prediction_rows(),
+        )],
+    }  # fmt: skip
+
+
 def main() -> None:
-    sections: dict[str, Callable[[], Iterator[str]]] = {
-        "speed": speeds,  # by the first word of the heading
-        "jumps": jumps,
-        "pushes": lambda: pushes(arguments.pushes),
-        "time": horizons,
-        "solvers": solvers,
-        "flight": flights,
-    }
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sections", nargs="*", choices=[*sections, []], help="all by default")
-    parser.add_argument("--pushes", type=int, default=30)
+    parser = harness.command_line(__doc__, pushes=(30, "pushes of each robot"))
+    parser.add_argument("sections", nargs="*", choices=[*sections(0), []], help="all by default")
     arguments = parser.parse_args()
-    path = Path(__file__).with_suffix(".md")
-    parts = dict.fromkeys(sections, "")
-    for part in path.read_text(encoding="utf-8").split("## ")[1:] if path.exists() else ():
-        parts[part.replace(",", " ").split()[0].lower()] = part
-    intro = [
-        "# Model predictive control and jumps: measured results",
-        "",
-        f"Made by `python benchmarks/mpc.py` with floatbase {fb.__version__}. All robots and",
-        "speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground. The",
-        "control period is 2 ms. `Walk` and `MPC` trot with a swing of 0.15 s. The flying trot has",
-        "stances of 0.1 s and flights of 0.04 s. Times are processor times of the thread.",
-        "",
-    ]
-    for name in arguments.sections or sections:
-        parts[name] = "\n".join([*sections[name](), "", ""]).removeprefix("## ")
-        written = "".join(f"## {part}" for part in parts.values() if part)
-        path.write_text("\n".join(intro) + "\n" + written.rstrip() + "\n", encoding="utf-8")
-    print(path)
+    made, path = sections(arguments.pushes), Path(__file__).with_suffix(".md")
+    stored = path.read_text(encoding="utf-8").split("\n## ")[1:] if path.exists() else []
+    parts = dict.fromkeys(made, "")
+    parts |= {re.findall(r"\w+", part)[0].lower(): f"## {part.rstrip()}" for part in stored}
+    for name in arguments.sections or made:
+        parts[name] = "\n\n".join(
+            f"{text}\n\n{harness.table(header, rows)}" for text, header, rows in made[name]
+        )
+        harness.write(
+            __file__,
+            "Model predictive control and jumps: measured results",
+            f"Made by `python benchmarks/mpc.py` with floatbase {fb.__version__}. All robots and\n"
+            "speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.\n"
+            "The control period is 2 ms. `Walk` and `MPC` trot with a swing of 0.15 s. The flying\n"
+            "trot has stances of 0.1 s and flights of 0.04 s. Times are processor times of the\n"
+            "thread.",
+            *filter(None, parts.values()),
+        )
 
 
 if __name__ == "__main__":

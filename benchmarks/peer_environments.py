@@ -47,13 +47,14 @@ def python_of(peer: str, home: Path) -> Path:
     return python
 
 
-def versions(python: Path, names: Sequence[str]) -> dict[str, str]:
-    """The versions of packages in an environment."""
-    code = "import sys; from importlib.metadata import version; print(*map(version, sys.argv[1:]))"
-    said = subprocess.run(
-        [str(python), "-c", code, *names], capture_output=True, text=True, check=True
-    ).stdout
-    return dict(zip(names, said.split(), strict=True))
+def versions(python: Path, names: Sequence[str]) -> str:
+    """The names and versions of packages in an environment."""
+    code = (
+        "import sys; from importlib.metadata import version; "
+        "print(*(f'{name} {version(name)}' for name in sys.argv[1:]), sep=', ')"
+    )
+    command = [str(python), "-c", code, *names]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def _key(peer: str) -> str:
@@ -78,47 +79,26 @@ def _steps(peer: str, folder: Path) -> Iterator[list[str]]:
     if peer == "placo":
         yield [*pip, f"placo=={PLACO}", "pin==3.8.0"]
         return
-    yield [
-        *pip,
-        "cmeel[build]",
-        "eiquadprog[build]",
-        f"pin[build]=={version('pin')}",
-        "jrl-cmakemodules",
-        "scipy",
-    ]
+    built_with = "cmeel[build]", "eiquadprog[build]", f"pin[build]=={version('pin')}"
+    yield [*pip, *built_with, "jrl-cmakemodules", "scipy"]
+    compiled = "--no-build-isolation", "--no-deps", "--no-cache-dir", "--no-binary"
     for package in ("libtsid", "tsid"):
         print(f"Compiling {package} {TSID}: some minutes.", flush=True)
-        yield [
-            *pip,
-            "--no-build-isolation",
-            "--no-deps",
-            "--no-cache-dir",
-            "--no-binary",
-            package,
-            f"{package}=={TSID}",
-        ]
+        yield [*pip, *compiled, package, f"{package}=={TSID}"]
 
 
 def _run(command: list[str], folder: Path) -> None:
     """Run a command in an environment; what it prints goes to `log.txt` there."""
-    jobs = str(os.cpu_count() or 1)
-    settings = {
-        "PATH": f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}",
-        "CMEEL_RUN_TESTS": "OFF",
-        "CMEEL_JOBS": jobs,
-    }
-    log = folder / "log.txt"
+    path = f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    jobs = {"CMEEL_RUN_TESTS": "OFF", "CMEEL_JOBS": str(os.cpu_count() or 1)}
+    environment, log = os.environ | jobs | {"PATH": path}, folder / "log.txt"
     with log.open("a") as out:
-        out.write(f"$ {' '.join(command)}\n")
-        out.flush()
-        code = subprocess.run(
-            command, stdout=out, stderr=subprocess.STDOUT, env=os.environ | settings
-        ).returncode
-    if code:
-        wrong = [
-            line.strip()[:200] for line in log.read_text().splitlines() if "error" in line.lower()
-        ][-3:]
+        print("$", *command, file=out, flush=True)
+        done = subprocess.run(command, stdout=out, stderr=subprocess.STDOUT, env=environment)
+    if done.returncode:
+        lines = log.read_text().splitlines()
+        wrong = [line.strip()[:200] for line in lines if "error" in line.lower()][-3:]
         raise MissingError(
-            f"`{' '.join(command)}` ended with code {code}: {' / '.join(wrong)}. All that it said "
-            f"is in {log}."
+            f"`{' '.join(command)}` ended with code {done.returncode}: {' / '.join(wrong)}. All "
+            f"that it said is in {log}."
         )

@@ -22,19 +22,16 @@ def build(description: dict) -> Contender:
         "", placo.Flags.ignore_collisions, _prepared(description["urdf"], description["contacts"])
     )
     names = [name for name in robot.model.names if name not in ("universe", "root_joint")]
-    if names != description["joints"]:
-        raise SystemExit(
-            f"placo orders the joints as {names}, the problem as {description['joints']}."
-        )
+    expected, armatures = description["joints"], description["armature"]
+    if names != expected:
+        raise SystemExit(f"placo orders the joints as {names}, the problem as {expected}.")
     solver = placo.DynamicsSolver(robot)
     solver.torque_cost = description["torque_weight"]
     solver.problem.regularization = description["hessian"]
     solver.enable_joint_limits(False)
     solver.enable_velocity_limits(False)
     solver.enable_torque_limits(True)
-    for joint, limit, armature in zip(
-        names, description["torque_limits"], description["armature"], strict=True
-    ):
+    for joint, limit, armature in zip(names, description["torque_limits"], armatures, strict=True):
         solver.set_torque_limit(joint, limit)
         robot.set_rotor_inertia(joint, armature)
         robot.set_gear_ratio(joint, 1.0)
@@ -107,12 +104,10 @@ def _add_contact(solver: placo.DynamicsSolver, contact: dict, force_weight: floa
             made[0].length, made[0].width = 2.0 * np.max(corners, axis=0)[:2]
             made[0].weight_moments = force_weight
         else:
-            names = [_corner(frame, i) for i in range(len(corners))]
-            carriers = [
-                _kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0)
-                for name in names
-            ]
-            made = [solver.add_unilateral_point_contact(carrier) for carrier in carriers]
+            made = []
+            for name in (_corner(frame, i) for i in range(len(corners))):
+                carrier = _kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0)
+                made.append(solver.add_unilateral_point_contact(carrier))
     for one in made:
         one.mu, one.weight_forces, one.weight_tangentials = contact["mu"], force_weight, 0.0
 

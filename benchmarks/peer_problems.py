@@ -28,6 +28,7 @@ from functools import lru_cache
 from itertools import count, islice
 from typing import Any
 
+import harness
 import numpy as np
 import pinocchio as pin
 from tick import OwnCoM
@@ -35,8 +36,6 @@ from tick import OwnCoM
 import floatbase as fb
 from floatbase.control import JointLimits
 
-ROBOTS = ("go2", "solo12", "talos")
-SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 MU = 0.7
 # floatbase's answers; own: compiled, with a task as a user writes it
 WAYS = ("compiled", "own", "reference")
@@ -130,19 +129,12 @@ class Problem:
         com, *others = self.tasks
         tasks = [OwnCoM(com.position) if way == "own" else com, *others]
         backend = "compiled" if way == "own" else way
-        return fb.WholeBodyController(
-            self.robot,
-            self.contacts,
-            tasks,
-            facets=4,
-            inner_approximation=False,
-            joint_limits=self.joint_limits,
-            backend=backend,
-        )
+        options = {"facets": 4, "inner_approximation": False, "joint_limits": self.joint_limits}
+        return fb.WholeBodyController(self.robot, self.contacts, tasks, backend=backend, **options)
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""
-        drawn = (self.robot.random_state(seed, SPREADS[label]) for seed in count())
+        drawn = (self.robot.random_state(seed, harness.SPREADS[label]) for seed in count())
         pairs = (
             (level_soles(self.robot, s.q) if self.is_flat else np.array(s.q), np.array(s.v))
             for s in drawn
@@ -153,6 +145,7 @@ class Problem:
     def description(self) -> dict[str, Any]:
         """The problem in numbers and names, for a process without floatbase."""
         robot, (com, base, posture) = self.robot, self.tasks[:3]
+        planar = self.peer == "placo planar"
         return {
             "robot": robot.name,
             "peer": self.peer,
@@ -169,12 +162,7 @@ class Problem:
             "hessian": self.regularisation.hessian,
             "torque_weight": self.regularisation.peer_torque,
             "contacts": [
-                {
-                    "frame": foot.frame,
-                    "mu": MU,
-                    "corners": _plain(foot.corners),
-                    "planar": self.peer == "placo planar",
-                }
+                {"frame": foot.frame, "corners": _plain(foot.corners), "mu": MU, "planar": planar}
                 for foot in robot.feet
             ],
         }
@@ -206,10 +194,8 @@ def problem(robot: str, peer: str) -> Problem:
     """The problem of that name. Point feet are taken without their balls: they touch at their
     frames.
     """
-    feet = fb.load(robot).feet
-    return Problem(
-        fb.load(robot, feet=[foot if foot.is_flat else foot.frame for foot in feet]), peer
-    )
+    feet = [foot if foot.is_flat else foot.frame for foot in fb.load(robot).feet]
+    return Problem(fb.load(robot, feet=feet), peer)
 
 
 def level_soles(robot: fb.Robot, q: np.ndarray) -> np.ndarray:
@@ -224,8 +210,7 @@ def level_soles(robot: fb.Robot, q: np.ndarray) -> np.ndarray:
         error = np.concatenate([pin.log3(data.oMf[frame].rotation) for frame in frames])
         if np.max(np.abs(error)) < 1e-14:
             break
-        J = np.vstack(
-            [pin.getFrameJacobian(model, data, frame, pin.LOCAL)[3:, 6:] for frame in frames]
-        )
+        jacobians = [pin.getFrameJacobian(model, data, frame, pin.LOCAL) for frame in frames]
+        J = np.vstack([jacobian[3:, 6:] for jacobian in jacobians])
         q = pin.integrate(model, q, np.concatenate([np.zeros(6), -np.linalg.pinv(J) @ error]))
     return q

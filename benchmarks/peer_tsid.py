@@ -19,11 +19,9 @@ NO_LIMIT = 1e6  # N
 def build(description: dict) -> Contender:
     """The formulation and solver of a problem."""
     model = pin.buildModelFromXML(description["urdf"], pin.JointModelFreeFlyer())
-    if list(model.names)[2:] != description["joints"]:
-        raise SystemExit(
-            f"TSID orders the joints as {list(model.names)[2:]}, the problem as "
-            f"{description['joints']}."
-        )
+    names, expected = list(model.names)[2:], description["joints"]
+    if names != expected:
+        raise SystemExit(f"TSID orders the joints as {names}, the problem as {expected}.")
     model.armature = np.concatenate([np.zeros(6), description["armature"]])
     robot = tsid.RobotWrapper(model, tsid.RootJointType.FLOATING_BASE_SYSTEM, False)
     formulation = tsid.InverseDynamicsFormulationAccForce("standing", robot, False)
@@ -51,24 +49,14 @@ def build(description: dict) -> Contender:
 
 
 def _add_contact(formulation, robot, contact: dict, force_weight: float):
-    frame, normal = contact["frame"], np.array([0.0, 0.0, 1.0])
+    frame, friction = contact["frame"], (np.array([0.0, 0.0, 1.0]), contact["mu"], 0.0, NO_LIMIT)
     if contact["corners"] is None:
-        made = tsid.ContactPoint(frame, robot, frame, normal, contact["mu"], 0.0, NO_LIMIT)
+        made, size = tsid.ContactPoint(frame, robot, frame, *friction), 3
         made.useLocalFrame(False)
-        size = 3
         made.setRegularizationTaskWeightVector(np.ones(size))
     else:
-        made = tsid.Contact6d(
-            frame,
-            robot,
-            frame,
-            np.array(contact["corners"]).T,
-            normal,
-            contact["mu"],
-            0.0,
-            NO_LIMIT,
-        )
-        size = 6
+        corners = np.array(contact["corners"]).T
+        made, size = tsid.Contact6d(frame, robot, frame, corners, *friction), 6
     made.setKp(np.zeros(size))
     made.setKd(np.zeros(size))
     made.setReference(pin.SE3.Identity())
@@ -84,14 +72,10 @@ def _add_tasks(formulation, robot, description: dict) -> list:
     desired = {
         kind: np.array(description[kind]["target"]) for kind in ("com", "orientation", "posture")
     }
-    desired["orientation"] = np.concatenate(
-        [np.zeros(3), desired["orientation"].ravel(order="F")]
-    )  # position, then columns
-    for task, kind, size in (
-        (com, "com", 3),
-        (base, "orientation", 6),
-        (posture, "posture", robot.na),
-    ):
+    # position, then columns
+    desired["orientation"] = np.r_[np.zeros(3), desired["orientation"].ravel(order="F")]
+    tasks = (com, "com", 3), (base, "orientation", 6), (posture, "posture", robot.na)
+    for task, kind, size in tasks:
         task.setKp(description[kind]["kp"] * np.ones(size))
         task.setKd(description[kind]["kd"] * np.ones(size))
         sample = tsid.TrajectorySample(desired[kind].size, size)

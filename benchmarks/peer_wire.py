@@ -98,20 +98,12 @@ class Process:
     def __init__(
         self, python: Path, script: Path, arguments: Sequence[str] = (), paths: Sequence[Path] = ()
     ):
-        quiet = {
-            "OPENBLAS_NUM_THREADS": "1",
-            "OMP_NUM_THREADS": "1",
-            "PYTHONPATH": os.pathsep.join(map(str, paths)),
-        }
+        settings = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+        settings["PYTHONPATH"] = os.pathsep.join(map(str, paths))
+        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        command = [str(python), str(script), *arguments]
         self.name = script.stem
-        self.process = subprocess.Popen(
-            [str(python), str(script), *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=os.environ | quiet,
-        )
+        self.process = subprocess.Popen(command, text=True, env=os.environ | settings, **pipes)
 
     def ask(self, order: str, what: Any) -> Any:
         """The answer to one order. Raises `RuntimeError` with what the process said when it ended

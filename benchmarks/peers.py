@@ -13,30 +13,26 @@ states. Blocks of control steps alternate, so that other load on the machine aff
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
+import harness
 import numpy as np
 import peer_problems
+from harness import ROBOTS, SPREADS, microseconds
 from peer_environments import MissingError, python_of, versions
-from peer_problems import LIMITED, ROBOTS, SPREADS
+from peer_problems import LIMITED
 from peer_wire import Process
-from tick import JOINT_LIMITS, machine
+from tick import JOINT_LIMITS
 
 HERE = Path(__file__).parent
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
 PLANAR = "placo planar"  # placo's own flat foot, an easier problem
-SIDES = {
-    "tsid": "peer_tsid.py",
-    **dict.fromkeys(LIMITED, "peer_tsid.py"),
-    "placo": "peer_placo.py",
-    PLANAR: "peer_placo.py",
-}
 RUNS = {  # our way, whom it is measured beside, robots
     "tsid": (
         ("compiled", "tsid", ROBOTS),
@@ -52,10 +48,10 @@ RUNS = {  # our way, whom it is measured beside, robots
 class Row:
     """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
 
-    differences: of the torques, for each state, N·m; those up to tolerance count as none. within:
-        the largest between
-    the path measured and the reference one on every fifth state, N·m. ours, theirs: times, µs.
-    ratios: of the medians of each block.
+    unanswered: states without an answer, ours and theirs. differences: of the torques in each state
+    [N·m]; up to `tolerance`, they count as none. within: the largest difference between our way and
+    the reference backend on every fifth state [N·m]. ours, theirs: times [µs]. ratios: of the
+    medians of each block.
     """
 
     way: str
@@ -63,7 +59,7 @@ class Row:
     peer: str
     label: str
     states: int
-    unanswered: tuple[int, int]
+    unanswered: list[int]
     tolerance: float
     differences: np.ndarray
     within: float
@@ -87,52 +83,60 @@ class Row:
         """Our median over theirs in each turn, and of these the median."""
         return float(np.median(self.ratios)) if self.states else np.nan
 
+    @property
+    def middle(self) -> str:
+        """The middle of the ratios."""
+        low, high = np.percentile(self.ratios, [10, 90])
+        return f"{low:.2f} to {high:.2f}"
+
+    @property
+    def missing(self) -> str:
+        """States without an answer, ours and theirs."""
+        return " and ".join(map(str, self.unanswered))
+
 
 def compare(
     pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int
 ) -> Iterator[Row]:
     """Rows of one robot, one of our ways and one peer."""
     problem = peer_problems.problem(robot, peer)
-    everything = {
+    states = {
         label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS
     }
     for process in pair:
         process.ask("problem", problem.description)
-        process.ask("states", everything)
+        process.ask("states", states)
     found = {label: [process.ask("torques", label) for process in pair] for label in SPREADS}
     kept = {
         label: [i for i, both in enumerate(zip(*found[label], strict=True)) if None not in both]
         for label in SPREADS
     }
+    states = {label: [states[label][i] for i in kept[label]] for label in SPREADS}
     for process in pair:
-        process.ask(
-            "states", {label: [everything[label][i] for i in kept[label]] for label in SPREADS}
-        )
-    turns: dict[str, list[list[list[float]]]] = {label: [] for label in SPREADS}
-    for _ in range(rounds):
-        # all rows in every turn: a slow second of the machine is then a few turns of each, not one
-        # row
-        for label in SPREADS:
-            turns[label].append([process.ask("clock", label) for process in pair])
+        process.ask("states", states)
+    # every turn has all rows, so that a slow second of the machine does not fall on one row
+    turns = [
+        {label: [process.ask("clock", label) for process in pair] for label in SPREADS}
+        for _ in range(rounds)
+    ]
     for label in SPREADS:
         ours, theirs = ([np.array(torques[i]) for i in kept[label]] for torques in found[label])
-        unanswered = tuple(sum(tau is None for tau in torques) for torques in found[label])
-        times = np.array(turns[label])
+        times = np.array([turn[label] for turn in turns])
         medians = np.median(times, axis=2)
         yield Row(
             way,
             robot,
             peer,
             label,
-            len(kept[label]),
-            unanswered,
-            TOLERANCE * float(np.max(problem.robot.torque_limits)),
-            _differences(ours, theirs),
-            _within(problem, ours, [everything[label][i] for i in kept[label]]),
-            times[:, 0].ravel(),
-            times[:, 1].ravel(),
-            medians[:, 0] / medians[:, 1],
-            pair[1].ask("stages", label),
+            states=len(kept[label]),
+            unanswered=[sum(tau is None for tau in torques) for torques in found[label]],
+            tolerance=TOLERANCE * float(np.max(problem.robot.torque_limits)),
+            differences=_differences(ours, theirs),
+            within=_within(problem, ours, states[label]),
+            ours=times[:, 0].ravel(),
+            theirs=times[:, 1].ravel(),
+            ratios=medians[:, 0] / medians[:, 1],
+            stages=pair[1].ask("stages", label),
         )
 
 
@@ -158,69 +162,78 @@ def ours(way: str) -> Process:
 
 def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
-    for way, name, robot in [
-        (way, name, robot) for way, name, robots in RUNS[peer] for robot in robots
-    ]:
-        pair = [ours(way), Process(python, HERE / SIDES[name])]
-        some = (
-            (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)
-        )  # it takes long
-        yield from compare(pair, way, robot, name, *some)
-        for process in pair:
-            process.close()
+    for way, name, robots in RUNS[peer]:
+        # the reference backend takes long
+        some = (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)
+        for robot in robots:
+            pair = [ours(way), Process(python, HERE / f"peer_{peer}.py")]
+            yield from compare(pair, way, robot, name, *some)
+            for process in pair:
+                process.close()
 
 
 # results ------------------------------------------------------------------------------------------
 
 
-def torque_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield (
-        "| our way | robot | peer | states | compared | no answer: ours, peer | largest "
-        "difference | from our reference |"
+def torque_table(rows: Sequence[Row]) -> str:
+    return harness.table(
+        "our way | robot | peer | states | compared | no answer: ours, peer | largest difference "
+        "| from our reference",
+        (
+            [row.way, row.robot, row.peer, row.label, row.states]
+            + [row.missing, f"{row.difference:.1e} N·m", f"{row.within:.1e} N·m"]
+            for row in rows
+        ),
     )
-    yield "|---" * 8 + "|"
-    for row in rows:
-        missing, size = (
-            " and ".join(map(str, row.unanswered)),
-            f"{row.difference:.1e} N·m | {row.within:.1e} N·m",
-        )
-        yield (
-            f"| {row.way} | {row.robot} | {row.peer} | {row.label} | {row.states} | {missing} | "
-            f"{size} |"
-        )
 
 
-def time_table(rows: Sequence[Row], name: str = "floatbase") -> Iterator[str]:
-    yield (
-        f"| robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio "
-        f"| 10 to 90 % of blocks |"
+def time_table(rows: Sequence[Row], name: str = "floatbase") -> str:
+    return harness.table(
+        f"robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio "
+        "| 10 to 90 % of blocks",
+        (
+            [row.robot, row.peer, row.label]
+            + microseconds(np.percentile([row.ours, row.theirs], [50, 99], axis=1).T.ravel())
+            + [f"**{row.ratio:.2f}**", row.middle]
+            for row in rows
+        ),
     )
-    yield "|---|---|---|---|---|---|---|---|---|"
-    for row in rows:
-        numbers = " | ".join(
-            f"{x:.1f} µs"
-            for x in (*np.percentile(row.ours, [50, 99]), *np.percentile(row.theirs, [50, 99]))
-        )
-        low, high = np.percentile(row.ratios, [10, 90])
-        yield (
-            f"| {row.robot} | {row.peer} | {row.label} | {numbers} | **{row.ratio:.2f}** | "
-            f"{low:.2f} to {high:.2f} |"
-        )
 
 
-def stage_table(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| robot | peer | states | time of each call |"
-    yield "|---|---|---|---|"
-    for row in rows:
-        parts = ", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())
-        yield f"| {row.robot} | {row.peer} | {row.label} | {parts} |"
+def stage_table(rows: Sequence[Row]) -> str:
+    return harness.table(
+        "robot | peer | states | time of each call",
+        (
+            [row.robot, row.peer, row.label]
+            + [", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())]
+            for row in rows
+        ),
+    )
+
+
+def limits_table(rows: Sequence[Row]) -> str:
+    """TSID with joint limits: torques, how many states have active limits, and ratios."""
+
+    def cells(row: Row) -> list[object]:
+        problem = peer_problems.problem(row.robot, row.peer)
+        controller = problem.controller("compiled")
+        active = sum(
+            any(name.kind.endswith(JOINT_LIMITS) for name in controller(q, v).active)
+            for q, v in problem.states(row.label, row.states)
+        )
+        ratio = f"**{row.ratio:.2f}**" if row.is_same else "torques differ"
+        first = [row.robot, row.peer, row.label, row.states, active]
+        return [*first, row.missing, f"{row.difference:.1e} N·m", ratio, row.middle]
+
+    return harness.table(
+        "robot | peer | states | compared | active limits | no answer: floatbase, peer | largest "
+        "difference | ratio | 10 to 90 % of blocks",
+        map(cells, rows),
+    )
 
 
 def plot(rows: Sequence[Row]) -> None:
-    """Median ticks side by side, a row of pictures for each peer."""
-    import matplotlib
-
-    matplotlib.use("Agg")
+    """Median control steps side by side, a row of pictures for each peer."""
     import matplotlib.pyplot as plt
 
     peers = list(dict.fromkeys(row.peer for row in rows))
@@ -228,31 +241,21 @@ def plot(rows: Sequence[Row]) -> None:
     figure, axes = plt.subplots(
         len(peers), len(ROBOTS), figsize=size, constrained_layout=True, squeeze=False
     )
-    for ax, (peer, robot) in zip(
-        axes.flat, [(peer, robot) for peer in peers for robot in ROBOTS], strict=True
-    ):
+    for ax, (peer, robot) in zip(axes.flat, product(peers, ROBOTS), strict=True):
         chosen = [row for row in rows if (row.peer, row.robot) == (peer, robot)]
-        for shift, times, label, color in (
-            (-0.2, "theirs", "the peer", "0.65"),
-            (0.2, "ours", "floatbase", "tab:blue"),
-        ):
-            heights = [float(np.median(getattr(row, times))) for row in chosen]
-            ax.bar(np.arange(len(chosen)) + shift, heights, 0.4, label=label, color=color)
-        for x, row in enumerate(chosen):
-            ax.annotate(
-                f"{row.ratio:.2f} ×",
-                (x, np.median(row.theirs)),
-                (0, 3),
-                textcoords="offset points",
-                ha="center",
-            )
-        ax.set_xticks(range(len(chosen)), [row.label for row in chosen])
+        x, theirs = np.arange(len(chosen)), [float(np.median(row.theirs)) for row in chosen]
+        ax.bar(x - 0.2, theirs, 0.4, label="the peer", color="0.65")
+        ours = [float(np.median(row.ours)) for row in chosen]
+        ax.bar(x + 0.2, ours, 0.4, label="floatbase", color="tab:blue")
+        for at, row in zip(zip(x, theirs, strict=True), chosen, strict=True):
+            above = {"xytext": (0, 3), "textcoords": "offset points", "ha": "center"}
+            ax.annotate(f"{row.ratio:.2f} ×", at, **above)
+        ax.set_xticks(x, [row.label for row in chosen])
         ax.set(title=f"{robot} against {peer}", ylabel="median control step [µs]")
         ax.margins(y=0.15)
         ax.spines[["top", "right"]].set_visible(False)
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False
-    )
+    labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*labels, loc="outside lower center", ncols=2, frameon=False)
     figure.savefig(HERE / "peers.png", dpi=120)
 
 
@@ -294,121 +297,63 @@ floatbase's compiled and reference backends, which share no solver, agree more c
 fifth state)."""
 
 
-def report(rows: list[Row], used: dict[str, dict[str, str]], lacking: list[str]) -> str:
-    """The text of peers.md."""
+PLANAR_FEET = """\
+placo's own flat foot has six variables instead of twelve and no limit on the moment about its
+normal, so its problem is easier. Its torques equal those of floatbase where friction at the corners
+can produce its wrenches."""
+
+
+def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
+    """Write peers.md."""
     equal = [row for row in rows if row.peer != PLANAR and row.peer not in LIMITED]
-    other = [row for row in equal if not row.is_same]
     compiled, own, reference = (
         [row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS
     )
-    peers = "; ".join(
-        f"{peer}: " + ", ".join(f"{k} {v}" for k, v in each.items()) for peer, each in used.items()
-    )
-    lines = [
-        "# Computing time of floatbase, TSID and placo",
-        "",
-        f"`python benchmarks/peers.py` on {machine()}. {peers}.",
-        "",
-    ]
-    lines += [f"**Not measured: {why}**\n" for why in lacking]
-    lines += [INTRODUCTION, ""]
-    lines += [
-        "## The common problem",
-        "",
-        (peer_problems.__doc__ or "").strip(),
-        "",
-        SAMENESS,
-        "",
-        *torque_table(equal),
-        "",
-    ]
-    lines += [
+    peers = "; ".join(f"{peer}: {packages}" for peer, packages in used.items())
+    parts = [f"`python benchmarks/peers.py` on {harness.machine()}. {peers}."]
+    parts += [f"**Not measured: {why}**" for why in lacking]
+    problem = (peer_problems.__doc__ or "").strip()
+    parts += [INTRODUCTION, "## The common problem", problem, SAMENESS, torque_table(equal)]
+    parts += [
         f"Torques differ, so times are not compared: "
-        f"{row.robot} with {row.peer}, {row.label}, {row.way}.\n"
-        for row in other
+        f"{row.robot} with {row.peer}, {row.label}, {row.way}."
+        for row in equal
+        if not row.is_same
     ]
-    lines += ["## Times", "", *time_table(compiled), ""]
+    parts += ["## Times", time_table(compiled)]
     if reference:
-        lines += [
-            'The reference backend, `backend="reference"`:',
-            "",
-            *time_table(reference, "reference"),
-            "",
-        ]
-    lines += [
-        "Time of each call inside the peers' control steps (medians):",
-        "",
-        *stage_table(compiled),
-        "",
-    ]
+        parts.append('The reference backend, `backend="reference"`:')
+        parts.append(time_table(reference, "reference"))
+    parts.append("Time of each call inside the peers' control steps (medians):")
+    parts.append(stage_table(compiled))
     if own:
-        lines += ["## A user-defined task", "", OWN, "", *time_table(own, "own task"), ""]
+        parts += ["## A user-defined task", OWN, time_table(own, "own task")]
     limited = [row for row in rows if row.peer in LIMITED]
     if limited:
-        lines += ["## Joint limits", "", LIMITS, "", *limits_section(limited), ""]
+        parts += ["## Joint limits", LIMITS, limits_table(limited)]
     planar = [row for row in rows if row.peer == PLANAR]
     if planar:
-        lines += ["## An easier problem", "", *planar_section(planar), ""]
-    return "\n".join(lines)
+        agreements = [
+            f"- {row.label}: {np.sum(row.differences <= row.tolerance)} of {row.states} states "
+            f"have the same torques; the largest difference is {row.difference:.1f} N·m."
+            for row in planar
+        ]
+        parts += ["## An easier problem", PLANAR_FEET, "\n".join(agreements), time_table(planar)]
+    harness.write(__file__, "Computing time of floatbase, TSID and placo", *parts)
 
 
-def limits_section(rows: Sequence[Row]) -> Iterator[str]:
-    """TSID with joint limits: torques, how many states have active limits, and ratios."""
-    yield (
-        "| robot | peer | states | compared | active limits | no answer: floatbase, peer | "
-        "largest difference | ratio | 10 to 90 % of blocks |"
+def main() -> int:
+    parser = harness.command_line(
+        __doc__,
+        states=(200, "random states for each row"),
+        rounds=(100, "turns that each side takes"),
     )
-    yield "|---" * 9 + "|"
-    for row in rows:
-        problem = peer_problems.problem(row.robot, row.peer)
-        controller = problem.controller("compiled")
-        active = sum(
-            any(name.kind.endswith(JOINT_LIMITS) for name in controller(q, v).active)
-            for q, v in problem.states(row.label, row.states)
-        )
-        ratio = f"**{row.ratio:.2f}**" if row.is_same else "torques differ"
-        low, high = np.percentile(row.ratios, [10, 90])
-        yield (
-            f"| {row.robot} | {row.peer} | {row.label} | {row.states} | {active} | "
-            f"{' and '.join(map(str, row.unanswered))} | {row.difference:.1e} N·m | {ratio} | "
-            f"{low:.2f} to {high:.2f} |"
-        )
-
-
-def planar_section(rows: Sequence[Row]) -> Iterator[str]:
-    """placo's own flat foot, which floatbase has no equal to."""
-    yield (
-        "placo's own flat foot has six variables instead of twelve and no limit on the moment "
-        "about its normal, so its problem is easier. Its torques equal those of floatbase where "
-        "friction at the corners can produce its wrenches."
-    )
-    yield ""
-    for row in rows:
-        agree, largest = (
-            int(np.sum(row.differences <= row.tolerance)),
-            f"the largest difference is {row.difference:.1f} N·m",
-        )
-        yield f"- {row.label}: {agree} of {row.states} states have the same torques; {largest}."
-    yield ""
-    yield from time_table(rows)
-
-
-def main() -> None:
-    ask = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    ask.add_argument(
-        "--env",
-        type=Path,
-        default=HERE.parent / "build" / "peers",
-        help="folder of the peers' environments",
-    )
-    ask.add_argument("--peers", nargs="+", choices=PACKAGES, default=list(PACKAGES))
-    ask.add_argument("--states", type=int, default=200, help="random states for each row")
-    ask.add_argument("--rounds", type=int, default=100, help="turns that each side takes")
-    options = ask.parse_args()
+    environments = HERE.parent / "build" / "peers"
+    parser.add_argument("--env", type=Path, default=environments, help="the peers' environments")
+    parser.add_argument("--peers", nargs="+", choices=PACKAGES, default=list(PACKAGES))
+    options = parser.parse_args()
     rows: list[Row] = []
-    used: dict[str, dict[str, str]] = {}
+    used: dict[str, str] = {}
     lacking: list[str] = []
     for peer in options.peers:
         try:
@@ -421,19 +366,12 @@ def main() -> None:
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
-    text = report(rows, used, lacking)
-    (HERE / "peers.md").write_text(text, encoding="utf-8")
+    report(rows, used, lacking)
+    compiled = [row for row in rows if row.way == "compiled" and row.peer not in LIMITED]
     if rows:
-        plot(
-            [
-                row
-                for row in rows
-                if row.is_same and row.way == "compiled" and row.peer not in LIMITED
-            ]
-        )
-    print(text)
-    raise SystemExit(1 if lacking else 0)
+        plot([row for row in compiled if row.is_same])
+    return 1 if lacking else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -15,23 +15,16 @@ knows the ground leans with its slope on purpose: 18° on these stairs.
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
+import harness
 import numpy as np
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk
 
-RUNS = 10
 PERIOD = 0.002  # s
 BEHIND = 0.3  # m that the base walks past the terrain
 MAX_TIME = 40.0  # s
@@ -101,77 +94,59 @@ FLAT_FEET = [
 ]  # fmt: skip
 
 
-def load(name: str) -> fb.Robot:
-    feet = {"anymal_c": ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]}
-    return fb.load(name, feet=feet[name], foot_radius=0.02) if name in feet else fb.load(name)
-
-
-def attempt(robot: fb.Robot, walker: Walker, case: Case, seed: int) -> tuple[bool, float, float]:
+def attempt(
+    robot: fb.Robot, contacts: fb.Contacts, walker: Walker, case: Case, seed: int
+) -> tuple[bool, float, float]:
     """Return whether a robot passed, its largest tilt [°], and where it ended [m]."""
     rng = np.random.default_rng(seed)
-    length = float(np.ptp(fb.Contacts.feet(robot).positions(robot.standing())[:, 0]))
+    length = float(np.ptp(contacts.positions(robot.standing())[:, 0]))
     start = 0.5 * length + rng.uniform(0.15, 0.45)
     speed = walker.speed * rng.uniform(0.9, 1.1)
     ground, end = case.make(start, seed)
-    walk = Walk(
-        robot,
-        fb.Contacts.feet(robot, mu=0.6),
-        walker.gait(robot),
-        (speed, 0.0),
-        clearance=walker.clearance,
-        ground=ground if case.seen else None,
-    )
+    options = {"clearance": walker.clearance, "ground": ground if case.seen else None}
+    walk = Walk(robot, contacts, walker.gait(robot), (speed, 0.0), **options)
     sim = fb.Simulation(robot, ground)
-    begin, goal, upright = sim.q[0], end + 0.5 * length + BEHIND, 1.0
-    while sim.time < MAX_TIME and sim.q[0] < begin + goal:
+    goal, largest = sim.q[0] + end + 0.5 * length + BEHIND, 0.0
+    while sim.time < MAX_TIME and sim.q[0] < goal:
         run = fb.rollout(sim, walk, 0.5, control_period=PERIOD)
-        upright = min(upright, float(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2).max()))
+        largest = max(largest, harness.tilt(run))
         if run.outcome != "completed":
-            return False, float(np.rad2deg(np.arccos(upright))), float(sim.q[0])
-    return sim.q[0] >= begin + goal, float(np.rad2deg(np.arccos(upright))), float(sim.q[0])
+            return False, largest, float(sim.q[0])
+    return sim.q[0] >= goal, largest, float(sim.q[0])
 
 
-def row(walker: Walker, case: Case, runs: int) -> str:
-    robot, found, clock = load(walker.name), [], time.process_time()
+def row(walker: Walker, case: Case, runs: int) -> list[str]:
+    robot, contacts = harness.walker(walker.name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the speed that a robot can reach is in the result
-        found = [attempt(robot, walker, case, seed) for seed in range(runs)]
-    passed = sum(done for done, _, _ in found)
+        found = [attempt(robot, contacts, walker, case, seed) for seed in range(runs)]
     tilts = [angle for done, angle, _ in found if done]
     tilt = f"{np.median(tilts):.1f}°, {max(tilts):.1f}°" if tilts else ""
     failed = [f"{x:.2f}" for done, _, x in found if not done]
-    line = (
-        f"| {walker.name} | {case.name} | {'seen' if case.seen else 'blind'} | {passed} of {runs} "
-        f"| {tilt} | {', '.join(failed)} |"
-    )
-    print(line, f"{time.process_time() - clock:.0f} s", flush=True)
-    return line
+    return [*named(walker, case), f"{len(tilts)} of {runs}", tilt, ", ".join(failed)]
+
+
+def named(walker: Walker, case: Case) -> list[str]:
+    """Return the first cells of a row."""
+    return [walker.name, case.name, "seen" if case.seen else "blind"]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=RUNS, help="runs of each case")
+    parser = harness.command_line(__doc__, runs=(10, "runs of each case"))
     parser.add_argument("--only", nargs="*", default=[], help="words that a row must contain")
     options = parser.parse_args()
-    rows = [
+    pairs = [(walker, case) for walker in QUADRUPEDS for case in POINT_FEET]
+    pairs += [(TALOS, case) for case in FLAT_FEET]
+    rows = (
         row(walker, case, options.runs)
-        for walkers, cases in ((QUADRUPEDS, POINT_FEET), ([TALOS], FLAT_FEET))
-        for walker in walkers
-        for case in cases
-        if all(
-            word in f"{walker.name} {case.name} {'seen' if case.seen else 'blind'}"
-            for word in options.only
-        )
-    ]
+        for walker, case in pairs
+        if all(word in " ".join(named(walker, case)) for word in options.only)
+    )
+    table = harness.table(
+        "robot | terrain | ground | passed | tilt, median and largest | falls at x [m]", rows
+    )
     if not options.only:
-        table = [
-            "| robot | terrain | ground | passed | tilt, median and largest | falls at x [m] |",
-            "|---|---|---|---|---|---|",
-            *rows,
-        ]
-        text = "# Walking over terrain\n\n" + __doc__.split("\n\n", 2)[2] + "\n"
-        path = Path(__file__).with_suffix(".md")
-        path.write_text(text + "\n".join(table) + "\n", encoding="utf-8")
+        harness.write(__file__, "Walking over terrain", __doc__.split("\n\n", 2)[2].strip(), table)
 
 
 if __name__ == "__main__":

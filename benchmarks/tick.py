@@ -1,8 +1,6 @@
-"""Measure the controller's control step, and check that its backends agree.
+"""Measure the control step of both backends.
 
     python benchmarks/tick.py                    times, growth -> benchmarks/tick.md, tick.png
-    python benchmarks/tick.py --agreement 2000   compares the backends on that many random states
-                                                 for each robot and stance
     python benchmarks/tick.py --joint-limits     control steps with inactive joint limits
                                                  relative to control steps without joint limits
 
@@ -12,101 +10,55 @@ on the machine.
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import platform
-import time
-from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import version
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import harness
 import numpy as np
+from harness import ROBOTS, SPREADS, clock, interleaved, microseconds, states
 
 import floatbase as fb
 from floatbase.control import JointLimits, LinearInequality
+from floatbase.control.tick import tick
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint
-from floatbase.errors import InfeasibleError
 
-HERE = Path(__file__).parent
-ROBOTS = ("go2", "solo12", "talos")
 BACKENDS = ("compiled", "reference")
-SPREADS = {"easy": 0.02, "medium": 0.1, "saturated": 0.3}
 JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
 
 
-def two_points(robot: fb.Robot) -> fb.Contacts:
-    """Return point contacts at the first two feet."""
-    return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:2]])
+Rows = Iterator[list[object]]
 
 
 def controller(
-    robot: fb.Robot, backend: str = "compiled", **options: object
+    robot: fb.Robot, backend: str = "compiled", contacts: fb.Contacts | None = None, **options: Any
 ) -> fb.WholeBodyController:
-    """Make a controller that stands on all feet."""
-    contacts = options.pop("contacts") if "contacts" in options else fb.Contacts.feet(robot)
-    return fb.WholeBodyController(
-        robot, contacts, fb.standing_tasks(robot.standing()), backend=backend, **options
-    )
-
-
-def states(robot: fb.Robot, n: int, spread: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the same random configurations and velocities every time."""
-    found = [robot.random_state(seed, spread) for seed in range(n)]
-    return [(np.array(s.q), np.array(s.v)) for s in found]
-
-
-def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) -> np.ndarray:
-    """Measure each call [µs]."""
-    times = np.empty(len(arguments))
-    for i, args in enumerate(arguments):
-        start = time.perf_counter_ns()
-        call(*args)
-        times[i] = 1e-3 * (time.perf_counter_ns() - start)
-    return times
-
-
-def interleaved(
-    calls: Sequence[Callable[..., object]], arguments: Sequence[tuple[object, ...]], rounds: int
-) -> list[np.ndarray]:
-    """Measure several functions alternately, so that other load affects all of them."""
-    blocks = [[clock(call, arguments) for call in calls] for _ in range(rounds)]
-    return [np.concatenate([block[i] for block in blocks]) for i in range(len(calls))]
+    """Make a controller that stands, by default on all feet."""
+    contacts = fb.Contacts.feet(robot) if contacts is None else contacts
+    tasks = fb.standing_tasks(robot.standing())
+    return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options)
 
 
 # tick time ----------------------------------------------------------------------------------------
 
 
-def tick_times(n: int) -> Iterator[str]:
+def tick_times(n: int) -> Rows:
     """Measure both backends by robot and difficulty."""
-    yield (
-        "| robot | states | active rows | compiled median | compiled p99 | reference median | "
-        "reference p99 | speed-up |"
-    )
-    yield "|---" * 8 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
         controllers = [controller(robot, backend) for backend in BACKENDS]
         for label, spread in SPREADS.items():
             at = states(robot, n, spread)
             active = np.mean([len(controllers[0](q, v).active) for q, v in at[:50]])
-            numbers = np.concatenate(
-                [np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)]
+            compiled, reference = (
+                np.percentile(times, [50, 99]) for times in interleaved(controllers, at, 3)
             )
-            text = " | ".join(f"{number:.1f} µs" for number in numbers)
-            yield f"| {name} | {label} | {active:.1f} | {text} | {numbers[2] / numbers[0]:.0f} × |"
+            times = microseconds([*compiled, *reference])
+            yield [name, label, f"{active:.1f}", *times, f"{reference[0] / compiled[0]:.0f} ×"]
 
 
-def parts(n: int) -> Iterator[str]:
-    """The compiled tick taken apart: it is stopped after one part, two, ..., and the times are
-    taken from each other.
-    """
-    from floatbase.control.tick import tick
-
-    yield ("| robot | states | dynamics | rows | elimination | objective | optimum | Python them |")
-    yield "|---" * 8 + "|"
+def parts(n: int) -> Rows:
+    """Take the compiled step apart: stop it after each part, and subtract the times."""
     for name in ROBOTS:
         robot = fb.load(name)
         command = controller(robot)
@@ -122,11 +74,7 @@ def parts(n: int) -> Iterator[str]:
                 ]
                 ends = [np.min(times) for times in (update, *ticks, clock(command, [(q, v)] * 5))]
                 spent.append([ends[0], *np.diff([0.0, *ends[1:-1]]), ends[-1] - ends[0] - ends[-2]])
-            yield (
-                f"| {name} | {label} | "
-                + " | ".join(f"{number:.1f} µs" for number in np.median(spent, axis=0))
-                + " |"
-            )
+            yield [name, label, *microseconds(np.median(spent, axis=0))]
 
 
 class OwnCoM:
@@ -143,54 +91,36 @@ class OwnCoM:
         return fb.Affine(s.com_jacobian, s.com_drift - desired)
 
 
-def own(n: int) -> Iterator[str]:
-    """The same problem with the package's task for the centre of mass, with a user's, and with rows
-    and a constraint beside.
-    """
-    yield (
-        "| robot | states | built-in tasks | user-defined task | user-defined task and 2 "
-        "inequalities | user-defined constraint | user-defined task, reference |"
-    )
-    yield "|---" * 7 + "|"
+def own(n: int) -> Rows:
+    """Measure user-defined tasks, inequalities and constraints on one problem."""
     for name in ROBOTS:
         robot = fb.load(name)
         at, feet = robot.standing(), fb.Contacts.feet(robot)
         joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
-        inequality = LinearInequality(
-            "acceleration", "qdd", (np.vstack([joint, -joint]), np.full(2, 50.0))
-        )
+        bounds = np.vstack([joint, -joint]), np.full(2, 50.0)
+        limited = {"inequalities": [LinearInequality("acceleration", "qdd", bounds)]}
         held = feet + fb.Contacts(
             [LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))]
         )
-        ways = [
+        controllers = [
             fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="compiled"),
-            fb.WholeBodyController(
-                robot, feet, mine, inequalities=[inequality], backend="compiled"
-            ),
+            fb.WholeBodyController(robot, feet, mine, backend="compiled", **limited),
             fb.WholeBodyController(robot, held, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="reference"),
         ]
         for label in ("easy", "saturated"):
-            medians = [
-                np.median(times) for times in interleaved(ways, states(robot, n, SPREADS[label]), 3)
-            ]
-            yield (
-                f"| {name} | {label} | "
-                + " | ".join(f"{median:.1f} µs" for median in medians)
-                + " |"
-            )
+            times = interleaved(controllers, states(robot, n, SPREADS[label]), 3)
+            yield [name, label, *microseconds(np.median(times, axis=1))]
 
 
 # joint limits -------------------------------------------------------------------------------------
 
 
-def joint_limits(n: int, rounds: int = 40) -> Iterator[str]:
+def joint_limits(n: int, rounds: int = 40) -> Rows:
     """Measure the cost of joint limits in states in which none is active."""
-    yield "| robot | states | without, median | hard, ratio | soft, ratio |"
-    yield "|---" * 5 + "|"
     for name in ROBOTS:
         robot = fb.load(name)
         off, hard, soft = (
@@ -205,10 +135,7 @@ def joint_limits(n: int, rounds: int = 40) -> Iterator[str]:
         times = np.reshape(interleaved((off, hard, soft), at, rounds), (3, rounds, -1))
         medians = np.median(times, axis=2)
         ratios = np.median(medians[1:] / medians[0], axis=1)
-        yield (
-            f"| {name} | {len(at)} | {np.median(times[0]):.1f} µs | {ratios[0]:.3f} | "
-            f"{ratios[1]:.3f} |"
-        )
+        yield [name, len(at), f"{np.median(times[0]):.1f} µs", *(f"{x:.3f}" for x in ratios)]
 
 
 # growth -------------------------------------------------------------------------------------------
@@ -216,40 +143,36 @@ def joint_limits(n: int, rounds: int = 40) -> Iterator[str]:
 
 def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
     """Measure medians [µs] by facets, contacts and degrees of freedom; easy and saturated."""
-    go2, talos = fb.load("go2"), fb.load("talos")
-    frames = [foot.frame for foot in go2.feet]
+    go2, kinova, talos = map(fb.load, ("go2", "anymal_kinova", "talos"))
+
+    def points(robot: fb.Robot, count: int) -> fb.Contacts:
+        """Return point contacts at the first feet."""
+        return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:count]])
+
     families = {
-        "facets (go2)": [
-            (n_facets, controller(go2, facets=n_facets)) for n_facets in (4, 8, 16, 32, 64)
-        ],
-        "contacts (go2)": [
-            (i, controller(go2, contacts=fb.Contacts.points(go2, frames=frames[:i])))
-            for i in (1, 2, 3, 4)
-        ],
+        "facets (go2)": [(m, controller(go2, facets=m)) for m in (4, 8, 16, 32, 64)],
+        "contacts (go2)": [(i, controller(go2, contacts=points(go2, i))) for i in (1, 2, 3, 4)],
         "joints (two points)": [
-            (r.d, controller(r, contacts=two_points(r)))
-            for r in (go2, fb.load("anymal_kinova"), talos)
+            (robot.d, controller(robot, contacts=points(robot, 2)))
+            for robot in (go2, kinova, talos)
         ],
     }
     found: dict[str, list[tuple[float, ...]]] = {}
     for family, members in families.items():
-        times = {}
-        for spread in (0.02, 0.3):
+        medians = []
+        for spread in (SPREADS["easy"], SPREADS["saturated"]):
             at = [states(member.robot, n, spread) for _, member in members]
-            for _ in range(8):
-                for i, (_, member) in enumerate(members):
-                    times.setdefault((i, spread), []).append(clock(member, at[i]))
+            times = [
+                [clock(member, at[i]) for i, (_, member) in enumerate(members)] for _ in range(8)
+            ]
+            medians.append([np.median([turn[i] for turn in times]) for i in range(len(members))])
         found[family] = [
-            (x, *(float(np.median(np.concatenate(times[i, spread]))) for spread in (0.02, 0.3)))
-            for i, (x, _) in enumerate(members)
+            (x, easy, saturated) for (x, _), easy, saturated in zip(members, *medians, strict=True)
         ]
     return found
 
 
 def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(
@@ -265,161 +188,55 @@ def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
         ax.grid(alpha=0.3)
     axes[0].set(ylabel="median control step [µs]", xticks=[4, 16, 32, 64])
     axes[0].legend()
-    figure.savefig(HERE / "tick.png", dpi=120)
-
-
-# agreement, long run ------------------------------------------------------------------------------
-
-
-def agreement(n: int, names: Sequence[str] = ()) -> Iterator[str]:
-    """Find the largest torque difference of the backends over n random states per stance."""
-    yield (
-        "| robot | feet | states | infeasible | left to the reference backend | largest "
-        "difference |"
-    )
-    yield "|---" * 6 + "|"
-    for name in names or fb.catalogue():
-        robot = fb.load(name)
-        feet = fb.Contacts.feet(robot)
-        for count in range(min(1, len(feet)), len(feet) + 1):
-            contacts = feet.only(*feet.names[:count]) if count else feet
-            compiled, reference = (
-                controller(robot, backend, contacts=contacts) for backend in BACKENDS
-            )
-            worst, left, infeasible = 0.0, 0, 0
-            for seed in range(n):
-                state = robot.random_state(seed, tuple(SPREADS.values())[seed % 3])
-                try:
-                    expected = reference(state.q, state.v)
-                except InfeasibleError as error:
-                    infeasible += 1
-                    check_verdict(compiled, state, error.constraints, f"{name}, state {seed}")
-                    continue
-                found = compiled(state.q, state.v)
-                left += found.backend == "reference"
-                worst = max(worst, float(np.max(np.abs(found.tau - expected.tau))))
-            yield f"| {name} | {count} | {n} | {infeasible} | {left} | {worst:.1e} N·m |"
-
-
-def check_verdict(
-    compiled: fb.WholeBodyController, state: fb.State, rows: Sequence[str], where: str
-) -> None:
-    """Exit unless the controller reports the state as infeasible, with the same constraints."""
-    try:
-        compiled(state.q, state.v)
-    except InfeasibleError as error:
-        if error.constraints != rows:
-            raise SystemExit(f"{where}: other constraints on the compiled backend") from None
-        return
-    raise SystemExit(f"{where}: not infeasible on the compiled backend")
-
-
-def long_run(ticks: int) -> Iterator[str]:
-    """Measure memory and time per control step over a long run."""
-    import resource
-
-    robot = fb.load("go2")
-    compiled, at = controller(robot), states(robot, 1000, 0.1)
-    for share in range(5):
-        spent = np.concatenate([clock(compiled, at) for _ in range(max(1, ticks // 5000))])
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        yield f"| {(share + 1) * len(spent)} | {np.median(spent):.2f} µs | {memory:.1f} MB |"
-
-
-def machine() -> str:
-    """Describe the machine and the versions."""
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        cpu = next(
-            line.split(":")[1].strip()
-            for line in info.read_text().splitlines()
-            if line.startswith("model name")
-        )
-    names = ("numpy", "pin", "numba", "daqp", "mujoco")
-    packages = ", ".join(
-        [f"floatbase {fb.__version__}", *(f"{name} {version(name)}" for name in names)]
-    )
-    return (
-        f"{cpu}, {os.cpu_count()} cores, one used; Python {platform.python_version()}, {packages}"
-    )
+    figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    parser = harness.command_line(__doc__, states=(400, "random states for each row of a table"))
+    parser.add_argument(
+        "--joint-limits", action="store_true", help="only measure the cost of joint limits"
     )
-    ask.add_argument(
-        "--states", type=int, default=400, help="random states for each row of the table"
-    )
-    ask.add_argument(
-        "--agreement",
-        type=int,
-        default=0,
-        help="compare the backends on so many states, and measure no times",
-    )
-    ask.add_argument(
-        "--long", type=int, default=0, help="run so many ticks, and measure nothing else"
-    )
-    ask.add_argument(
-        "--joint-limits", action="store_true", help="measure the cost of joint limits, nothing else"
-    )
-    options = ask.parse_args()
-    only = None
-    if options.agreement:
-        only = agreement(options.agreement)
-    elif options.long:
-        only = long_run(options.long)
-    elif options.joint_limits:
-        only = joint_limits(options.states)
-    if only:
-        for line in only:
-            print(line, flush=True)
+    options = parser.parse_args()
+    if options.joint_limits:
+        harness.table(
+            "robot | states | without, median | hard, ratio | soft, ratio",
+            joint_limits(options.states),
+        )
         return
-    curves = growth(options.states // 4)
+    few = options.states // 4
+    curves = growth(few)
     plot(curves)
-    lines = [
-        "# Computing time of a control step",
-        "",
-        f"`python benchmarks/tick.py` on {machine()}.",
-        "",
-    ]
-    lines += [
+    harness.write(
+        __file__,
+        "Computing time of a control step",
+        f"`python benchmarks/tick.py` on {harness.machine()}.",
         "States are random around standing. Joint angles and attitude vary by 0.02 rad (easy), "
-        "0.1 rad (medium) and 0.3 rad (saturated: friction"
-    ]
-    lines += [
-        "or torque limits are active in most of them), velocities by as much per second.",
-        "",
-    ]
-    lines += [*tick_times(options.states), ""]
-    lines += [
+        "0.1 rad (medium) and 0.3 rad (saturated: friction\nor torque limits are active in most of "
+        "them), velocities by as much per second.",
+        harness.table(
+            "robot | states | active rows | compiled median | compiled p99 | reference median | "
+            "reference p99 | speed-up",
+            tick_times(options.states),
+        ),
         "Parts of the compiled control step (stopped after each part, best of 5, median over "
         "states):",
-        "",
-        *parts(options.states // 4),
-        "",
-    ]
-    lines += [
+        harness.table(
+            "robot | states | dynamics | rows | elimination | objective | optimum | "
+            "Python overhead",
+            parts(few),
+        ),
         "User-defined terms, called at every control step beside the compiled code (median):",
-        "",
-        *own(options.states // 4),
-        "",
-    ]
-    lines += [
+        harness.table(
+            "robot | states | built-in tasks | user-defined task | user-defined task and 2 "
+            "inequalities | user-defined constraint | user-defined task, reference",
+            own(few),
+        ),
         "Growth of the median control step (tick.png):",
-        "",
-        "| what | number | easy | saturated |",
-        "|---|---|---|---|",
-    ]
-    lines += [
-        f"| {what} | {x} | {a:.1f} µs | {b:.1f} µs |"
-        for what, rows in curves.items()
-        for x, a, b in rows
-    ]
-    lines.append("")
-    (HERE / "tick.md").write_text("\n".join(lines), encoding="utf-8")
-    print("\n".join(lines))
+        harness.table(
+            "what | number | easy | saturated",
+            ([what, x, *microseconds(row)] for what, rows in curves.items() for x, *row in rows),
+        ),
+    )
 
 
 if __name__ == "__main__":

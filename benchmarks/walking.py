@@ -9,48 +9,57 @@ Friction is 0.6 in the controller and 1 on the ground; pushes last 0.1 s. The co
 
 from __future__ import annotations
 
-import argparse
-import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
+import harness
 import numpy as np
+from harness import tilt, velocity
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Stand, Walk
 from floatbase.simulation import Rollout
 
 SEED = 0
-Row = tuple[str, str, str, bool]  # what, found, required, whether it holds
+Check = tuple[str, str, bool]  # what was found, what is required, whether it holds
+Row = tuple[str, str, str, bool]  # the same of several checks, after what was done
 
 
-def robot_of(name: str) -> tuple[fb.Robot, fb.Contacts]:
-    robot = fb.load(name)
-    return robot, fb.Contacts.feet(robot, mu=0.6)
+def most(found: str, value: float, limit: float, unit: str = " mm") -> Check:
+    return found.format(value), f"≤ {limit:g}{unit}", bool(value <= limit)
+
+
+def near(found: str, value: float, target: float, share: float, named: str = "") -> Check:
+    """Check that a value differs from a target by at most a share of it."""
+    holds = abs(value / target - 1.0) <= share
+    return found.format(value), f"{named}± {100 * share:g} %", bool(holds)
+
+
+def judged(what: str, run: Rollout, *checks: Check) -> Row:
+    """Return the row of a run that has to be completed and to pass checks."""
+    found, required, holds = zip(*checks, strict=True)
+    done = run.outcome == "completed"
+    limits = ", ".join(filter(None, required))
+    return what, ", ".join([run.outcome, *found]), limits or "completed", done and all(holds)
 
 
 def walked(
-    name: str, gait: Callable[[fb.Robot], Gait], velocity: tuple[float, float], duration: float,
+    name: str,
+    gait: Callable[[fb.Robot], Gait],
+    speed: float,
+    duration: float,
     *pushes: fb.Push,
-    period: float = 1e-3, **options: object,
-) -> tuple[Rollout, Walk]:  # fmt: skip
-    robot, contacts = robot_of(name)
-    walk = Walk(robot, contacts, gait(robot), velocity, **options)
+    period: float = 1e-3,
+    **options: object,
+) -> tuple[Rollout, Walk]:
+    robot, contacts = harness.walker(name)
+    walk = Walk(robot, contacts, gait(robot), (speed, 0.0), **options)
     return fb.rollout(fb.Simulation(robot), walk, duration, pushes, period), walk
 
 
-def tilt(run: Rollout) -> float:
-    return float(np.rad2deg(np.arccos(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2)).max()))
-
-
-def speed(run: Rollout, begin: float, end: float) -> np.ndarray:
-    first, last = np.searchsorted(run.time, [begin, end]).clip(max=len(run) - 1)
-    return (run.com[last, :2] - run.com[first, :2]) / (run.time[last] - run.time[first])
+def horizontal(force: float, angle: float, start: float) -> fb.Push:
+    return fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), start)
 
 
 def jump(run: Rollout) -> float:
@@ -61,192 +70,149 @@ def jump(run: Rollout) -> float:
     )
 
 
+def foot_drift(run: Rollout) -> float:
+    """Return how far a foot is from its first position at the end [mm]."""
+    return 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
+
+
+def peak(run: Rollout) -> float:
+    """Return the largest normal force at a point, as a fraction of the weight."""
+    return run.measured[:, 2::3].max() / run.robot.weight
+
+
 def lifted(name: str, period: float) -> Row:
-    run, walk = walked(
-        name,
-        lambda robot: replace(Gait.crawl(robot, 1.2, 1.0), stop=9.0),
-        (0.0, 0.0),
-        11.0,
-        period=period,
-    )
+    def gait(robot: fb.Robot) -> Gait:
+        return replace(Gait.crawl(robot, 1.2, 1.0), stop=9.0)
+
+    run, walk = walked(name, gait, 0.0, 11.0, period=period)
     rise = 1e3 * (run.foot_positions[:, :, 2].max(axis=0) - run.foot_positions[0, :, 2]).min()
-    drift = 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
-    com = 1e3 * np.linalg.norm(
-        run.com[-1, :2] - walk.plan(run.time[-1])[0]
-    )  # feet roll by millimetres while it comes there
-    found = (
-        f"{rise:.1f} mm, CoM {com:.1f} mm from its target, tilt {tilt(run):.2f}°, drift "
-        f"{drift:.1f} mm"
-    )
-    holds = (
-        run.outcome == "completed"
-        and rise >= 48.0
-        and tilt(run) <= 0.3
-        and drift <= 10.0
-        and com <= 1.0
-    )
-    return (
+    # feet roll by millimetres while it comes there
+    com = 1e3 * np.linalg.norm(run.com[-1, :2] - walk.plan(run.time[-1])[0])
+    return judged(
         f"{name}: each foot raised 5 cm{at(period)}",
-        found,
-        "≥ 48 mm, ≤ 1 mm, ≤ 0.3°, ≤ 10 mm",
-        holds,
+        run,
+        (f"{rise:.1f} mm", "≥ 48 mm", bool(rise >= 48.0)),
+        most("CoM {:.1f} mm from its target", com, 1.0),
+        most("tilt {:.2f}°", tilt(run), 0.3, "°"),
+        most("drift {:.1f} mm", foot_drift(run), 10.0),
     )
 
 
-def crawled(name: str, most: float, period: float) -> Row:
-    step = 0.08 if name == "go2" else 0.06
-    run, _ = walked(name, Gait.crawl, (step, 0.0), 11.0, period=period)
-    v = speed(run, 3.0, 11.0)[0]
-    found = f"{100 * v:.1f} cm/s, tilt {tilt(run):.2f}°, torque jump {jump(run):.2f} N·m"
-    holds = (
-        run.outcome == "completed"
-        and abs(v / step - 1.0) <= 0.05
-        and tilt(run) <= 0.5
-        and jump(run) <= most
-    )
-    return (
+def crawled(name: str, largest_jump: float, period: float) -> Row:
+    step = 8.0 if name == "go2" else 6.0
+    run, _ = walked(name, Gait.crawl, step / 100.0, 11.0, period=period)
+    return judged(
         f"{name}: crawl{at(period)}",
-        found,
-        f"{100 * step:g} cm/s ± 5 %, ≤ 0.5°, ≤ {most:g} N·m",
-        holds,
+        run,
+        near("{:.1f} cm/s", 100.0 * velocity(run, 3.0, 11.0)[0], step, 0.05, f"{step:g} cm/s "),
+        most("tilt {:.2f}°", tilt(run), 0.5, "°"),
+        most("torque jump {:.2f} N·m", jump(run), largest_jump, " N·m"),
     )
 
 
 def in_place(period: float) -> Row:
-    run, _ = walked("go2", Gait.trot, (0.0, 0.0), 11.0, period=period)
+    run, _ = walked("go2", Gait.trot, 0.0, 11.0, period=period)
     drift = 1e3 * np.linalg.norm(run.com[-1, :2] - run.com[round(1.0 / period), :2])
-    holds = run.outcome == "completed" and drift <= 20.0 and tilt(run) <= 0.5
-    return (
+    return judged(
         f"go2: trot in place 10 s{at(period)}",
-        f"drift {drift:.1f} mm, tilt {tilt(run):.2f}°",
-        "≤ 20 mm, ≤ 0.5°",
-        holds,
+        run,
+        most("drift {:.1f} mm", drift, 20.0),
+        most("tilt {:.2f}°", tilt(run), 0.5, "°"),
     )
 
 
 def trotted(period: float) -> Row:
-    run, walk = walked("go2", Gait.trot, (0.3, 0.0), 11.0, period=period)
-    v, peak = speed(run, 2.0, 11.0)[0], run.measured[:, 2::3].max() / walk.robot.weight
-    aside = 1e3 * abs(run.com[-1, 1])
-    found = f"{v:.3f} m/s, y {aside:.0f} mm, tilt {tilt(run):.2f}°, foot peak {peak:.2f} weights"
-    holds = (
-        run.outcome == "completed"
-        and abs(v / 0.3 - 1.0) <= 0.03
-        and aside <= 30
-        and tilt(run) <= 0.5
-        and peak <= 1.2
+    run, _ = walked("go2", Gait.trot, 0.3, 11.0, period=period)
+    return judged(
+        f"go2: trot 0.3 m/s 10 s{at(period)}",
+        run,
+        near("{:.3f} m/s", velocity(run, 2.0, 11.0)[0], 0.3, 0.03),
+        most("y {:.0f} mm", 1e3 * abs(run.com[-1, 1]), 30.0),
+        most("tilt {:.2f}°", tilt(run), 0.5, "°"),
+        most("foot peak {:.2f} weights", peak(run), 1.2, ""),
     )
-    return f"go2: trot 0.3 m/s 10 s{at(period)}", found, "± 3 %, ≤ 30 mm, ≤ 0.5°, ≤ 1.2", holds
 
 
 def pushed(force: float, period: float) -> Row:
-    run, _ = walked(
-        "go2", Gait.trot, (0.3, 0.0), 8.0, fb.Push(np.array([0.0, force, 0.0]), 4.0), period=period
-    )
-    aside, small = 1e3 * abs(run.com[-1, 1]), force <= 60.0
-    found = f"{run.outcome}, {aside:.0f} mm to the side, tilt {tilt(run):.1f}°"
-    holds = run.outcome == "completed" and (not small or (aside <= 150.0 and tilt(run) <= 2.0))
-    return (
-        f"go2: the same, {force:g} N to the side{at(period)}",
-        found,
-        "≤ 150 mm, ≤ 2°" if small else "completed",
-        holds,
-    )
+    push = fb.Push([0.0, force, 0.0], 4.0)
+    run, _ = walked("go2", Gait.trot, 0.3, 8.0, push, period=period)
+    aside = most("{:.0f} mm to the side", 1e3 * abs(run.com[-1, 1]), 150.0)
+    angle = most("tilt {:.1f}°", tilt(run), 2.0, "°")
+    if force > 60.0:  # it only has to stay on its feet
+        aside, angle = (aside[0], "", True), (angle[0], "", True)
+    return judged(f"go2: the same, {force:g} N to the side{at(period)}", run, aside, angle)
 
 
 def one_leg(period: float) -> Row:
-    run, _ = walked(
-        "talos", lambda robot: Gait.walk(robot, 2.6, 1.0), (0.0, 0.0), 8.2, period=period
+    run, _ = walked("talos", lambda robot: Gait.walk(robot, 2.6, 1.0), 0.0, 8.2, period=period)
+    return judged(
+        f"talos: one foot up 2.6 s each{at(period)}",
+        run,
+        most("tilt {:.2f}°", tilt(run), 0.2, "°"),
+        most("feet back within {:.2f} mm", foot_drift(run), 2.0),
+        most("torque jump {:.1f} N·m", jump(run), 20.0, " N·m"),
     )
-    feet = 1e3 * np.linalg.norm(run.foot_positions[-1] - run.foot_positions[0], axis=1).max()
-    found = (
-        f"{run.outcome}, tilt {tilt(run):.2f}°, feet back within {feet:.2f} mm, torque jump "
-        f"{jump(run):.1f} N·m"
-    )
-    holds = run.outcome == "completed" and tilt(run) <= 0.2 and feet <= 2.0 and jump(run) <= 20.0
-    return f"talos: one foot up 2.6 s each{at(period)}", found, "≤ 0.2°, ≤ 2 mm, ≤ 20 N·m", holds
 
 
 def talos_walks(period: float) -> Row:
-    run, walk = walked("talos", Gait.walk, (0.2, 0.0), 11.0, period=period)
-    v, peak = speed(run, 2.4, 10.8)[0], run.measured[:, 2::3].max() / walk.robot.weight
+    run, walk = walked("talos", Gait.walk, 0.2, 11.0, period=period)
     steps, rows = list(walk.history), np.arange(round(2.0 / period), len(run), 10)
     plans = np.searchsorted([step.time for step in steps], run.time[rows], side="right") - 1
-    error = [
+    errors = [
         np.linalg.norm(steps[p].plan(run.time[i])[0] - run.com[i, :2])
         for p, i in zip(plans, rows, strict=True)
     ]
-    found = (
-        f"{v:.3f} m/s, CoM {1e3 * max(error):.1f} mm error, tilt {tilt(run):.2f}°, corner peak "
-        f"{peak:.2f} weights"
-    )
-    holds = (
-        abs(v / 0.2 - 1.0) <= 0.03 and 1e3 * max(error) <= 8.0 and tilt(run) <= 0.5 and peak <= 0.9
-    )
-    return (
+    return judged(
         f"talos: 0.2 m/s 10 s{at(period)}",
-        found,
-        "± 3 %, ≤ 8 mm, ≤ 0.5°, ≤ 0.9",
-        run.outcome == "completed" and holds,
+        run,
+        near("{:.3f} m/s", velocity(run, 2.4, 10.8)[0], 0.2, 0.03),
+        most("CoM {:.1f} mm error", 1e3 * max(errors), 8.0),
+        most("tilt {:.2f}°", tilt(run), 0.5, "°"),
+        most("corner peak {:.2f} weights", peak(run), 0.9, ""),
     )
-
-
-def directions(n: int) -> Iterator[np.ndarray]:
-    rng = np.random.default_rng(SEED)
-    for _ in range(n):
-        angle = rng.uniform(0.0, 2.0 * np.pi)
-        yield np.array([np.cos(angle), np.sin(angle), rng.uniform(0.0, 1.4)])
 
 
 def talos_pushed(n: int) -> Row:
-    done = 0
-    for x, y, phase in directions(n):
-        push = fb.Push(300.0 * np.array([x, y, 0.0]), 3.0 + phase)
-        done += (
-            walked("talos", Gait.walk, (0.2, 0.0), 7.5, push, period=2e-3)[0].outcome == "completed"
-        )
-    return (
-        f"talos: 0.2 m/s and 300 N, {n} random directions (2 ms)",
-        f"{done} of {n}",
-        f"≥ {10 * n // 12}",
-        done >= 10 * n // 12,
-    )
+    rng, done, required = np.random.default_rng(SEED), 0, 10 * n // 12
+    for _ in range(n):
+        angle, phase = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, 1.4)
+        push = horizontal(300.0, angle, 3.0 + phase)
+        run, _ = walked("talos", Gait.walk, 0.2, 7.5, push, period=2e-3)
+        done += run.outcome == "completed"
+    what = f"talos: 0.2 m/s and 300 N, {n} random directions (2 ms)"
+    return what, f"{done} of {n}", f"≥ {required}", done >= required
 
 
 def recovered(name: str, low: float, high: float, gait: Callable[[fb.Robot], Gait], n: int) -> Row:
-    robot, contacts = robot_of(name)
+    robot, contacts = harness.walker(name)
     rng = np.random.default_rng(SEED)
     survived: dict[bool, list[bool]] = {False: [], True: []}
     for force, angle in rng.uniform([low, 0.0], [high, 2.0 * np.pi], (n, 2)):
-        push = fb.Push(force * np.array([np.cos(angle), np.sin(angle), 0.0]), 0.5)
+        push = horizontal(force, angle, 0.5)
         for steps, outcomes in survived.items():
             stand = Stand(robot, contacts, gait(robot) if steps else None)
-            outcomes.append(
-                fb.rollout(fb.Simulation(robot), stand, 4.0, [push], 2e-3).outcome == "completed"
-            )
-    stood, stepped = (sum(survived[steps]) for steps in (False, True))
+            run = fb.rollout(fb.Simulation(robot), stand, 4.0, [push], 2e-3)
+            outcomes.append(run.outcome == "completed")
+    stood, stepped = sum(survived[False]), sum(survived[True])
     lost = sum(a and not b for a, b in zip(survived[False], survived[True], strict=True))
-    enough = 26 * n // 30 if name == "talos" else 27 * n // 30
-    more = stood + 8 * n // 30 if name == "talos" else 2 * stood
-    found = f"standing {stood}, with steps {stepped} of {n}; {lost or 'none'} lost by stepping"
+    if name == "talos":
+        enough = max(26 * n // 30, stood + 8 * n // 30)
+    else:
+        enough = max(27 * n // 30, 2 * stood)
     what = f"{name}: {n} pushes of {low:g} to {high:g} N (2 ms)"
-    return (
-        what,
-        found,
-        f"steps ≥ {max(enough, more)}, none lost",
-        stepped >= max(enough, more) and lost == 0,
-    )
+    found = f"standing {stood}, with steps {stepped} of {n}; {lost or 'none'} lost by stepping"
+    return what, found, f"steps ≥ {enough}, none lost", stepped >= enough and lost == 0
 
 
 def turned(yaw_rate: float) -> Row:
-    run, _ = walked("go2", Gait.trot, (0.2, 0.0), 7.0, period=2e-3, yaw_rate=yaw_rate)
+    run, _ = walked("go2", Gait.trot, 0.2, 7.0, period=2e-3, yaw_rate=yaw_rate)
     rows = run.time > 4.0
     x, y = run.com[rows, :2].T
     A = np.column_stack([2.0 * x, 2.0 * y, np.ones(rows.sum())])
     *centre, c = np.linalg.lstsq(A, x**2 + y**2, rcond=None)[0]
     v = yaw_rate * np.sqrt(c + np.square(centre).sum())
-    holds = run.outcome == "completed" and abs(v / 0.2 - 1.0) <= 0.03
-    return f"go2: 0.2 m/s and {yaw_rate:g} rad/s (2 ms)", f"{v:.4f} m/s", "± 3 %", holds
+    what = f"go2: 0.2 m/s and {yaw_rate:g} rad/s (2 ms)"
+    return judged(what, run, near("{:.4f} m/s", v, 0.2, 0.03))
 
 
 def gait_walked(name: str, gait: str, mu: float) -> Row:
@@ -258,48 +224,29 @@ def gait_walked(name: str, gait: str, mu: float) -> Row:
         return what, f"refused: {str(error).split(',')[0]}", "refused", gait in ("bound", "pronk")
     run = fb.rollout(fb.Simulation(robot), walk, 5.0, control_period=2e-3)
     whole_periods = made.period * np.floor(2.0 / made.period)
-    v = speed(run, 4.99 - whole_periods, 4.99)[0]
-    holds = run.outcome == "completed" and abs(v / 0.2 - 1.0) <= 0.1 and tilt(run) <= 2.0
-    return what, f"{run.outcome}, {v:.3f} m/s, tilt {tilt(run):.1f}°", "± 10 %, ≤ 2°", holds
+    speed = near("{:.3f} m/s", velocity(run, 4.99 - whole_periods, 4.99)[0], 0.2, 0.1)
+    return judged(what, run, speed, most("tilt {:.1f}°", tilt(run), 2.0, "°"))
 
 
 def bolt_walked() -> Row:
     robot = fb.load("bolt", feet=["FL_FOOT", "FR_FOOT"])
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot))
     run = fb.rollout(fb.Simulation(robot), walk, 4.0, control_period=2e-3)
-    drift = 1e3 * np.linalg.norm(run.com[-1, :2])
-    holds = run.outcome == "completed" and drift <= 200.0
-    return "bolt: on the spot 4 s (2 ms)", f"{run.outcome}, {drift:.0f} mm", "≤ 200 mm", holds
-
-
-class Slope:
-    """A plane through the origin that a walk knows."""
-
-    def __init__(self, normal: np.ndarray):
-        self._normal = normal
-
-    def height(self, xy: np.ndarray) -> float:
-        return float(-self._normal[:2] @ xy / self._normal[2])
-
-    def normal(self, xy: np.ndarray) -> np.ndarray:
-        return self._normal
+    drift = most("{:.0f} mm", 1e3 * np.linalg.norm(run.com[-1, :2]), 200.0)
+    return judged("bolt: on the spot 4 s (2 ms)", run, drift)
 
 
 def sloped(degrees: float, known: bool) -> Row:
     robot, angle = fb.load("talos"), np.deg2rad(degrees)
     normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
     contacts = fb.Contacts.feet(robot, mu=0.6, normals=normal)
-    ground = Slope(normal) if known else None
-    walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=ground)
-    run = fb.rollout(fb.Simulation(robot, ground=fb.Ground(normal=normal)), walk, 5.0, (), 2e-3)
+    ground = fb.Ground(normal=normal)
+    known_ground = ground if known else None
+    walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=known_ground)
+    run = fb.rollout(fb.Simulation(robot, ground), walk, 5.0, (), 2e-3)
     slide = 1e3 * run.slip(include_rolling=False).max()
-    limit = 2.0 if known else 40.0
-    return (
-        f"talos: slope of {degrees:g}°, {'known' if known else 'blind'} (2 ms)",
-        f"{run.outcome}, slides {slide:.1f} mm a stance",
-        f"≤ {limit:g} mm",
-        run.outcome == "completed" and slide <= limit,
-    )
+    what = f"talos: slope of {degrees:g}°, {'known' if known else 'blind'} (2 ms)"
+    return judged(what, run, most("slides {:.1f} mm a stance", slide, 2.0 if known else 40.0))
 
 
 def hand_held() -> Row:
@@ -308,11 +255,8 @@ def hand_held() -> Row:
 
     def circle(t: float) -> tuple[np.ndarray, ...]:
         c, s = 0.1 * np.cos(rate * t), 0.1 * np.sin(rate * t)
-        return (
-            start + [0.0, s, c - 0.1],
-            rate * np.array([0.0, c, -s]),
-            -(rate**2) * np.array([0.0, s, c]),
-        )
+        velocity, acceleration = rate * np.array([0, c, -s]), -(rate**2) * np.array([0, s, c])
+        return start + [0.0, s, c - 0.1], velocity, acceleration
 
     contacts = fb.Contacts.feet(robot, mu=0.6)
     walk = Walk(robot, contacts, Gait.trot(robot), tasks=[fb.FrameTask(frame, circle)])
@@ -322,11 +266,10 @@ def hand_held() -> Row:
         np.linalg.norm(run.state(i).point(frame) - circle(run.time[i])[0])
         for i in range(0, len(run), 5)
     )
-    return (
+    return judged(
         "anymal_kinova: hand on a circle in the world, trot, push of 150 N (2 ms)",
-        f"{run.outcome}, hand within {error:.1f} mm",
-        "≤ 5 mm",
-        run.outcome == "completed" and error <= 5.0,
+        run,
+        most("hand within {:.1f} mm", error, 5.0),
     )
 
 
@@ -335,7 +278,7 @@ def step_time(name: str, gait: Callable[[fb.Robot], Gait], impulse: float) -> Ro
 
     At 2.4 s, a push of `impulse` [N s] makes some steps infeasible.
     """
-    robot, contacts = robot_of(name)
+    robot, contacts = harness.walker(name)
     walk, sim = Walk(robot, contacts, gait(robot), (0.2, 0.0)), fb.Simulation(robot)
     swinging_feet = walk.gait.stance(walk.gait.start + walk.gait.swing / 2.0)
     tasks = fb.standing_tasks(robot.standing())
@@ -363,12 +306,8 @@ def step_time(name: str, gait: Callable[[fb.Robot], Gait], impulse: float) -> Ro
         f"{ratio:.2f} times; 99 % ≤ {p99:.0f} µs, slowest {walks[1:].max() / 1e3:.1f} ms; "
         f"{softened} steps softened, {' and '.join(sorted(backends))}"
     )
-    return (
-        f"{name}: a control step of `Walk`, {impulse:g} N s at 2.4 s",
-        found,
-        "≤ 2 times, 99 % ≤ 1000 µs",
-        ratio <= 2.0 and p99 <= 1000.0,
-    )
+    what = f"{name}: a control step of `Walk`, {impulse:g} N s at 2.4 s"
+    return what, found, "≤ 2 times, 99 % ≤ 1000 µs", ratio <= 2.0 and p99 <= 1000.0
 
 
 def first_infeasible() -> Row:
@@ -379,66 +318,57 @@ def first_infeasible() -> Row:
         robot, contacts, fb.standing_tasks(state), on_infeasible="soften", **weak
     )
     v = np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)]
-    times = []
-    for _ in range(20):
-        begin = time.thread_time_ns()
-        command = controller(state.q, v)
-        times.append((time.thread_time_ns() - begin) / 1e6)
-    return (
-        "talos: infeasible control step, softened",
-        f"first {times[0]:.1f} ms, then {np.median(times):.1f} ms",
-        "first ≤ 5 ms",
-        command.softened and times[0] <= 5.0,
-    )
+    times = [1e3 * harness.work(controller, state.q, v) for _ in range(20)]
+    found = f"first {times[0]:.1f} ms, then {np.median(times):.1f} ms"
+    holds = controller(state.q, v).softened and times[0] <= 5.0
+    return "talos: infeasible control step, softened", found, "first ≤ 5 ms", holds
 
 
 def at(period: float) -> str:
     return "" if period == 1e-3 else f" ({1e3 * period:g} ms)"
 
 
-def rows(n: int) -> Iterator[Callable[[], Row]]:
+def rows(n: int) -> Iterator[Row]:
     for period in (1e-3, 2e-3):
-        for name, most in (("go2", 1.5), ("solo12", 0.3)):
-            yield lambda name=name, period=period: lifted(name, period)
-            yield lambda name=name, most=most, period=period: crawled(name, most, period)
-        for one in (in_place, trotted, one_leg, talos_walks):
-            yield lambda one=one, period=period: one(period)
+        for name, largest_jump in (("go2", 1.5), ("solo12", 0.3)):
+            yield lifted(name, period)
+            yield crawled(name, largest_jump, period)
+        for measure in (in_place, trotted, one_leg, talos_walks):
+            yield measure(period)
         for force in (60.0, 200.0):
-            yield lambda force=force, period=period: pushed(force, period)
-    yield lambda: talos_pushed(max(1, 12 * n // 30))
-    yield lambda: recovered("go2", 100.0, 400.0, lambda robot: Gait.trot(robot, swing=0.2), n)
-    yield lambda: recovered("talos", 300.0, 600.0, lambda robot: Gait.walk(robot, swing=0.4), n)
+            yield pushed(force, period)
+    yield talos_pushed(max(1, 12 * n // 30))
+    yield recovered("go2", 100.0, 400.0, lambda robot: Gait.trot(robot, swing=0.2), n)
+    yield recovered("talos", 300.0, 600.0, lambda robot: Gait.walk(robot, swing=0.4), n)
     for yaw_rate in (0.5, 1.5):
-        yield lambda yaw_rate=yaw_rate: turned(yaw_rate)
+        yield turned(yaw_rate)
     for gait, mu in (("walk", 0.6), ("pace", 0.8), ("bound", 0.6), ("bound", 1.0), ("pronk", 0.6)):
-        yield lambda gait=gait, mu=mu: gait_walked("go2", gait, mu)
-    yield bolt_walked
+        yield gait_walked("go2", gait, mu)
+    yield bolt_walked()
     for degrees, known in ((5.0, False), (5.0, True), (-5.0, True)):
-        yield lambda degrees=degrees, known=known: sloped(degrees, known)
-    yield hand_held
-    yield first_infeasible
-    yield lambda: step_time("go2", Gait.trot, 30.0)
-    yield lambda: step_time("talos", Gait.walk, 90.0)
+        yield sloped(degrees, known)
+    yield hand_held()
+    yield first_infeasible()
+    yield step_time("go2", Gait.trot, 30.0)
+    yield step_time("talos", Gait.walk, 90.0)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    parser = harness.command_line(__doc__, pushes=(30, "pushes of each series"))
+    pushes = parser.parse_args().pushes
+    table = harness.table(
+        "test | measured | required | ",
+        ((*row, "met" if holds else "**missed**") for *row, holds in rows(pushes)),
     )
-    parser.add_argument("--pushes", type=int, default=30, help="pushes per series, 30 by default")
-    given = parser.parse_args()
-    lines = ["| test | measured | required | |", "|---|---|---|---|"]
-    for row in rows(given.pushes):
-        what, found, required, holds = row()
-        lines.append(f"| {what} | {found} | {required} | {'met' if holds else '**missed**'} |")
-        print(lines[-1], flush=True)
-    if given.pushes == 30:
-        text = (
-            f"# Walking: measured results\n\nMade by `python benchmarks/walking.py` with floatbase "
-            f"{fb.__version__}. Friction is 0.6 in the controller and 1 on the ground; pushes last "
-            f"0.1 s. The control period is 1 ms, or 2 ms where noted.\n\n" + "\n".join(lines) + "\n"
+    if pushes == 30:
+        harness.write(
+            __file__,
+            "Walking: measured results",
+            f"Made by `python benchmarks/walking.py` with floatbase {fb.__version__}. Friction is "
+            "0.6 in the controller and 1 on the ground; pushes last 0.1 s. The control period is "
+            "1 ms, or 2 ms where noted.",
+            table,
         )
-        Path(__file__).with_suffix(".md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

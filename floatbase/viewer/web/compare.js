@@ -1,5 +1,4 @@
-// Compare the page's engine with the Python library, in node (reference.mjs) or in a browser
-// (benchmarks/live.py), and measure it.
+// Compare the page's engine with the Python library.
 
 import {createEngine, defaults} from "./src/engine/engine.js";
 import {pushRecovery} from "./src/engine/recovery.js";
@@ -14,42 +13,13 @@ const robots = {}, engines = {};
 // The largest differences between the page and the library. given: MuJoCo, the control step's
 // module, and the contents of FILES and NUMBERS by name.
 export async function compare(given) {
-  prepare(given);
-  const recovery = await compareRecovery();
-  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery};
-}
-
-function prepare(given) {
   ({mj, module, files} = given);
   for (const name of ["go2", "solo12", "talos"]) {
     robots[name] = files[`${name}.json`];
     engines[name] = createEngine(mj, module, robots[name]);
   }
-}
-
-// Times of single steps of a warm engine, µs, and the last bits of three runs: a push, a fall and a
-// trot.
-export function measure(given, count = 20000) {
-  prepare(given);
-  const engine = engines.go2, times = new Float64Array(count), states = [];
-  for (let i = 0; i < 3000; i++) engine.step();
-  for (let i = 0; i < count; i++) {
-    const begin = performance.now();
-    engine.step();
-    times[i] = 1000 * (performance.now() - begin);
-  }
-  for (const [force, gait] of [[30, null], [300, null], [60, "trot"]]) {
-    engine.set({...defaults(robots.go2), gait, speed: 0.4, turn: 0.2});
-    engine.reset();
-    engine.push({force: [0, force, 0], start: 1.5, duration: 0.1});
-    for (let i = 0; i < 3000; i++) engine.step();
-    states.push([...engine.actual.data.qpos]);
-  }
-  times.sort();
-  const bits = states.map((state) => [...new Uint8Array(new Float64Array(state).buffer)]
-    .map((byte) => byte.toString(16).padStart(2, "0")).join(""));
-  return {median: times[count >> 1], p99: times[Math.floor(0.99 * count)],
-    mean: times.reduce((sum, x) => sum + x) / count, bits, com: engine.com()};
+  const recovery = await compareRecovery();
+  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery};
 }
 
 const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
