@@ -41,9 +41,8 @@ FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
 FLAT = tuple(
     name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet)
 )
-every_robot = pytest.fixture(params=ROBOTS)(
-    lambda request: request.param
-)  # `name = judges.every_robot` runs a file on each
+# `name = judges.every_robot` runs a file on each
+every_robot = pytest.fixture(params=ROBOTS)(lambda request: request.param)
 every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: request.param)
 # one of each kind: point feet with enough torques and with too few, flat feet, bolted down
 KINDS = ("go2", "solo8", "talos", "ur5")

@@ -148,9 +148,8 @@ def test_what_counts_as_curvature_is_decided_in_one_place(curvature: float, coun
     over = cost.argmin_over(np.array([[0.0], [1.0]]))
     assert np.allclose(cost.minimiser(), [0.0, float(counts)])
     assert np.allclose(cost.argmin_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
-    assert np.allclose(
-        over([3.0, 4.0]), [3.0, 1.0]
-    )  # on its own, this curvature is the largest one
+    # on its own, this curvature is the largest one
+    assert np.allclose(over([3.0, 4.0]), [3.0, 1.0])
 
 
 def test_a_partial_minimum_is_the_least_of_all_points_that_keep_the_rest() -> None:
@@ -236,14 +235,8 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
         (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), InputError, 3, 2),
         (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), InputError, 2, 3),
         (lambda: fb.Affine.identity(2) + np.ones(1), InputError, 1, 2),
-        (
-            lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)),
-            InputError,
-            "a",
-            2,
-            "b",
-            3,
-        ),
+        (lambda: fb.Affine.stack(a=fb.Affine.identity(2), b=fb.Affine.identity(3)), InputError,
+            "a", 2, "b", 3),
         (lambda: fb.Affine.stack(), InputError),
         (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], InputError, "toe", "tau"),
         (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), InputError, "H", 2, 3),
@@ -251,6 +244,6 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
         (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), InputError, 3, 2),
         (lambda: fb.Quadratic.from_affine(fb.Affine.identity(1), -1.0), InputError, "weight", -1),
     ],
-)
+)  # fmt: skip
 def test_shapes_that_do_not_fit_are_named(case: tuple[Any, ...]) -> None:
     refused(*case)

@@ -51,11 +51,8 @@ PACKAGES = (
     "", "actuators", "behaviours", "control", "dynamics", "friction", "lessons", "objectives", "qp",
     "playground", "robots", "simulation", "viewer",
 )  # fmt: skip
-MODULES = (
-    run_plots,
-    qp_plots,
-    recording,
-)  # of the viewer; the others draw and pack what these and `Viewer.show` have checked
+# of the viewer; the others draw and pack what these and `Viewer.show` have checked
+MODULES = (run_plots, qp_plots, recording)
 ZERO = np.zeros(12)
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
 FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
@@ -385,9 +382,8 @@ def wrongs(callee: Callee, name: str) -> dict[str, Any]:
     """Wrong arguments for a parameter."""
     rights = rights_of(callee)
     kind = type(rights.pop(name, None)).__name__
-    alone = not any(
-        map(of_a_robot, (*callee.self, *rights.values()))
-    )  # then another robot's is as good as any
+    # then another robot's is as good as any
+    alone = not any(map(of_a_robot, (*callee.self, *rights.values())))
     if alone or kind not in others():
         return FEW
     return {label: wrong for label, wrong in FEW.items() if label != "ragged"} | {

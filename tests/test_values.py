@@ -17,6 +17,7 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from values import UP, controller, record, values
 
 import floatbase as fb
@@ -142,12 +143,10 @@ def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> No
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
 def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
-    robot, state, contacts, control = (
-        values()["Robot"],
-        values()["State"],
-        values()["Contacts"],
-        controller(),
-    )
+    robot = values()["Robot"]
+    state = values()["State"]
+    contacts = values()["Contacts"]
+    control = controller()
     push = fb.Push([0.0, 60.0, 0.0], start=0.005)
     sim, oil = fb.Simulation(robot), HydraulicActuators(robot)
     fb.rollout(sim, control, 0.01, [push], actuators=oil)
@@ -155,7 +154,7 @@ def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
     runs = [
         fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, control, oil), others)
     ]
-    np.testing.assert_array_equal(runs[0].q, runs[1].q)
+    assert_array_equal(runs[0].q, runs[1].q)
     assert np.ptp(runs[0].q, axis=0).max() > 1e-4
     assert (
         not others[2].state.pressures.flags.writeable
@@ -163,9 +162,7 @@ def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
     )
     fb.rollout(sim, alone, 0.001)  # the controller of a robot that was copied, and not the robot
     analytic = AnalyticController(robot, contacts, state)
-    np.testing.assert_array_equal(
-        copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau
-    )
+    assert_array_equal(copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau)
     assert not copied(analytic).com.flags.writeable
 
 
@@ -177,7 +174,7 @@ def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: A
         late.step(first, still, still, 1e-3)
         other = copied(late)
         steps = [[one.step(second, still, still, 1e-3) for _ in range(3)] for one in (late, other)]
-        np.testing.assert_array_equal(*steps)
+        assert_array_equal(*steps)
         assert np.ptp(steps[0], axis=0).max() > 0.5
 
 
@@ -187,7 +184,7 @@ def test_values_come_back_from_another_process() -> None:
         back = dict(zip(values(), pool.map(copy.copy, values().values()), strict=True))
         run = pool.submit(fb.rollout, fb.Simulation(robot), control, 0.005).result()
     assert [kind for kind, value in back.items() if not same(value, values()[kind])] == []
-    np.testing.assert_array_equal(run.q, record().q)
+    assert_array_equal(run.q, record().q)
     assert isinstance(back["State"], fb.State) and not back["State"].q.flags.writeable
     fb.Simulation(robot).reset(run.final)  # a state of the same robot
 

@@ -324,10 +324,8 @@ def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward(
     worst, dt = np.zeros(12), 1e-3
     for i in range(1000):
         phase = 2.0 * np.pi * 2.0 * i * dt
-        q, v = (
-            cylinders.max_lever_angle + 0.3 * np.sin(phase),
-            np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase)),
-        )
+        q = cylinders.max_lever_angle + 0.3 * np.sin(phase)
+        v = np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase))
         ramp = min(1.0, i / 100.0)  # set off gently
         q, v = cylinders.max_lever_angle + ramp * (q - cylinders.max_lever_angle), ramp * v
         worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / robot.torque_limits)
@@ -405,10 +403,8 @@ def test_oil_that_is_pulled_apart_boils_instead_of_pulling() -> None:
 def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest() -> None:
     robot, actuators = judges.load("go2"), joints()
     run(actuators, robot.torque_limits, 0.02)
-    tau, q = (
-        0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12),
-        actuators.cylinders.max_lever_angle + 0.3,
-    )
+    tau = 0.5 * robot.torque_limits * np.resize([1.0, -1.0], 12)
+    q = actuators.cylinders.max_lever_angle + 0.3
     actuators.reset(tau, q)
     assert np.allclose(actuators.torques(q), tau)
     assert not np.any(actuators.state.opening) and not np.any(actuators.state.integral)

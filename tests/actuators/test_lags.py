@@ -56,9 +56,8 @@ def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps() -> Non
     for _ in range(100_000):
         late.step(STILL, STILL, STILL, dt)
     came = got(late, np.ones((100, 12)), dt)[:, 0]
-    assert np.sum(1.0 - came) * dt == pytest.approx(
-        0.02, abs=1e-7
-    )  # s: missing under a step of 1; 1 ns a step
+    # s: missing under a step of 1; 1 ns a step
+    assert np.sum(1.0 - came) * dt == pytest.approx(0.02, abs=1e-7)
 
 
 # first-order lag
@@ -118,11 +117,9 @@ def test_a_rollout_through_a_delay_gets_the_torques_of_earlier_ticks() -> None:
 
 
 def test_go2_stands_live_through_a_lag() -> None:
-    sim, controller, lag = (
-        fb.Simulation(ROBOT),
-        judges.controller_of("go2"),
-        FirstOrderLag(ROBOT, 20.0),
-    )
+    sim = fb.Simulation(ROBOT)
+    controller = judges.controller_of("go2")
+    lag = FirstOrderLag(ROBOT, 20.0)
     lag.reset(controller(sim.q, sim.v).tau)
     records: list[fb.Rollout] = []
     live = LiveSimulation(sim, controller, records.append, actuators=lag)

@@ -209,9 +209,8 @@ def test_the_support_margin_is_the_distance_to_the_hull() -> None:
             ]
             nearest = min(np.linalg.norm(point - edge, axis=1).min() for edge in edges)
             assert margin < 0.0 and np.isclose(-margin, nearest, atol=2e-3)
-    assert np.isclose(
-        support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0
-    )  # two feet: a line
+    # two feet: a line
+    assert np.isclose(support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0)
     assert np.isclose(support_margin([0.0, 1.0], [[0.0, 0.0]]), -1.0)
     refused(lambda: support_margin([0.0, 0.0], np.zeros((0, 2))), InputError, "feet")
 
@@ -244,9 +243,8 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
                 else:
                     assert found is not None and np.allclose(times, found, atol=1e-9)
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
-    assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx(
-        (3.0, 3.25)
-    )  # 30 · 0.1 is not 3 but more, due to rounding
+    # 30 · 0.1 is not 3 but more, due to rounding
+    assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx((3.0, 3.25))
 
 
 def test_a_swing_of_no_duration_is_refused() -> None:

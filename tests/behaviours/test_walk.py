@@ -21,6 +21,7 @@ import judges
 import numpy as np
 import pytest
 from messages import refused, warns
+from numpy.testing import assert_allclose
 
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
@@ -155,9 +156,8 @@ def test_it_turns_on_the_spot_and_goes_sideways() -> None:
     assert record.outcome == "completed"
     q = record.q[-1]
     yaw = np.arctan2(2.0 * (q[6] * q[5] + q[3] * q[4]), 1.0 - 2.0 * (q[4] ** 2 + q[5] ** 2))
-    assert np.isclose(
-        yaw, 0.5 * (3.0 - 0.25), atol=0.1
-    )  # half a second of it speeds up by 1 rad/s²
+    # half a second of it speeds up by 1 rad/s²
+    assert np.isclose(yaw, 0.5 * (3.0 - 0.25), atol=0.1)
 
 
 def test_it_keeps_its_speed_on_a_circle() -> None:
@@ -203,13 +203,11 @@ def test_steps_save_a_robot_that_would_fall() -> None:
 @pytest.mark.parametrize("towards", [(1.0, 1.0), (-1.0, -1.0)])
 def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float, float]) -> None:
     robot = judges.load("go2")
-    stand = Stand(
-        robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot)
-    )  # whose first pair stands along this diagonal
+    # whose first pair stands along this diagonal
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot))
     push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
-    assert (
-        run(stand, 2.0, push).outcome == "completed"
-    )  # it used to fall at 230 N, which it survives without a step
+    # it used to fall at 230 N, which it survives without a step
+    assert run(stand, 2.0, push).outcome == "completed"
     assert next(step.stance for step in stand.history if len(step.stance) == 2) == (
         "FL_foot",
         "RR_foot",
@@ -219,9 +217,8 @@ def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float,
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side: str) -> None:
     robot = judges.load("talos")
-    stand = Stand(
-        robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot)
-    )  # whose first foot is the left one
+    # whose first foot is the left one
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot))
     push = fb.Push([0.0, 400.0 if side == "left" else -400.0, 0.0], start=0.1)
     assert run(stand, 1.3, push).outcome == "completed"
     assert next(step.stance for step in stand.history if len(step.stance) == 1) == (
@@ -307,9 +304,8 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
         )
         sim = fb.Simulation(robot)
         sim.reset(robot.standing().replace(q=q))
-        walk = walk_of(
-            "go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw
-        )  # of the facets of friction
+        # of the facets of friction
+        walk = walk_of("go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw)
         record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
         assert record.outcome == "completed"
         ways.append((record.com - record.com[0]) @ turn)
@@ -336,9 +332,8 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
     )
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
     assert record.outcome == "completed"  # it falls if footholds are limited around the plan
-    assert (
-        reach < leg + walk.options.reach + 0.05
-    )  # relative to the body, which the push has moved away from the plan
+    # relative to the body, which the push has moved away from the plan
+    assert reach < leg + walk.options.reach + 0.05
 
 
 def test_a_stance_with_area_does_not_throw_its_feet_away() -> None:
@@ -422,9 +417,8 @@ def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> 
         row = np.searchsorted(record.time, step.time + 0.05)
         for foot in step.stance:
             place = record.state(int(row)).point(foot)
-            assert (
-                np.linalg.norm(place - step.feet[foot]) < radius / 4
-            )  # a ball that rolls moves less than that in 50 ms
+            # a ball that rolls moves less than that in 50 ms
+            assert np.linalg.norm(place - step.feet[foot]) < radius / 4
             assert place[2] - radius < 2e-3
 
 
@@ -443,15 +437,13 @@ def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
 
 
 def test_the_load_shifts_before_a_first_step_that_is_far_away() -> None:
-    walk = walk_of(
-        "talos", lambda robot: Gait.walk(robot, start=5.5)
-    )  # beyond the 5 s that a plan looks ahead
+    # beyond the 5 s that a plan looks ahead
+    walk = walk_of("talos", lambda robot: Gait.walk(robot, start=5.5))
     sim = fb.Simulation(walk.robot)
     assert fb.rollout(sim, walk, 4.0, control_period=PERIOD).outcome == "completed"
     record = fb.rollout(sim, walk, 2.4, control_period=PERIOD)
-    assert (
-        record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02
-    )  # it was 7 cm
+    # it was 7 cm
+    assert record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02
 
 
 def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_stands() -> None:
@@ -465,18 +457,18 @@ def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_st
         and farthest_from_plan(record, walk, 1.4) < 0.02
         and tilt(record) < 0.3
     )
+    # its foot is unloaded
     assert (
         record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight
-    )  # its foot is unloaded
+    )
 
 
 def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing() -> None:
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=-0.15))
     record = run(walk, 1.0)
     assert record.outcome == "completed" and len(walk.history[0].stance) == 4
-    assert [step.time for step in walk.history][1] == pytest.approx(
-        0.1, abs=PERIOD
-    )  # the next lift-off of the schedule
+    # the next lift-off of the schedule
+    assert [step.time for step in walk.history][1] == pytest.approx(0.1, abs=PERIOD)
     assert record.measured[:, 2::3].max() < walk.robot.weight
 
 
@@ -495,7 +487,7 @@ def test_the_zmp_does_not_jump_when_a_trot_stops() -> None:
     assert len(stops) == 3
     for before, after in stops:
         zmps = [before.plan.zmp(after.time - 1e-6), after.plan.zmp(after.time)]
-        np.testing.assert_allclose(zmps[1], zmps[0], atol=1e-5)
+        assert_allclose(zmps[1], zmps[0], atol=1e-5)
 
 
 def test_another_gait_takes_over_when_all_feet_stand() -> None:
@@ -666,9 +658,8 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
 def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
     record = run(walk_of(name, Gait.walk if name == "g1" else Gait.trot, (0.2, 0.0)), 3.0)
     assert record.outcome == "completed"
-    assert (
-        np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
-    )  # 2 s, in which it speeds up at 1 m/s²
+    # 2 s, in which it speeds up at 1 m/s²
+    assert np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
 
 
 SEEDED = """
@@ -781,9 +772,7 @@ def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.3), (0.5, 0.2)])
-def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
-    velocity: tuple[float, float],
-) -> None:
+def test_six_feet_walk_slowly_within_the_reach_of_their_legs(velocity: tuple[float, float]) -> None:
     """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
     robot = hexapod()
     offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}

@@ -65,14 +65,11 @@ except fb.FloatbaseError as error:
 @pytest.mark.parametrize(
     ("obstacle", "environment", "reason"),
     [
-        (
-            'sys.modules["numba"] = None',
-            {},
-            "numba cannot be loaded (.*); reinstall it with pip install numba",
-        ),
+        ('sys.modules["numba"] = None', {},
+            "numba cannot be loaded (.*); reinstall it with pip install numba"),
         ("", {"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set, so numba does not compile"),
     ],
-)
+)  # fmt: skip
 def test_without_numba_the_reference_backend_answers_and_says_why(
     obstacle: str, environment: dict[str, str], reason: str
 ) -> None:
@@ -89,9 +86,8 @@ def test_without_numba_the_reference_backend_answers_and_says_why(
 def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = fb.load(
-        "go2", torque_limits=20.0
-    )  # a robot of this test alone, since the result is cached for each robot
+    # a robot of this test alone, since the result is cached for each robot
+    robot = fb.load("go2", torque_limits=20.0)
     monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "layout_supported", False)
     controller = fb.WholeBodyController(
         robot, judges.stance(robot), fb.standing_tasks(robot.standing())
@@ -101,14 +97,10 @@ def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(
 
 
 def test_threads_may_share_a_controller() -> None:
-    controller, states = (
-        judges.controller_of("go2", backend="compiled"),
-        judges.states("go2", 40, 0.3),
-    )
-    expected, interval = (
-        [controller(state.q, state.v).tau for state in states],
-        sys.getswitchinterval(),
-    )
+    controller = judges.controller_of("go2", backend="compiled")
+    states = judges.states("go2", 40, 0.3)
+    expected = [controller(state.q, state.v).tau for state in states]
+    interval = sys.getswitchinterval()
 
     def wrong(shift: int) -> list[int]:
         order = (np.arange(400) + shift) % len(states)
@@ -131,10 +123,8 @@ def test_threads_may_share_a_controller() -> None:
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
     """Other threads and the locks that they hold do not exist in the forked process."""
-    controller, state = (
-        judges.controller_of("go2", backend=backend),
-        judges.load("go2").random_state(3, 0.1),
-    )
+    controller = judges.controller_of("go2", backend=backend)
+    state = judges.load("go2").random_state(3, 0.1)
     expected, ended, answers = controller(state.q, state.v).tau.tobytes(), threading.Event(), []
 
     def answer(out: Any) -> None:
@@ -151,9 +141,8 @@ def test_a_process_forked_while_threads_tick_ticks_on(backend: str) -> None:
     for _ in range(20):
         child = multiprocessing.get_context("fork").Process(target=answer, args=(out,))
         child.start()
-        answers.append(
-            into.recv() if into.poll(10.0) else "nothing"
-        )  # s: a tick takes at most a few milliseconds
+        # s: a tick takes at most a few milliseconds
+        answers.append(into.recv() if into.poll(10.0) else "nothing")
         child.kill()
         child.join()
         if answers[-1] == "nothing":
@@ -222,9 +211,8 @@ def test_an_edit_in_any_file_of_the_tick_changes_the_key_of_its_cache(
     copy = shutil.copytree(TICK, tmp_path / "tick", ignore=shutil.ignore_patterns("__pycache__"))
     key, files = jit.source_digest(copy), sorted(copy.glob("*.py"))
     assert len(files) == len(list(TICK.glob("*.py"))) and key == jit.source_digest()
-    assert inspect.getclosurevars(tick.tick.py_func).nonlocals == {
-        "digest": key
-    }  # numba's key holds the closure
+    # numba's key holds the closure
+    assert inspect.getclosurevars(tick.tick.py_func).nonlocals == {"digest": key}
     for file in files:
         text = file.read_text(encoding="utf-8")
         file.write_text(

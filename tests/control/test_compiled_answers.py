@@ -32,12 +32,10 @@ def prove_optimal(solution: Solution) -> None:
 
     They prove that the answer is the optimum.
     """
-    qp, x, mu, residuals = (
-        solution.qp,
-        solution.x,
-        solution.inequality_multipliers,
-        solution.residuals,
-    )
+    qp = solution.qp
+    x = solution.x
+    mu = solution.inequality_multipliers
+    residuals = solution.residuals
     slopes = (qp.H @ x, qp.g, qp.A.T @ solution.equality_multipliers, qp.G.T @ mu)
     forces = (np.abs(qp.A) @ np.abs(x), np.abs(qp.b))
     costs = (mu * qp.h, mu * (np.abs(qp.G) @ np.abs(x)))
@@ -514,10 +512,8 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_controller_can_be_copied_and_sent_to_another_process(backend: str) -> None:
-    controller, state = (
-        judges.controller_of("go2", backend=backend),
-        judges.load("go2").random_state(1, 0.1),
-    )
+    controller = judges.controller_of("go2", backend=backend)
+    state = judges.load("go2").random_state(1, 0.1)
     for other in (
         copy.deepcopy(controller),
         copy.copy(controller),

@@ -139,9 +139,8 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) 
     moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
     assert np.allclose(moment, 0.0, atol=SAG * state.robot.weight)
     assert np.allclose(command.qdd[:6], 0.0, atol=0.05)
-    assert np.allclose(
-        command.qdd[6:], 0.0, atol=0.6
-    )  # 0.5 rad/s² where anymal_kinova's arm begins
+    # 0.5 rad/s² where anymal_kinova's arm begins
+    assert np.allclose(command.qdd[6:], 0.0, atol=0.6)
     # grippers of talos rest at their limits
     assert all("position" in row for row in command.active)
 
@@ -303,11 +302,9 @@ def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
 
 def test_the_order_of_tasks_and_of_contacts_does_not_matter() -> None:
     robot = judges.load("go2")
-    state, tasks, contacts = (
-        robot.random_state(3),
-        fb.standing_tasks(robot.standing()),
-        fb.Contacts.points(robot),
-    )
+    state = robot.random_state(3)
+    tasks = fb.standing_tasks(robot.standing())
+    contacts = fb.Contacts.points(robot)
     turned = fb.Contacts.points(robot, frames=contacts.names[::-1])
     stances = ((contacts, tasks), (contacts, tasks[::-1]), (turned, tasks))
     one, two, three = (fb.WholeBodyController(robot, *given)(state.q, state.v) for given in stances)
@@ -427,10 +424,8 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     from floatbase.dynamics import fixed_frame
 
     robot = judges.load("go2")
-    feet, bolts = (
-        fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]),
-        fb.Contacts([fixed_frame("base")]),
-    )
+    feet = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"])
+    bolts = fb.Contacts([fixed_frame("base")])
     tasks = fb.standing_tasks(robot.standing())
     state = robot.random_state(3, 0.05)
     first = fb.WholeBodyController(robot, bolts + feet, tasks)(state.q, state.v)

@@ -194,8 +194,7 @@ def driven(robot: Robot, joint: int, side: float, period: float, **options: obje
 
 
 @pytest.mark.parametrize(
-    ("name", "joints"),
-    [("go2", (0, 1, 2)), ("solo12", (1, 5)), ("talos", (3, 9, 15, 21))],
+    ("name", "joints"), [("go2", (0, 1, 2)), ("solo12", (1, 5)), ("talos", (3, 9, 15, 21))]
 )
 def test_no_joint_passes_its_limit_in_mujoco(name: str, joints: tuple[int, ...]) -> None:
     floating = judges.load(name)

@@ -182,9 +182,8 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str
         torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}),
     )
     with raises(UnknownNameError, "min_normal_force", "heel"):
-        torques(
-            swing, **bounds
-        )  # a new controller knows the robot's feet, but no other absent contact
+        # a new controller knows the robot's feet, but no other absent contact
+        torques(swing, **bounds)
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])

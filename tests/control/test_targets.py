@@ -29,9 +29,7 @@ def moving_controller(backend: str, **options: object) -> fb.WholeBodyController
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_array_of_targets_replaces_the_targets_of_the_tasks(
-    backend: str,
-) -> None:
+def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend: str) -> None:
     controller, rng = moving_controller(backend), np.random.default_rng(0)
     for state in judges.states("go2", 5, 0.05):
         t = float(rng.uniform(0.0, 0.1))

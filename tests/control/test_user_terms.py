@@ -137,9 +137,7 @@ class Looks:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(
-    name: str,
-) -> None:
+def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(name: str) -> None:
     robot = judges.load(name)
     seen: list[EquationsOfMotion] = []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
@@ -275,9 +273,8 @@ def test_threads_may_share_a_controller_whose_task_calls_another_controller() ->
     class Nested(MyCoM):
         def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> fb.Affine:
             found = super().residual(eom, t)
-            inner(
-                eom.state.replace(v=np.zeros(18)).q, np.zeros(18)
-            )  # this runs a tick of the same robot
+            # this runs a tick of the same robot
+            inner(eom.state.replace(v=np.zeros(18)).q, np.zeros(18))
             return found
 
     tasks = [Nested(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
@@ -367,10 +364,8 @@ def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_
     psutil = pytest.importorskip("psutil")
     robot = judges.load("go2")
     tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
-    controller, states = (
-        judges.pair(robot, judges.stance(robot), tasks)[0],
-        judges.states("go2", 50, 0.1),
-    )
+    controller = judges.pair(robot, judges.stance(robot), tasks)[0]
+    states = judges.states("go2", 50, 0.1)
 
     def resident(ticks: int) -> float:
         for i in range(ticks):
@@ -475,10 +470,8 @@ class Reuses(PointContact):
 
 def test_user_defined_contacts_may_write_into_the_same_arrays_again() -> None:
     robot = judges.load("go2")
-    others, frames = (
-        fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"]),
-        ("FL_foot", "FR_foot"),
-    )
+    others = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"])
+    frames = ("FL_foot", "FR_foot")
     own = fb.Contacts([Reuses(frame, radius=0.022) for frame in frames])
     same = fb.Contacts([PointContact(frame, radius=0.022) for frame in frames])
     A, b = own.constraint(robot.random_state(0))

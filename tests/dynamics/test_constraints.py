@@ -129,10 +129,8 @@ def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_mult
         state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint])
     )
     tau = rng.normal(size=12)
-    qdd, forces = (
-        dynamics.accelerations_from_torques(eom)(tau),
-        dynamics.forces_from_torques(eom)(tau),
-    )
+    qdd = dynamics.accelerations_from_torques(eom)(tau)
+    forces = dynamics.forces_from_torques(eom)(tau)
     assert np.allclose(A @ qdd, b, atol=1e-8)
     J_foot = (
         judges.mujoco_of("go2")
@@ -343,9 +341,8 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)
     assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
-    faster = state.replace(
-        v=1.2 * state.v
-    )  # at another rate the lean changes, and the path is not a circle
+    # at another rate the lean changes, and the path is not a circle
+    faster = state.replace(v=1.2 * state.v)
     assert (
         np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular)
         > 1.0

@@ -64,10 +64,8 @@ def test_contacts_of_a_users_own_are_chosen_by_name() -> None:
     assert contacts.force_slice("FR_foot") == slice(3, 6)
     assert contacts.only("FR_foot").names == contacts.without("FL_foot").names == ("FR_foot",)
     state = judges.load("go2").standing()
-    eom, feet = (
-        fb.equations_of_motion(state, contacts),
-        [PointContact(name) for name in contacts.names],
-    )
+    eom = fb.equations_of_motion(state, contacts)
+    feet = [PointContact(name) for name in contacts.names]
     assert np.allclose(eom.J, fb.equations_of_motion(state, fb.Contacts(feet)).J, atol=1e-12)
 
 
@@ -79,9 +77,8 @@ def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str)
         )
         sim = fb.Simulation(robot, Ground(normal=normal))
         if name in judges.FLAT:
-            state = (
-                robot.standing()
-            )  # corners are balls' lowest points, so only level soles can be compared
+            # corners are balls' lowest points, so only level soles can be compared
+            state = robot.standing()
         sim.reset(state)
         make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
         contacts = make(robot, normals=normal)
@@ -308,12 +305,10 @@ def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(
     )
     here = fb.FrameTask("FL_foot", state.point("FL_foot"))
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    assert np.allclose(
-        here.residual(eom).b, state.frame_drift("FL_foot")[:3]
-    )  # no error to correct
-    assert (
-        np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
-    )  # kp times the radius, m/s²
+    # no error to correct
+    assert np.allclose(here.residual(eom).b, state.frame_drift("FL_foot")[:3])
+    # kp times the radius, m/s²
+    assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
 
 
 def test_a_constraint_of_a_users_own_needs_no_friction_and_half_of_it_is_refused() -> None:

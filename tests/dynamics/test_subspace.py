@@ -260,9 +260,8 @@ def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_
         found = dynamics.dimensions(fb.equations_of_motion(state, contacts))
         assert found.rank_J == 18 - lost
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
-        assert (
-            found.rank_V_qdd == 12 - found.rank_J + 6 == lost
-        )  # independent motions of the legs; none if they are bent
+        # independent motions of the legs; none if they are bent
+        assert found.rank_V_qdd == 12 - found.rank_J + 6 == lost
 
 
 def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
@@ -329,9 +328,8 @@ def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
             case
         )
         space = dynamics.feasible_space(eom)
-        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, (
-            case
-        )  # the point of smallest norm, which includes q̈ in rad/s²
+        # the point of smallest norm, which includes q̈ in rad/s²
+        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, case
 
 
 def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank() -> None:
@@ -359,9 +357,8 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     eom = fb.equations_of_motion(sim.state, contacts)
     _, s, Vt = np.linalg.svd(eom.A)
     assert 1e-6 < s[10] / s[0] < dynamics.CONSTRAINT_RANK_TOLERANCE
-    rolling = (
-        0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
-    )  # N·m, torques along the poorly resolved direction
+    # N·m, torques along the poorly resolved direction
+    rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
     change, rolls = [], []
     motors = [sim.model.joint(joint).dofadr[0] for joint in robot.joint_names]
     sim.data.ctrl[:] = 0.0
@@ -376,9 +373,8 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     assert dynamics.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
     found = (dynamics.forces_from_torques(eom).A @ rolling).reshape(4, 3)
     assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
-    assert (
-        np.max(np.abs(found - (change[1] - change[0]))) < 0.3
-    )  # N; the softness of the contacts decides the lateral forces
+    # N; the softness of the contacts decides the lateral forces
+    assert np.max(np.abs(found - (change[1] - change[0]))) < 0.3
     to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
     assert np.max(np.abs(to_the_letter @ np.linalg.solve(eom.M, eom.S @ rolling))) > 100.0
 
@@ -477,10 +473,8 @@ def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tup
         )
         assert model.m_baumgarte_parameters.Kp == model.m_baumgarte_parameters.Kd == 0.0
         models.append(model)
-    datas, data = (
-        pin.StdVec_RigidConstraintData([m.createData() for m in models]),
-        robot.model.createData(),
-    )
+    datas = pin.StdVec_RigidConstraintData([m.createData() for m in models])
+    data = robot.model.createData()
     pin.initConstraintDynamics(robot.model, data, models, datas)
     settings = pin.ProximalSettings(1e-14, 1e-12, 200)
     qdd = pin.constraintDynamics(
@@ -574,9 +568,8 @@ def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
     """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    pressing = eom.J[:, 6:].T @ np.tile(
-        [0.0, 0.0, -10.0], 4
-    )  # joint torques of a downward force of the feet
+    # joint torques of a downward force of the feet
+    pressing = eom.J[:, 6:].T @ np.tile([0.0, 0.0, -10.0], 4)
     change = dynamics.forces_from_torques(eom).A @ pressing
     assert np.all(change[2::3] > 1.0)
 
@@ -703,9 +696,8 @@ def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str
         beta = rng.normal(size=space.dimension)
         assert np.allclose(space.coordinates(*space(beta)), beta, atol=1e-8), case
         assert np.allclose(space.map.A.T @ space.map.A, np.eye(space.dimension), atol=1e-10), case
-        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, (
-            case
-        )  # (13) v has no part along V⊥
+        # (13) v has no part along V⊥
+        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, case
 
 
 def test_with_inconsistent_contacts_the_dynamics_hold_and_motion_rows_are_met_nearest() -> None:

@@ -76,10 +76,8 @@ def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_sl
 
 
 def test_the_tolerance_is_in_newton() -> None:
-    cone, polyhedron = (
-        FrictionCone(UP, 0.5),
-        FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False),
-    )
+    cone = FrictionCone(UP, 0.5)
+    polyhedron = FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False)
     slipping = [50.02, 0.0, 100.0]
     for shape in (cone, polyhedron):
         assert not shape.contains(slipping)
@@ -144,10 +142,8 @@ def test_the_status_changes_at_the_friction_limit() -> None:
 
 def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
     force = [5.0, 0.0, 10.0]
-    inner, outer = (
-        FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True),
-        FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False),
-    )
+    inner = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True)
+    outer = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False)
     assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == (
         "outside",
         "inside",
@@ -190,10 +186,8 @@ def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_be
     seed: int, n: int, mu: float
 ) -> None:
     normal = any_normal(np.random.default_rng(seed))
-    inner, outer = (
-        FrictionPolyhedron(normal, mu, n),
-        FrictionPolyhedron(normal, mu, n, inner_approximation=False),
-    )
+    inner = FrictionPolyhedron(normal, mu, n)
+    outer = FrictionPolyhedron(normal, mu, n, inner_approximation=False)
     for ray in inner.rays:
         assert slips(ray, normal, mu) == pytest.approx(0.0, abs=1e-9)
     for direction in inner.face_matrix + inner.mu_facet * normal:

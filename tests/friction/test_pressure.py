@@ -56,9 +56,8 @@ def test_the_ground_pushes_where_the_controller_planned() -> None:
         centre_of_pressure(run.final, SOLES, forces[-1]) for forces in (run.planned, run.measured)
     )
     assert np.allclose(planned, measured, atol=1e-3)
-    assert np.allclose(
-        measured[:2], run.final.com[:2], atol=2e-3
-    )  # at rest it is below the centre of mass
+    # at rest it is below the centre of mass
+    assert np.allclose(measured[:2], run.final.com[:2], atol=2e-3)
 
 
 def test_without_pressure_there_is_no_centre() -> None:

@@ -416,9 +416,8 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
 def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() -> None:
     feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
     area = ConvexHull(feet[:, :2]).volume
-    outwards = np.column_stack(
-        [feet[:, :2], np.full(3, 0.8)]
-    )  # feet on a hilltop: friction must hold them
+    # feet on a hilltop: friction must hold them
+    outwards = np.column_stack([feet[:, :2], np.full(3, 0.8)])
     inwards = np.column_stack([-feet[:, :2], np.full(3, 0.8)])  # feet in a bowl
     on_top, in_bowl = (of(feet, normals, 0.3).support_region() for normals in (outwards, inwards))
     areas = [ConvexHull(region).volume if len(region) > 2 else 0.0 for region in (on_top, in_bowl)]

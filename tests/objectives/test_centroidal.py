@@ -92,9 +92,8 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
         assert np.allclose(
             objectives.centroidal_momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum()
         )
-        still = objectives.centroidal_momentum_rate(
-            state, np.zeros(state.robot.nv)
-        )  # the motion q̇ changes the momentum, too
+        # the motion q̇ changes the momentum, too
+        still = objectives.centroidal_momentum_rate(state, np.zeros(state.robot.nv))
         assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
 
 
@@ -299,9 +298,8 @@ def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(
     eom = judges.at_rest(name, 0)
     found = objectives.torques_from_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
-    assert found.reachable.n_in == (
-        9 if name == "solo8" else 12
-    )  # solo8: 8 torques and one null(Jᵀ)
+    # solo8: 8 torques and one null(Jᵀ)
+    assert found.reachable.n_in == (9 if name == "solo8" else 12)
     assert found.null_torques.shape[1] == max(eom.d - eom.k, 0)
 
 
@@ -343,9 +341,8 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
     more = found.null_torques @ rng.normal(size=found.null_torques.shape[1])
     assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
     assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
-    assert np.allclose(
-        found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8
-    )  # the smallest torques have no part of them
+    # the smallest torques have no part of them
+    assert np.allclose(found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
@@ -372,11 +369,9 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
     rng = np.random.default_rng(0)
     for seed in (None, 0, 1):
         eom = judges.at_rest("solo8", seed)
-        found, zeta, N = (
-            objectives.torques_from_forces(eom),
-            dynamics.forces_from_torques(eom),
-            dynamics.undetermined_forces(eom),
-        )
+        found = objectives.torques_from_forces(eom)
+        zeta = dynamics.forces_from_torques(eom)
+        N = dynamics.undetermined_forces(eom)
         desired = 10.0 * rng.normal(size=12)
         tau, unseen = cp.Variable(8), cp.Variable(N.shape[1])
         reach = zeta.A @ tau + zeta.b + N @ unseen

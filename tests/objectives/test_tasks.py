@@ -118,11 +118,9 @@ def test_targets_may_be_functions_of_time() -> None:
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     p, v, a = [2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0]
-    R, q, w = (
-        judges.rotation([0.0, 0.0, 0.3]),
-        state.integrate(np.full(18, 0.1)),
-        np.linspace(-1.0, 1.0, 12),
-    )
+    R = judges.rotation([0.0, 0.0, 0.3])
+    q = state.integrate(np.full(18, 0.1))
+    w = np.linspace(-1.0, 1.0, 12)
     kinds = [
         (partial(fb.CoMTask, kp=4.0), (p, v, a)),
         (partial(fb.FrameTask, "FL_foot"), (p, v, a)),
@@ -214,10 +212,8 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
         tasks = [fb.CoMTask(target), *fb.standing_tasks(standing)[1:]]
         controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
         run = fb.rollout(fb.Simulation(robot), controller, 2.5, control_period=2e-3)
-        left, speed = (
-            1e3 * float(np.linalg.norm(target - run.com[-1])),
-            float(np.abs(run.final.v).max()),
-        )
+        left = 1e3 * float(np.linalg.norm(target - run.com[-1]))
+        speed = float(np.abs(run.final.v).max())
         wrong += (
             []
             if left < 1.0 and speed < STILL

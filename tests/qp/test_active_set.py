@@ -86,9 +86,8 @@ def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equal
     assert found.active == ("table",)
     assert np.allclose(found.x, [0.5, 0.0])
     assert np.allclose(found.x, equality.x)
-    assert found.multipliers["table"] == pytest.approx(
-        1.0
-    )  # the minimum lies 1 m below, at curvature 1
+    # the minimum lies 1 m below, at curvature 1
+    assert found.multipliers["table"] == pytest.approx(1.0)
 
 
 def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
@@ -296,9 +295,8 @@ def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, .
     check_optimum(run)
     check_record(run)
     assert run.solution.objective == pytest.approx(solve(qp, "cvxpy").objective, abs=1e-6)
-    again = active_set(
-        qp, run.solution.x, qp.inequality_names
-    )  # every row at once: dependent ones are left out
+    # every row at once: dependent ones are left out
+    again = active_set(qp, run.solution.x, qp.inequality_names)
     assert np.allclose(again.solution.objective, run.solution.objective)
 
 
@@ -361,12 +359,10 @@ def random_qp(seed: int) -> QP:
     def whole(*shape: int) -> Array:
         return rng.integers(-2, 3, shape).astype(np.float64)
 
-    root, G, A, inside = (
-        whole(int(rng.integers(0, n + 1)), n),
-        whole(rows, n),
-        whole(equalities, n),
-        whole(n),
-    )
+    root = whole(int(rng.integers(0, n + 1)), n)
+    G = whole(rows, n)
+    A = whole(equalities, n)
+    inside = whole(n)
     h = whole(rows) if rng.random() < 0.3 else G @ inside + rng.integers(0, 2, rows)
     return QP(root.T @ root, whole(n), A, A @ inside, G, h)
 

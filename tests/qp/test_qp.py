@@ -326,53 +326,23 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
         (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), InputError, "b", 1, 2),
         (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), InputError, "h", 1, 2),
         (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), InputError, "g", np.nan),
-        (
-            lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]),
-            InputError,
-            "h",
-            np.inf,
-        ),
-        (
-            lambda: QP(
-                np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=("a",)
-            ),
-            InputError,
-            1,
-            2,
-        ),
-        (
-            lambda: QP(
-                np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1], inequality_names=("a", "a")
-            ),
-            InputError,
-            "a",
-        ),
+        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), InputError, "h",
+            np.inf),
+        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2),
+            inequality_names=("a",)), InputError, 1, 2),
+        (lambda: QP(np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1],
+            inequality_names=("a", "a")), InputError, "a"),
         (lambda: solve(SQUARE)["torques"], InputError, "torques"),
         (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
         (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
-        (
-            lambda: active_set(table_top(), working_set=["tabel"]),
-            UnknownNameError,
-            "tabel",
-            "table",
-        ),
-        *[
-            (
-                lambda most=most: active_set(table_top(), max_iterations=most),
-                InputError,
-                "max_iterations",
-                most,
-            )
-            for most in (0, -1, 1.5, "3")
-        ],
-        (
-            lambda: active_set(table_top(), max_iterations=True),
-            InputError,
-            "max_iterations",
-            "True",
-        ),
+        (lambda: active_set(table_top(), working_set=["tabel"]), UnknownNameError, "tabel",
+            "table"),
+        (*[(lambda most=most: active_set(table_top(), max_iterations=most), InputError,
+            "max_iterations", most) for most in (0, -1, 1.5, "3")],),
+        (lambda: active_set(table_top(), max_iterations=True), InputError, "max_iterations",
+            "True"),
     ],
-)
+)  # fmt: skip
 def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:
     refused(*case)
 

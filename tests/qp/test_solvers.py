@@ -89,9 +89,8 @@ def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> 
 
 
 def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding() -> None:
-    u = np.array(
-        [2.0, -1.0, 1.0]
-    )  # H, g and the row all look along the direction that the equality fixes
+    # H, g and the row all look along the direction that the equality fixes
+    u = np.array([2.0, -1.0, 1.0])
     qp = QP(
         1e4 * np.outer(u, u), 3.0 * u, u[None], np.array([-3.0]), 7.0 * u[None], np.array([-21.0])
     )
@@ -170,10 +169,8 @@ def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str
     verdicts = []
     for seed in range(8):
         limits = 10.0 ** rng.uniform(-2.0, -0.5) * robot.torque_limits
-        contacts, tasks = (
-            judges.stance(robot, rng.choice([0.2, 0.7])),
-            fb.standing_tasks(robot.standing()),
-        )
+        contacts = judges.stance(robot, rng.choice([0.2, 0.7]))
+        tasks = fb.standing_tasks(robot.standing())
         press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
         controller = fb.WholeBodyController(
             robot,
@@ -210,11 +207,9 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: f
     for seed in range(20):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(2, 8))
-        point, meeting, G = (
-            scale * rng.normal(size=n),
-            int(rng.integers(1, n)),
-            rng.normal(size=(2 * n, n)),
-        )
+        point = scale * rng.normal(size=n)
+        meeting = int(rng.integers(1, n))
+        G = rng.normal(size=(2 * n, n))
         h = G @ point + scale * np.where(np.arange(2 * n) < meeting, 0.0, rng.uniform(size=2 * n))
         G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
         qp = QP(
@@ -362,10 +357,8 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         assert judges.is_feasible(qp, list(range(len(qp.G))))
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         slopes = (qp.H @ found.x, qp.g, qp.A.T @ found.equality_multipliers)
-        steepest, flattest = (
-            max(np.max(np.abs(slope)) for slope in slopes),
-            np.linalg.eigvalsh(qp.reduced.H)[0],
-        )
+        steepest = max(np.max(np.abs(slope)) for slope in slopes)
+        flattest = np.linalg.eigvalsh(qp.reduced.H)[0]
         assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
     assert "active_set" in answered, (
         "DAQP managed: these states no longer try what this test is about"

@@ -189,14 +189,10 @@ HUNG = """<link name="tip"><inertial><mass value="1"/>
         (two_links(iyy=-0.1), ("elbow", "inertia", -0.1)),
         (two_links().replace("0 1 0", "0 0 0"), ("elbow", "axis")),
         (two_links(extra=LIMIT.replace("0.5", "3")), ("elbow", "lower", 3, "upper", 2)),
-        (
-            two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")),
-            ("elbow", "lower", 0, "upper", -2),
-        ),
-        (
-            two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'),
-            ("joint", "base"),
-        ),
+        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")),
+            ("elbow", "lower", 0, "upper", -2)),
+        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'),
+            ("joint", "base")),
         (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), ("link", "base")),
         (two_links(joint="root_joint"), ("joint", "root_joint")),
         (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), ("elbow", "wrist", "mimic", "locked")),
@@ -210,7 +206,7 @@ HUNG = """<link name="tip"><inertial><mass value="1"/>
         (two_links(kind="floating"), ("elbow", 6)),
         ('<robot name="none"><link name="base"/></robot>', ("mass", 0, "inertial")),
     ],
-)
+)  # fmt: skip
 def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(
     urdf: str, named: tuple[str | float, ...]
 ) -> None:

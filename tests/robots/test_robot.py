@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from messages import raises
+from numpy.testing import assert_array_equal
 
 import floatbase as fb
 from floatbase.control import AnalyticController
@@ -149,7 +150,7 @@ def test_a_robot_without_joints_falls_under_every_controller() -> None:
 def test_a_seed_may_be_any_whole_number() -> None:
     robot = judges.load("go2")
     for seed in (3.0, np.int64(3), np.random.default_rng(3)):
-        np.testing.assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
+        assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
 
 
 def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:

@@ -16,9 +16,8 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
-PUSH = (
-    fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),
-)  # N: a fifth of go2's weight for 0.2 s
+# N: a fifth of go2's weight for 0.2 s
+PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)
 
 
 @cache

@@ -103,9 +103,8 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_fre
 def test_welded_links_move_as_one_body_whatever_each_of_them_is(name: str, feet: list[str]) -> None:
     state = fb.load(name, feet=feet, foot_radius=0.02).random_state(0)
     judge = judges.Mujoco(state.robot).move_to(state)
-    size = np.sqrt(
-        state.M.diagonal()
-    )  # each entry relative to its own joints', or a shank's would not show next to the trunk's
+    # each entry relative to its own joints', or a shank's would not show next to the trunk's
+    size = np.sqrt(state.M.diagonal())
     assert np.max(np.abs(state.M - judge.M) / np.outer(size, size)) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 

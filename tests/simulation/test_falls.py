@@ -222,10 +222,8 @@ def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
     sim = fb.Simulation(judges.load("go2"))
     for _ in range(50):
         sim.step(np.full(12, 0.5))
-    state, before = (
-        sim.state,
-        (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()),
-    )
+    state = sim.state
+    before = (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces())
     for touch in (True, False):
         sim.link_collisions = touch
         assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)

@@ -222,8 +222,6 @@ def test_a_sole_beside_a_box_is_parallel_to_the_slope() -> None:
     for foot in robot.feet:
         corners = np.array([state.point(foot.frame, corner) for corner in foot.corners])
         assert np.allclose(corners[:, 2], ground.height(corners[:, :2]), rtol=0.0, atol=1e-8)
-        middle, up = (
-            state.point(foot.frame, foot.middle),
-            state.frame_pose(foot.frame).rotation[:, 2],
-        )
+        middle = state.point(foot.frame, foot.middle)
+        up = state.frame_pose(foot.frame).rotation[:, 2]
         assert np.allclose(up, ground.normal(middle[:2]), rtol=0.0, atol=1e-8)

@@ -11,6 +11,7 @@ from itertools import pairwise
 import judges
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from waiting import until
 
 import floatbase as fb
@@ -82,14 +83,11 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
         ("paused", "", "paused"),
         ("idle", "", "paused"),
         ("fell", "", "fell"),
-        (
-            "controller failed",
-            "no point satisfies all constraints. In conflict:\n  6 × friction.",
-            "controller failed: no point satisfies all constraints",
-        ),
+        ("controller failed", "no point satisfies all constraints. In conflict:\n  6 × friction.",
+            "controller failed: no point satisfies all constraints"),
         ("stopped", "0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
-)
+)  # fmt: skip
 def test_what_stopped_a_run_is_told_in_one_sentence(status: str, reason: str, line: str) -> None:
     message = status_message(status, reason)
     assert message.startswith(line) and not {"\n", "Why", "6"} & {*message, *message.split()}
@@ -177,7 +175,7 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(
         assert fall[0].time[0] == 0.0
         assert [(p.start, *p.force) for p in fall[0].pushes] == [(0.0, *HARD[0])]
         assert fall[-1].time[-1] == falls[0][-1].time[-1]
-        np.testing.assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
+        assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
 
 
 def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
@@ -257,9 +255,8 @@ def test_it_runs_after_a_start_that_crosses_a_close(
             until(lambda count=count: len(slices) > count)  # type: ignore[misc]
         run.close()
         assert run.status == "paused"
-    assert all(
-        late.time[0] > early.time[-1] for early, late in pairwise(slices)
-    )  # one thread at a time
+    # one thread at a time
+    assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))
 
 
 def test_a_status_is_told_as_it_comes(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
@@ -327,7 +324,7 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.close()
     assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
     desired = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
-    np.testing.assert_allclose(slices[1].tau[0], desired, atol=1e-9)
+    assert_allclose(slices[1].tau[0], desired, atol=1e-9)
     run.reset()
     until(lambda: delay.resets == 1)
     run.close()

@@ -59,9 +59,8 @@ def test_a_robot_in_the_air_falls_with_g(name: str) -> None:
         sim.step(np.zeros(sim.robot.d))
     assert sim.time == pytest.approx(0.1)
     assert np.allclose(sim.state.com_velocity, 0.1 * G, atol=1e-6)
-    assert np.allclose(
-        sim.state.com - start.com, 0.005 * G, atol=6e-4
-    )  # half a step of semi-implicit Euler
+    # half a step of semi-implicit Euler
+    assert np.allclose(sim.state.com - start.com, 0.005 * G, atol=6e-4)
     assert not np.any(sim.contact_forces())
 
 
@@ -94,9 +93,8 @@ def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str)
 def test_the_work_of_the_motors_is_what_the_energy_gains(name: str) -> None:
     start, rng = flying(name, seed=2, speed=0.1), np.random.default_rng(0)
     robot = start.robot
-    gentle = (
-        500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
-    )  # N·m for 500 rad/s²: no joint reaches its limits
+    # N·m for 500 rad/s²: no joint reaches its limits
+    gentle = 500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
     tau = rng.uniform(-0.3, 0.3, robot.d) * np.minimum(
         np.minimum(robot.torque_limits, 0.01 * robot.weight), gentle
     )
@@ -146,10 +144,8 @@ def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_betw
         f'<robot name="ball"><link name="ball"><inertial>{inertia}</inertial></link></robot>'
     )
     sim, rng = fb.Simulation(ball), np.random.default_rng(0)
-    starts, durations = (
-        rng.uniform(0.0, 0.02, 40),
-        rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40),
-    )
+    starts = rng.uniform(0.0, 0.02, 40)
+    durations = rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40)
     pushes = [fb.Push(rng.normal(size=3), *times) for times in zip(starts, durations, strict=True)]
     for some in ([pushes[0]], pushes):
         sim.reset(ball.neutral().replace(q=[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0]))

@@ -92,9 +92,8 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
         axis=1,
     )
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
-    assert np.allclose(
-        recovery.static_bound, tips, rtol=1e-3
-    )  # the feet are level to a fraction of a millimetre
+    # the feet are level to a fraction of a millimetre
+    assert np.allclose(recovery.static_bound, tips, rtol=1e-3)
     assert np.all(recovery.static_bound < recovery.pushes)  # a short push can be larger
 
 
@@ -136,10 +135,7 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
     assert {
         path.split("/")[0]
         for path in push_recovery_plots.picture(recovery, theory=False, previous=before)
-    } == {
-        "push_recovery",
-        "previous",
-    }
+    } == {"push_recovery", "previous"}
     other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
     refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
     ends = [

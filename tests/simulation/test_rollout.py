@@ -130,9 +130,8 @@ def test_torques_that_are_no_finite_numbers_end_the_record_and_rows_before_are_k
         if t < 0.0095:
             return Torques(tau)
         tau[3] = number
-        return Torques(
-            tau, np.full(5, np.nan)
-        )  # the torques are reported before forces of another length
+        # the torques are reported before forces of another length
+        return Torques(tau, np.full(5, np.nan))
 
     record = fb.rollout(sim, goes_wild, 0.1)
     assert (record.outcome, len(record)) == ("controller failed", 10)
@@ -392,9 +391,8 @@ def test_a_record_follows_a_stance_that_changes(sim: fb.Simulation) -> None:
     assert record.foot_positions[95, 0, 2] > 0.002
     for i in (20, 70):  # each row has the plan of its own stance
         command = Switching()(record.q[i], record.v[i], float(record.time[i]))
-        present = slice(
-            3 * (4 - len(record.contacts_at(i))), None
-        )  # FL, the first one, is not always in the stance
+        # FL, the first one, is not always in the stance
+        present = slice(3 * (4 - len(record.contacts_at(i))), None)
         assert np.allclose(record.planned[i][present], command.forces, atol=1e-9)
 
 

@@ -69,10 +69,8 @@ def test_after_a_push_of_30_newtons_go2_comes_back() -> None:
 def test_under_the_push_the_ground_pushes_back() -> None:
     record = stood("go2", 2.0, push=True)
     sideways = record.measured.reshape(len(record), 4, 3).sum(axis=1)[:, :2]
-    before, during = (
-        (record.time > 0.2) & (record.time < 0.49),
-        (record.time > 0.53) & (record.time < 0.59),
-    )
+    before = (record.time > 0.2) & (record.time < 0.49)
+    during = (record.time > 0.53) & (record.time < 0.59)
     assert np.abs(sideways[before]).max() < 1.0
     assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
 

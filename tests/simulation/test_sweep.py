@@ -95,9 +95,8 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert said == "(60, 3) i result error\n"
     assert_marked(read_sweep(rows))
-    assert (
-        rows.read_bytes().count(b"\n") == 61
-    )  # no point has two lines, and the incomplete line is gone
+    # no point has two lines, and the incomplete line is gone
+    assert rows.read_bytes().count(b"\n") == 61
     calls = (tmp_path / "calls").read_text().split()
     assert set(calls) == {str(i) for i in range(60)}
     assert len(calls) - 60 <= 2 * 2  # for each of two workers, its present point and the next
@@ -225,10 +224,7 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
     ):
         with raises(InputError, "rows.jsonl", *named):
             fb.sweep(function, grid, file=path, progress=False)
-    for again in (
-        fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False),
-        read_sweep(path),
-    ):
+    for again in (fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False), read_sweep(path)):
         assert_frame_equal(first, again, check_exact=True)
     assert path.read_bytes() == kept
     for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):

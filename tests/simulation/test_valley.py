@@ -124,11 +124,9 @@ def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() 
 
 def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> None:
     robot, (left, right) = judges.load("go2"), sides(30.0)
-    home, contacts, bottom = (
-        robot.standing(),
-        fb.Contacts.points(robot),
-        robot.feet[0].radius / np.cos(np.deg2rad(30.0)),
-    )
+    home = robot.standing()
+    contacts = fb.Contacts.points(robot)
+    bottom = robot.feet[0].radius / np.cos(np.deg2rad(30.0))
     centres = {
         foot.frame: home.frame_pose(foot.frame).translation * [1, 0, 0] + [0, 0, bottom]
         for foot in robot.feet

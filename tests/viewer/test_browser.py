@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from waiting import until
 
 from floatbase.dynamics import Contacts
@@ -34,9 +35,7 @@ def test_a_page_has_what_is_shown(
     assert tree["robot"] == 13
     assert tree["measured"] == tree["cone"] == tree["patch"] == 4
     for name, position in zip(contacts.point_names, contacts.positions(standing), strict=True):
-        np.testing.assert_allclose(
-            page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5
-        )
+        assert_allclose(page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5)
     image = picture(page, "go2_standing")
     for colour in (MEASURED, CALM, WARNING, ALARM, COM):
         assert hue_pixels(image, colour) > 100
@@ -116,9 +115,8 @@ def test_controls_have_any_name_and_the_same_values_in_every_page(
         assert one.evaluate("window.hit") is None
     page.reload()
     page.wait_for_function(f"window.viewer && {now} == '{present}'")
-    viewer.add_slider(
-        NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0
-    )  # made again, as a cell that is run again does
+    # made again, as a cell that is run again does
+    viewer.add_slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)
     other.wait_for_function(f"{VALUES}[0] == 1")
     other.close()
     picture(page, "controls")

@@ -11,6 +11,7 @@ import pytest
 from browsers import SCREENSHOTS
 from matplotlib.colors import to_hex
 from messages import refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.behaviours import Gait, StepPlan, Walk, capture_point
@@ -74,23 +75,22 @@ def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, W
     assert set(look) == {"dcm", "zmp"} | {f"foothold/{f}" for f in walk.footholds} | {
         f"swing/{f}" for f in swinging
     }
-    np.testing.assert_allclose(
+    assert_allclose(
         look["dcm"].matrix[:2, 3],
         capture_point(state.com, state.com_velocity, walk.omega),
         atol=ROUNDED,
     )
-    np.testing.assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
+    assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
     for foot, place in walk.footholds.items():  # go2's frames are in the middles of its balls
         ring = look[f"foothold/{foot}"]
-        np.testing.assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
+        assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
         assert (
             0.0
             < ring.matrix[2, 3] - (place[2] - run.robot.feet[0].radius)
             < 0.01 * viewer.painter.size
         )
-        assert (
-            np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
-        )  # seen around the foot
+        # seen around the foot
+        assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
 
 
 def test_a_line_follows_the_swing_to_its_foothold(
@@ -103,12 +103,12 @@ def test_a_line_follows_the_swing_to_its_foothold(
         ground = [0.0, 0.0, -run.robot.feet[0].radius]
         size = np.linalg.norm(path.end - path.start) + path.height
         for point, at in ((line[0], path.start), (line[-1], path.end)):
-            np.testing.assert_allclose(point, at + ground, atol=POINTS * size)
+            assert_allclose(point, at + ground, atol=POINTS * size)
         middle, *_ = path((path.lift_off + path.touchdown) / 2.0)
         # feet touch down at slightly different heights, so the curve leans by the difference of its
         # ends
         leans = abs(path.end[2] - path.start[2]) + POINTS * size
-        np.testing.assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
+        assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
 
 
 def test_a_swing_with_a_new_target_costs_no_new_shape(
@@ -117,9 +117,8 @@ def test_a_swing_with_a_new_target_costs_no_new_shape(
     run, walk = walked
     viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final))
     shapes = {path: item.shape for path, item in viewer.renderer.picture.items()}
-    other = run.state(
-        -20
-    )  # the capture point is elsewhere, and so the picture of the same step differs
+    # the capture point is elsewhere, and so the picture of the same step differs
+    other = run.state(-20)
     viewer.show(
         other,
         walk.contacts,
@@ -146,9 +145,9 @@ def test_a_stored_step_is_drawn_as_it_was_planned(
     assert {path for path in look if path.startswith("swing/")} == {
         f"swing/{foot}" for foot in step.swings
     }
-    np.testing.assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
+    assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
     for foot, place in step.footholds.items():
-        np.testing.assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
+        assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
 def test_a_walk_has_no_marks_before_its_first_control_step(
@@ -169,13 +168,11 @@ def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
         outline = vertices(look[f"foothold/{foot}"])
         corners = run.robot.feet[0].corners[:, :2]
         middle = outline[:, :2].mean(axis=0)
-        np.testing.assert_allclose(
-            middle, walk.footholds[foot][:2], atol=1e-3
-        )  # m: the sole's frame is in its middle
+        # m: the sole's frame is in its middle
+        assert_allclose(middle, walk.footholds[foot][:2], atol=1e-3)
         radii = np.linalg.norm(outline[:4, :2] - middle, axis=1)
-        np.testing.assert_allclose(
-            radii, np.linalg.norm(corners, axis=1), atol=1e-3
-        )  # vertices are 16-bit numbers
+        # vertices are 16-bit numbers
+        assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)
         x, y = look[f"foothold/{foot}"].matrix[:2, 0]
         left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
         base = run.final.frame_pose("base").rotation
@@ -251,10 +248,8 @@ def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Roll
         for clip in command["animations"]
         for track in clip["clip"]["tracks"]
     }
-    first, second = (
-        walk.history[1],
-        walk.history[2],
-    )  # after standing: one pair lifts, then the other
+    # after standing: one pair lifts, then the other
+    first, second = (walk.history[1], walk.history[2])
     for foot in first.swings:
         track = tracks[f"/meshcat/swing/{foot}", ".visible"]
         times, seen = np.array(track["times"]), np.array(track["values"])
@@ -276,12 +271,12 @@ def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Roll
 def test_a_followed_path_is_smooth_without_the_sway_of_steps() -> None:
     t = np.linspace(0.0, 4.0, 121)
     straight = np.stack([0.3 * t, -0.1 * t, np.full_like(t, 0.3)], axis=1)
-    np.testing.assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
+    assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
     swayed = straight + 0.02 * np.stack([0.0 * t, np.sin(2.0 * np.pi * t / 0.5), 0.0 * t], axis=1)
     left = recording.smoothed(t, swayed) - straight
     assert np.abs(left[30:-30]).max() < 0.02 / 100.0
     short = straight[:2]
-    np.testing.assert_array_equal(recording.smoothed(t[:2], short), short)
+    assert_array_equal(recording.smoothed(t[:2], short), short)
     refused(lambda: recording.smoothed(t, straight[:3]), InputError, 121, 3)
 
 
@@ -292,14 +287,11 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     lines = vertices(viewer.renderer.picture["ground"])
     low, high = lines.min(axis=0), lines.max(axis=0)
     assert (low[:2] < q[:2] - 3.0).all() and (high[:2] > q[:2] + 3.0).all()
-    np.testing.assert_allclose(
-        lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3
-    )  # the same lines
+    # the same lines
+    assert_allclose(lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3)
 
 
-def test_a_gait_diagram_shows_stances_and_measured_contacts(
-    walked: tuple[Rollout, Walk],
-) -> None:
+def test_a_gait_diagram_shows_stances_and_measured_contacts(walked: tuple[Rollout, Walk]) -> None:
     run, _ = walked
     axis = plots.plot_gait(run)
     names = [label.get_text() for label in axis.get_yticklabels()]
@@ -309,9 +301,9 @@ def test_a_gait_diagram_shows_stances_and_measured_contacts(
         t = (run.time[:-1] + run.time[1:]) / 2.0
         barred = ((t[:, None] > spans[:, 0]) & (t[:, None] < spans[:, 1])).any(axis=1)
         stands = [name in run.contacts_at(row).names for row in range(len(t))]
-        np.testing.assert_array_equal(barred, stands)
+        assert_array_equal(barred, stands)
         loaded = np.isfinite(np.asarray(axis.lines[i].get_ydata(), dtype=float))
-        np.testing.assert_array_equal(loaded, run.force(name)[:, 2] > MIN_LOAD * run.robot.weight)
+        assert_array_equal(loaded, run.force(name)[:, 2] > MIN_LOAD * run.robot.weight)
         assert 0.02 < np.mean(~loaded) < 0.8  # it was in the air, and stood
     assert {to_hex(line.get_color()).upper() for line in axis.lines} == {hex_code(MEASURED)}
     assert "push" in [text.get_text() for text in axis.get_legend().get_texts()]
@@ -328,7 +320,7 @@ def test_normal_forces_are_plotted_for_each_foot(biped: tuple[Rollout, Walk]) ->
     for axis, name in zip(axes, run.contacts.names, strict=True):
         assert re.match(name, axis.get_ylabel())
         planned, measured, _ = (np.asarray(line.get_ydata(), dtype=float) for line in axis.lines)
-        np.testing.assert_allclose(planned, run.force(name, "planned")[:, 2])
-        np.testing.assert_allclose(measured, run.force(name)[:, 2])
+        assert_allclose(planned, run.force(name, "planned")[:, 2])
+        assert_allclose(measured, run.force(name)[:, 2])
     assert axes[1].get_legend() is None and axes[0].get_legend() is not None
     plt.close("all")

@@ -63,11 +63,9 @@ def test_a_killed_browser_leaves_nothing_behind(
 ) -> None:
     viewer.show(standing, contacts, forces)
     address = viewer.url
-    threads, files, entries = (
-        threading.active_count(),
-        len(os.listdir("/proc/self/fd")),
-        len(viewer.window.scene),
-    )
+    threads = threading.active_count()
+    files = len(os.listdir("/proc/self/fd"))
+    entries = len(viewer.window.scene)
     browser = subprocess.Popen(
         [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", address],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from messages import refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.control import Command, JointLimits
@@ -93,8 +94,8 @@ def test_a_ring_is_around_the_axis_of_its_joint(name: str) -> None:
         before = state.joint_transforms[index]
         axis = pin.log3(turned[:3, :3] @ before[:3, :3].T) / 0.1
         size = np.linalg.norm(matrix[:3, 2])
-        np.testing.assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
-        np.testing.assert_allclose(matrix[:3, 2] / size, axis, atol=1e-6)
+        assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
+        assert_allclose(matrix[:3, 2] / size, axis, atol=1e-6)
     with_view.close()
 
 
@@ -146,7 +147,7 @@ def test_rings_appear_in_a_recording_when_limits_are_active(
         times, visible = moving[f"active_limit/{joint}", ".visible"]
         rows = np.round(times / 1e-3).astype(int)
         expected = [joint in owners(commands[i]) for i in rows]
-        np.testing.assert_array_equal(visible[:, 0].astype(bool), expected)
+        assert_array_equal(visible[:, 0].astype(bool), expected)
         hidden += expected.count(False)
     assert hidden
 
@@ -154,7 +155,7 @@ def test_rings_appear_in_a_recording_when_limits_are_active(
 def test_a_rollout_has_the_planned_accelerations(
     go2: Robot, stretched: fb.Rollout, commands: list[Command]
 ) -> None:
-    np.testing.assert_array_equal(stretched.planned_qdd, [command.qdd for command in commands])
+    assert_array_equal(stretched.planned_qdd, [command.qdd for command in commands])
     torques = SimpleNamespace(tau=np.zeros(go2.d))
     run = fb.rollout(fb.Simulation(go2), lambda q, v, t: torques, 0.01)
     assert run.planned_qdd is not None and run.planned_qdd.shape == (len(run), go2.nv)

@@ -14,6 +14,7 @@ from threading import Event
 import numpy as np
 import pytest
 from messages import missing
+from numpy.testing import assert_allclose
 from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_connected
@@ -194,7 +195,7 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
             arrow = page.wait_for_function(seen, timeout=4000).json_value()
             break
     assert arrow is not None
-    np.testing.assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
+    assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
     picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
     playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can

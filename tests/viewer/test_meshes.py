@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import catalogue, load, load_urdf, with_floating_base
@@ -50,8 +51,8 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
     assert {mesh.joint for mesh in light} == {piece.joint for piece in pieces}
     for mesh in light:
         own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
-        np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
-        np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
+        assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
+        assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
 
 
 def test_light_meshes_reach_down_to_the_contacts() -> None:
@@ -111,9 +112,8 @@ def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
         assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
     ankle = re.sub('"FL_foot_joint"\\s*type="fixed"', '"FL_foot_joint" type="continuous"', urdf)
     walker = load_urdf(re.sub('<axis\\s*xyz="0 0 0"', '<axis xyz="0 1 0"', ankle))
-    assert walker.model.getJointId("FL_foot_joint") in {
-        mesh.joint for mesh in robot_meshes(walker)
-    }  # its foot turns
+    # its foot turns
+    assert walker.model.getJointId("FL_foot_joint") in {mesh.joint for mesh in robot_meshes(walker)}
     other = load_urdf(MESHES.parent / "models" / "cart.urdf", name="go2")
     assert len(robot_meshes(other)) < len(light)
 
@@ -125,7 +125,7 @@ def test_the_base_of_a_floating_arm_moves_with_it() -> None:
     free = {mesh.joint: mesh for mesh in robot_meshes(loose)}
     assert set(free) == {joint + 1 for joint in bolted}
     for joint, mesh in bolted.items():
-        np.testing.assert_array_equal(free[joint + 1].vertices, mesh.vertices)
+        assert_array_equal(free[joint + 1].vertices, mesh.vertices)
 
 
 def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
@@ -138,7 +138,7 @@ def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
     )
     home, whole = arm.standing(), robot_meshes(arm)[-1]
     tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
-    np.testing.assert_allclose(
+    assert_allclose(
         tip,
         home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3),
         atol=1e-5,

@@ -14,13 +14,7 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
-from floatbase.playground import (
-    CHALLENGES,
-    Playground,
-    Settings,
-    mean_force_error,
-    playground,
-)
+from floatbase.playground import CHALLENGES, Playground, Settings, mean_force_error, playground
 from floatbase.robots import Robot
 
 from .looks import picture
@@ -276,9 +270,7 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
-def test_an_unknown_setting_is_refused_and_the_run_continues(
-    field: Playground,
-) -> None:
+def test_an_unknown_setting_is_refused_and_the_run_continues(field: Playground) -> None:
     with raises(UnknownNameError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
@@ -314,18 +306,12 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
     for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
         page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-        until(
-            lambda: field.session.settings != Settings(),
-            lambda: page.wait_for_timeout(20),
-        )
+        until(lambda: field.session.settings != Settings(), lambda: page.wait_for_timeout(20))
         if keys:
             page.keyboard.press(keys)
         else:
             page.locator("#panel button", has_text="undo").click()
-        until(
-            lambda: field.session.settings == Settings(),
-            lambda: page.wait_for_timeout(20),
-        )
+        until(lambda: field.session.settings == Settings(), lambda: page.wait_for_timeout(20))
         page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
 
 
@@ -434,6 +420,5 @@ def test_the_actual_slope_is_drawn(field: Playground) -> None:
             field.session.settings.slope == (0.0, 20.0) and field.view.painter.ground is not None
         )
     )
-    until(
-        lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3
-    )  # sin 20°: it rises forwards
+    # sin 20°: it rises forwards
+    until(lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3)

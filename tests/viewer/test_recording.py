@@ -12,6 +12,7 @@ import pytest
 import umsgpack
 from browsers import SCREENSHOTS
 from messages import refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.dynamics import Contacts, LinearConstraint
@@ -115,9 +116,9 @@ def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -
     moving = tracks(viewer)
     times, positions = moving["robot/root_joint", ".position"]
     rows = np.round(times / 1e-3).astype(int)
-    np.testing.assert_allclose(positions, rollout.q[rows, :3], atol=1e-5)
+    assert_allclose(positions, rollout.q[rows, :3], atol=1e-5)
     _, scales = moving["measured/FL_foot", ".scale"]
-    np.testing.assert_allclose(
+    assert_allclose(
         scales[:, 2], viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1), rtol=1e-4
     )
     assert times[-1] == pytest.approx(rollout.time[-1])
@@ -130,22 +131,18 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     moving = tracks(viewer)
     times, colours = moving["cone/FL_foot/surface", "shape.material.color"]
     slips = (times > 0.8) & (times < 1.2)
-    np.testing.assert_allclose(
-        colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6
-    )
-    np.testing.assert_allclose(
-        colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6
-    )
+    assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
+    assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
     times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
-    np.testing.assert_allclose(
+    assert_allclose(
         faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6
     )
     legend = [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
     assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
-    np.testing.assert_array_equal(visible[:, 0], times <= 1.5)
+    assert_array_equal(visible[:, 0], times <= 1.5)
     times, pushed = moving["push", ".visible"]
-    np.testing.assert_array_equal(pushed[:, 0], (times >= 0.3 - 1e-6) & (times < 0.5 - 1e-6))
+    assert_array_equal(pushed[:, 0], (times >= 0.3 - 1e-6) & (times < 0.5 - 1e-6))
 
 
 def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, go2: Robot) -> None:
@@ -159,7 +156,7 @@ def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, g
     moving = tracks(viewer)
     for part in ("cone/FL_foot/surface", "patch/FL_foot"):
         times, visible = moving[part, ".visible"]
-        np.testing.assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
+        assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
     assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(
         moving
     )
@@ -275,7 +272,7 @@ def test_a_saved_animation_plays_from_disk_without_network(
         where = inside.evaluate(
             "viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.toArray()"
         )
-        np.testing.assert_allclose(where, rollout.q[250, :3], atol=1e-3)
+        assert_allclose(where, rollout.q[250, :3], atol=1e-3)
     page.context.set_offline(False)
     inside.wait_for_function("!viewer.needs_render")
     picture(page, "saved_animation")
@@ -343,9 +340,8 @@ def test_a_busy_page_shows_the_second_record_as_it_is(
     settle(page)
     page.evaluate("viewer.animator.seek(1.0)")
     page.evaluate(WITHHOLD)
-    viewer.window.put(
-        [protocol.set_property("/Grid", "visible", True)]
-    )  # the page is busy with this one
+    # the page is busy with this one
+    viewer.window.put([protocol.set_property("/Grid", "visible", True)])
     page.wait_for_function("Boolean(window.release)")
     viewer.play_pictures([0, 1], leaning(viewer, standing, contacts, [0.9, 0.9]), title="second")
     page.evaluate("release()")
@@ -356,7 +352,7 @@ def test_a_busy_page_shows_the_second_record_as_it_is(
           .map((node) => [node.children.concat(node).find((o) => o.material), node.scale.z])
           .map(([drawn, length]) => [drawn.material.color.toArray(), length])"""
     )
-    np.testing.assert_allclose(cone[0], ALARM, atol=1e-3)
+    assert_allclose(cone[0], ALARM, atol=1e-3)
     length = viewer.scale * 0.25 * viewer.robot.weight * np.hypot(0.9, 1.0)
     assert arrow[1] == pytest.approx(length, rel=1e-3)
 
@@ -373,7 +369,7 @@ def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
     ]  # fmt: skip
     assert all(MEASURED in [line.get_color() for line in axis.lines] for axis in figure.axes[1:3])
     forces = plots.plot_forces(rollout)
-    np.testing.assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
+    assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     figure.savefig(SCREENSHOTS / "plots.png")
     forces.figure.savefig(SCREENSHOTS / "plot_forces.png")

@@ -12,18 +12,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from messages import raises, refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import Robot, State, catalogue, load
 from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
-from floatbase.viewer.scene.colours import (
-    ALARM,
-    CALM,
-    IDLE,
-    WARNING,
-)
+from floatbase.viewer.scene.colours import ALARM, CALM, IDLE, WARNING
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -60,9 +56,7 @@ def test_every_joint_is_where_the_state_says(viewer: Viewer, go2: Robot) -> None
     placed = matrices(viewer, "/meshcat/robot/")
     assert len(placed) == go2.model.njoints - 1
     for name, matrix in placed.items():
-        np.testing.assert_allclose(
-            matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6
-        )
+        assert_allclose(matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6)
 
 
 @pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
@@ -76,10 +70,10 @@ def test_arrows_start_at_contacts(
         for matrix, force, position in zip(
             arrows.values(), forces, contacts.positions(standing), strict=True
         ):
-            np.testing.assert_allclose(
+            assert_allclose(
                 matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6
             )
-            np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+            assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
@@ -94,10 +88,10 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
     for matrix, position in zip(cones.values(), contacts.positions(standing), strict=True):
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across / along == pytest.approx(mu, rel=1e-5)
-        np.testing.assert_allclose(
+        assert_allclose(
             matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6
         )
-        np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+        assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
 def test_the_colour_of_a_cone_shows_where_its_force_is(
@@ -133,9 +127,8 @@ def test_a_cone_without_a_force_is_grey_and_faint(
     viewer.show(standing, contacts)
     assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
     up = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
-    viewer.show(
-        standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]]
-    )  # the second in the air, the third all but
+    # the second in the air, the third all but
+    viewer.show(standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]])
     assert [looks()[name][:3] for name in names] == [list(CALM), list(IDLE), list(IDLE), list(CALM)]
     assert looks()[names[1]][3] < 0.5 * looks()[names[0]][3]
     viewer.show(standing, contacts, forces=0 * up, planned=up)  # what is measured counts
@@ -160,7 +153,7 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(
     state, contacts = State(go2, q), Contacts.points(go2, normals=slope)
     viewer.show(state, contacts, support=True)
     normal, point = normal_and_point(viewer)
-    np.testing.assert_allclose(normal, slope, atol=1e-6)
+    assert_allclose(normal, slope, atol=1e-6)
     for position in (
         *contacts.positions(state),
         matrices(viewer, "/meshcat/com/")["projection"][:3, 3],
@@ -185,15 +178,14 @@ def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing
         Contacts.points(go2, normals=[1, 0, 0]),
     ):
         viewer.show(standing, contacts)
-        np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
-    viewer.show(
-        standing, Contacts.points(go2, normals=slope)
-    )  # a slope that the feet do not stand on
-    np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+        assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+    # a slope that the feet do not stand on
+    viewer.show(standing, Contacts.points(go2, normals=slope))
+    assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
     viewer.close()
     viewer = Viewer(go2, ground=slope)
     viewer.show(standing, Contacts.points(go2))
-    np.testing.assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
+    assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
     viewer.close()
 
 
@@ -206,10 +198,10 @@ def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> 
     points = item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
     points = np.frombuffer(points, "<f4").reshape(-1, 3)
     clearances = ground.clearances(points)
-    np.testing.assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
+    assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
     assert np.all(np.sum(clearances < 1e-5, axis=0) > 1000)
     shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
-    np.testing.assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
+    assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
     assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
     viewer.close()
     with raises(InputError, "ground"):
@@ -299,9 +291,8 @@ def test_a_change_sends_only_what_changed(
     viewer.show(standing, contacts, forces=forces)
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
-    assert (
-        viewer.window.scene.newest - newest == 4 + 2
-    )  # four arrows, a cone that is no longer on its surface, and its entry in the legend
+    # four arrows, a cone that is no longer on its surface, and its entry in the legend
+    assert viewer.window.scene.newest - newest == 4 + 2
 
 
 # the same few paths in many spellings, some below others
@@ -326,9 +317,7 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
 
 
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
-def test_a_scene_shows_the_last_picture_however_paths_are_spelt(
-    pictures: list[Picture],
-) -> None:
+def test_a_scene_shows_the_last_picture_however_paths_are_spelt(pictures: list[Picture]) -> None:
     assert scene_after(pictures) == scene_after(pictures[-1:])
 
 
@@ -476,8 +465,8 @@ def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(
     state = go2.random_state(1)
     viewer.show(state)
     drawn = matrices(viewer, "/meshcat/com/")
-    np.testing.assert_allclose(drawn["ball"][:3, 3], state.com, atol=1e-6)
-    np.testing.assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
+    assert_allclose(drawn["ball"][:3, 3], state.com, atol=1e-6)
+    assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
 
 
 def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> None:

@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from messages import raises, refused
+from numpy.testing import assert_allclose
 
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
@@ -21,13 +22,7 @@ from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer, markers, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene import geometry
-from floatbase.viewer.scene.colours import (
-    CONE,
-    GREYS,
-    MEASURED,
-    PLANNED,
-    hex_code,
-)
+from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, PLANNED, hex_code
 
 
 @pytest.mark.parametrize(
@@ -53,8 +48,8 @@ def test_closed_meshes_face_outwards_and_have_their_volume(
 )
 def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
     turned = geometry.rotation_with_z_axis(direction)
-    np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
-    np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
+    assert_allclose(turned[:, 2], direction, atol=1e-12)
+    assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turned) == pytest.approx(1.0)
 
 
@@ -62,7 +57,7 @@ def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
     moment = np.array([0.1, -0.2, 0.2])
     item = markers.curled_arrow([1.0, 2.0, 3.0], moment)
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
-    np.testing.assert_allclose(item.matrix[:3, 2], moment)
+    assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
 
 
@@ -105,7 +100,7 @@ def test_invalid_shapes_are_refused_by_name(case: tuple[Any, ...]) -> None:
 
 def test_a_push_ends_where_it_acts() -> None:
     item = markers.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
-    np.testing.assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
+    assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
 
 
 def test_two_points_have_no_support_polygon() -> None:
@@ -120,14 +115,14 @@ def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
     start, quarter = (
         props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2)
     )
-    np.testing.assert_allclose(start, [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
+    assert_allclose(start, [0, 0, 1], atol=1e-12)
+    assert_allclose(quarter, [1, 0, 0], atol=1e-12)
 
 
 def test_a_turntable_turns_to_the_left_below_its_given_top() -> None:
     table = props.turntable([1, 0, 0.5], 0.4, np.pi / 2).matrix
-    np.testing.assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
-    np.testing.assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
+    assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
+    assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
 
 
 def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> None:
@@ -196,7 +191,7 @@ def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
     wrenches = wrench_set(standing, contacts)
     forces = wrenches.max_horizontal_forces(8)[1]
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
-    np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
+    assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
         "maximum horizontal force"
     ]
@@ -210,10 +205,10 @@ def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
     } and near.keys() == far.keys()
     ring = next(path for path in near if "label" in path)
     ends = [picture[ring].matrix[:2, 3] - standing.com[:2] for picture in (near, far)]
-    np.testing.assert_allclose(
+    assert_allclose(
         np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002])
     )
-    np.testing.assert_allclose(near["horizontal_force/line"].matrix[:2, 3], standing.com[:2])
+    assert_allclose(near["horizontal_force/line"].matrix[:2, 3], standing.com[:2])
     viewer.show(standing, contacts, extra=near)
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
@@ -259,19 +254,15 @@ def test_multipliers_are_at_the_middle_of_their_facets(
         arm = picture[f"multiplier/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
             rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
-            np.testing.assert_allclose(
+            assert_allclose(
                 arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9
             )
         else:
-            np.testing.assert_allclose(arm, height * normal, atol=1e-9)
+            assert_allclose(arm, height * normal, atol=1e-9)
         assert float(picture[f"multiplier/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [
-        hex_code(viewer.painter.text_colour),
-        "multiplier (shadow price)",
-        "patch",
-    ] in legend
+    assert [hex_code(viewer.painter.text_colour), "multiplier (shadow price)", "patch"] in legend
     with raises(InputError, "contacts", "solution"):
         viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
@@ -292,10 +283,10 @@ def test_figure_1_adds_up() -> None:
     right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
     drawn = right.renderer.picture
     feet = [item.matrix[:3, 2] for path, item in drawn.items() if path.startswith("measured/")]
-    np.testing.assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
+    assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
     force, ring = left.renderer.picture["f/wall"].matrix, left.renderer.picture["f/base"].matrix
     balance = -np.cross(force[:3, 3], force[:3, 2])
-    np.testing.assert_allclose(
+    assert_allclose(
         ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9
     )
     right.close(), left.close()

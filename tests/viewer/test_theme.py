@@ -10,13 +10,7 @@ import pytest
 from floatbase import Contacts
 from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
-from floatbase.viewer.scene.colours import (
-    BACKGROUNDS,
-    COM,
-    DARK_SHADES,
-    MEASURED,
-    hex_code,
-)
+from floatbase.viewer.scene.colours import BACKGROUNDS, COM, DARK_SHADES, MEASURED, hex_code
 
 from .looks import picture
 

@@ -83,9 +83,8 @@ def test_the_image_goes_with_a_robot_that_is_followed(
     viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
     at_home = image(viewer.show(standing))
     q = standing.q.copy()
-    q[:3] += 2.5 * np.array(
-        [np.cos(slope), 0.0, -np.sin(slope)]
-    )  # a whole jump of the grid, down the slope
+    # a whole jump of the grid, down the slope
+    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
     viewer.close()

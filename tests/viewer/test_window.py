@@ -313,9 +313,8 @@ def test_an_interrupt_never_leaves_a_scene_locked(
     with interrupting() as interrupted:
         while count < 200 and time.monotonic() < stop:
             count += interrupted(lambda: use(scene), 1e-4)
-            reader = threading.Thread(
-                target=scene.commands, daemon=True
-            )  # waits for ever where the lock is held
+            # waits for ever where the lock is held
+            reader = threading.Thread(target=scene.commands, daemon=True)
             reader.start()
             reader.join(PATIENCE)
             assert not reader.is_alive(), f"locked after {count} interrupts"
