@@ -111,6 +111,13 @@ def difference(
     return float(np.max(np.abs(found.tau - expected.tau)))
 
 
+def largest_difference(
+    both: tuple[fb.WholeBodyController, fb.WholeBodyController], at: list[State], t: float = 0.0
+) -> float:
+    """Largest `difference` [N·m] at these states."""
+    return max(difference(*both, state, t) for state in at)
+
+
 def agreement(robot: Robot) -> float:
     """N·m that may lie between two ways to the same torques."""
     return AGREEMENT * float(np.max(robot.torque_limits[np.isfinite(robot.torque_limits)]))

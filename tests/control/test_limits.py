@@ -122,9 +122,9 @@ def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
         assert normal["RL_foot"] >= 5.0 * t - 1e-6
         assert t == 0.0 or "FL_foot largest normal force" in command.active
         assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
-        assert max(
-            judges.difference(*both, state, t) for state in judges.near_and_far("go2", 3)
-        ) < judges.agreement(robot)
+        assert judges.largest_difference(both, judges.near_and_far("go2", 3), t) < judges.agreement(
+            robot
+        )
     row = next(row for row in command.active if row.endswith("largest normal force"))
     assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
 
@@ -136,9 +136,9 @@ def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> No
     both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
     normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
     assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
-    assert max(
-        judges.difference(*both, state) for state in judges.near_and_far("talos", 3)
-    ) < judges.agreement(robot)
+    assert judges.largest_difference(both, judges.near_and_far("talos", 3)) < judges.agreement(
+        robot
+    )
 
 
 class Heel(PointContact):

@@ -21,6 +21,7 @@ GO2, SOLO = judges.load("go2"), judges.load("solo12")
 CONTACTS = fb.Contacts.points(GO2)
 STATE = GO2.standing()
 UP = [0.0, 0.0, 1.0]
+NAN = np.full(18, np.nan)
 
 
 class Own:
@@ -91,8 +92,8 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(constant(np.ones(3))), "residual", "mine", "ndarray"),
         (lambda: controller(constant(None)), "residual", "mine", "NoneType"),
         (lambda: controller(own(lambda eom: None)), "residual", "mine", "eom", "t"),
-        (lambda: controller(constant(fb.Affine(np.ones(18), [0.0]))), "mine", "A", 18),
-        (lambda: controller(constant(fb.Affine(np.eye(18), np.full(18, np.nan)))), "mine", "b", np.nan),
+        (lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))), "mine", "A", 18),
+        (lambda: controller(own(lambda eom, t: fb.Affine(np.eye(18), NAN))), "mine", "b", np.nan),
         (lambda: controller(Own(block="foo")), "mine", "block", "foo", "qdd", "tau", "forces"),
         (lambda: controller(Own(weight=-1.0)), "weight", "mine", -1),
         (lambda: controller(Own()), "residual", "mine", "qdd", 3, 18),

@@ -116,9 +116,7 @@ def test_user_defined_tasks_on_torques_and_forces() -> None:
         fb.TorqueTask(),
     ]
     both = judges.pair(robot, judges.stance(robot), tasks)
-    assert max(
-        judges.difference(*both, state) for state in judges.near_and_far("go2", 6)
-    ) < judges.agreement(robot)
+    assert judges.largest_difference(both, judges.near_and_far("go2", 6)) < judges.agreement(robot)
 
 
 @dataclass
@@ -445,9 +443,7 @@ def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
     robot = judges.load("go2")
     held = Coupled("held", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
     both = judges.pair(robot, judges.stance(robot).without("FL_foot") + fb.Contacts([held]))
-    assert max(
-        judges.difference(*both, state) for state in judges.near_and_far("go2", 4)
-    ) < judges.agreement(robot)
+    assert judges.largest_difference(both, judges.near_and_far("go2", 4)) < judges.agreement(robot)
 
 
 class Reuses(PointContact):
@@ -506,6 +502,6 @@ def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones(
     tasks = list(fb.standing_tasks(robot.standing()))
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
         both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
-        assert max(
-            judges.difference(*both, state) for state in judges.near_and_far("go2", 5)
-        ) < judges.agreement(robot)
+        assert judges.largest_difference(both, judges.near_and_far("go2", 5)) < judges.agreement(
+            robot
+        )
