@@ -14,7 +14,6 @@ from dataclasses import is_dataclass
 from datetime import datetime
 from functools import cache, partial
 from importlib import import_module
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -84,7 +83,7 @@ CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
 
 
 @pytest.mark.parametrize("check", CHECKS)
-def test_each_kind_of_check_refuses_what_is_no_such_thing(check: str) -> None:
+def test_each_kind_of_check_refuses_what_is_no_such_thing(check):
     call, meant = CHECKS[check]
     answers = {label: answer(partial(call, wrong)) for label, wrong in WRONG.items()}
     assert {label: found for label, found in answers.items() if found and label not in meant} == {}
@@ -268,9 +267,7 @@ def answer(call: Callable[[], object]) -> str | None:
 
 
 @pytest.mark.parametrize("package", [package or "floatbase" for package in PACKAGES])
-def test_wrong_arguments_raise_an_error_of_the_package(
-    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_arguments_raise_an_error_of_the_package(package, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     faults = {}
     for callee in callees()[package]:
@@ -288,8 +285,8 @@ SAMPLES = 300
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_sample_of_calls_with_any_wrong_argument_raises_no_other_error(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    seed, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(seed)  # other calls with --seed
     every = [callee for package in callees().values() for callee in package]

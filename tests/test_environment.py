@@ -13,7 +13,7 @@ HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", 
 IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
-def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path: Path) -> None:
+def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path):
     pip = [
         sys.executable,
         "-m",
@@ -45,7 +45,7 @@ def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path
     }
 
 
-def test_importing_floatbase_is_light_and_quick() -> None:
+def test_importing_floatbase_is_light_and_quick():
     code = (
         "import json, sys, time; start = time.process_time(); import floatbase; took = "
         "time.process_time() - start; "

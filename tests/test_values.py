@@ -83,7 +83,7 @@ def same(a: Any, b: Any) -> bool:
     )
 
 
-def test_every_public_class_is_tested_here_or_no_value() -> None:
+def test_every_public_class_is_tested_here_or_no_value():
     classes = {
         name: found
         for package in packages()
@@ -102,7 +102,7 @@ def test_every_public_class_is_tested_here_or_no_value() -> None:
     ] == []
 
 
-def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
+def test_no_array_and_no_attribute_of_a_value_can_be_written_to():
     robot, state, contacts = values()["Robot"], values()["State"], values()["Contacts"]
     own = {
         "AnalyticController": AnalyticController(robot, contacts, state),
@@ -126,7 +126,7 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
 @pytest.mark.parametrize(
     "copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))]
 )
-def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> None:
+def test_copies_of_values_hold_the_same_and_are_read_only_too(copied):
     robot = values()["Robot"]
     for kind, value in values().items():
         other = copied(value)
@@ -142,7 +142,7 @@ def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> No
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
-def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
+def test_a_copy_of_a_simulation_goes_on_like_the_original(copied):
     robot = values()["Robot"]
     state = values()["State"]
     contacts = values()["Contacts"]
@@ -167,7 +167,7 @@ def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
-def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: Any) -> None:
+def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied):
     robot = values()["Robot"]
     still, first, second = np.zeros(12), np.arange(12.0), -np.arange(12.0)
     for late in (Delay(robot, 2e-3), FirstOrderLag(robot, 10.0)):
@@ -178,7 +178,7 @@ def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: A
         assert np.ptp(steps[0], axis=0).max() > 0.5
 
 
-def test_values_come_back_from_another_process() -> None:
+def test_values_come_back_from_another_process():
     robot, control = values()["Robot"], controller()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         back = dict(zip(values(), pool.map(copy.copy, values().values()), strict=True))
@@ -189,7 +189,7 @@ def test_values_come_back_from_another_process() -> None:
     fb.Simulation(robot).reset(run.final)  # a state of the same robot
 
 
-def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same() -> None:
+def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same():
     """A lock would be held for ever in a process that is forked meanwhile."""
     started, go_on = threading.Event(), threading.Event()
 
@@ -210,7 +210,7 @@ def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_
         assert other.result() is normals is contacts.normals
 
 
-def test_what_a_value_returns_cannot_be_written_to() -> None:
+def test_what_a_value_returns_cannot_be_written_to():
     state, contacts, command = values()["State"], values()["Contacts"], values()["Command"]
     wrenches = values()["WrenchSet"]
     answers = {

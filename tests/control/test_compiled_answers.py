@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-from pathlib import Path
 from typing import Any
 
 import judges
@@ -115,7 +114,7 @@ PROBLEMS: dict[str, tuple[Any, ...]] = {
 
 
 @pytest.mark.parametrize("label", PROBLEMS)
-def test_a_compiled_tick_gives_the_torques_of_the_reference_backend(label: str) -> None:
+def test_a_compiled_tick_gives_the_torques_of_the_reference_backend(label):
     name, n, bound, contacts, tasks, options = (*PROBLEMS[label], None, None, None)[:6]
     robot, at = judges.load(name), judges.near_and_far(name, n)
     if contacts is None:
@@ -157,9 +156,7 @@ def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
 
 
 @pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0])
-def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(
-    share: float,
-) -> None:
+def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(share):
     """solo8 on three feet: the smallest singular value of A on either side of the tolerance.
 
     The tolerance is CONSTRAINT_RANK_TOLERANCE.
@@ -176,7 +173,7 @@ def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-7, 1e-5, 1e-3, 1e-2, 0.1])
-def test_straight_knees(bend: float) -> None:
+def test_straight_knees(bend):
     robot = judges.load("go2")
     both = judges.pair(robot, judges.stance(robot))
     for seed, state in enumerate(judges.states("go2", 4, 0.05)):
@@ -188,7 +185,7 @@ def test_straight_knees(bend: float) -> None:
         assert np.max(np.abs(found - expected)) < 1e-7 * (1.0 + np.max(np.abs(expected)))
 
 
-def test_every_task_with_targets_that_move() -> None:
+def test_every_task_with_targets_that_move():
     robot = judges.load("go2")
     at, com, foot = robot.standing(), robot.standing().com, robot.standing().point("FL_foot")
     tasks = [
@@ -234,7 +231,7 @@ LINK = """<link name="{}"><inertial><mass value="1"/><origin xyz="0.1 0 0.2"/>
 <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
 
 
-def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) -> None:
+def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path):
     """A continuous joint is (cos, sin) in q."""
     links = "".join(LINK.format(f"l{i}") for i in range(3))
     joints = "".join(
@@ -269,7 +266,7 @@ def test_joints_without_limits_and_bases_that_are_bolted_down(tmp_path: Path) ->
         )
 
 
-def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
+def test_a_single_joint_takes_the_reference_backend(tmp_path):
     """Pinocchio's Jacobians of one joint have one dimension fewer."""
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(
@@ -298,7 +295,7 @@ def test_a_single_joint_takes_the_reference_backend(tmp_path: Path) -> None:
 # the same verdicts and messages -------------------------------------------------------------------
 
 
-def test_infeasible_problems_are_reported_by_both_with_the_same_rows() -> None:
+def test_infeasible_problems_are_reported_by_both_with_the_same_rows():
     """The motors cannot push with ten times the robot's weight at each leg."""
     robot = judges.load("solo12")
     both = judges.pair(robot, judges.stance(robot), min_normal_force=10.0 * 9.81 * robot.mass)
@@ -308,7 +305,7 @@ def test_infeasible_problems_are_reported_by_both_with_the_same_rows() -> None:
             both[0](state.q, state.v)
 
 
-def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference_backend() -> None:
+def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference_backend():
     """solo8 on four feet: J allows a velocity to first order, but its curvature J̇ v forbids it."""
     robot = judges.load("solo8")
     compiled, reference = judges.pair(robot, judges.stance(robot))
@@ -336,7 +333,7 @@ def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference
         (None, [1.0]),
     ],
 )
-def test_a_bad_state_is_refused_in_the_same_words(q: object, v: object) -> None:
+def test_a_bad_state_is_refused_in_the_same_words(q, v):
     robot = judges.load("go2")
     compiled, reference = judges.pair(robot, judges.stance(robot))
     q = robot.standing().q if q is None else q
@@ -350,7 +347,7 @@ def refusal(controller: fb.WholeBodyController, *given: object) -> str:
 
 
 @pytest.mark.parametrize("target", [[1.0, 2.0], [np.nan, 0.0, 0.0], "there"])
-def test_a_bad_target_is_refused_in_the_same_words(target: object) -> None:
+def test_a_bad_target_is_refused_in_the_same_words(target):
     robot = judges.load("go2")
     state = robot.standing()
     moving = fb.CoMTask(lambda t: target if t > 0 else state.com)
@@ -362,7 +359,7 @@ def test_a_bad_target_is_refused_in_the_same_words(target: object) -> None:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> None:
+def test_a_compiled_answer_proves_itself_on_the_reference_problem(name):
     """All joints but one are limited to nine tenths of the largest torque that they would need."""
     robot = judges.load(name)
     free, _ = judges.pair(robot, judges.stance(robot), torque_limits=np.inf)
@@ -388,7 +385,7 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(name: str) -> 
     assert "torque" in kinds
 
 
-def test_a_command_keeps_its_numbers_when_the_state_moves_on() -> None:
+def test_a_command_keeps_its_numbers_when_the_state_moves_on():
     robot = judges.load("go2")
     controller, reference = judges.pair(robot, judges.stance(robot))
     state, other = judges.states("go2", 2)
@@ -404,7 +401,7 @@ def test_a_command_keeps_its_numbers_when_the_state_moves_on() -> None:
 # which backend runs -------------------------------------------------------------------------------
 
 
-def test_the_backend_is_visible_and_can_be_chosen() -> None:
+def test_the_backend_is_visible_and_can_be_chosen():
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     state = robot.standing()
@@ -419,7 +416,7 @@ def test_the_backend_is_visible_and_can_be_chosen() -> None:
         assert controller.backend_reason
 
 
-def test_what_does_not_fit_takes_the_reference_backend_and_says_why() -> None:
+def test_what_does_not_fit_takes_the_reference_backend_and_says_why():
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), list(fb.standing_tasks(robot.standing()))
     controller = fb.WholeBodyController(robot, contacts, tasks, solver="cvxpy")
@@ -429,7 +426,7 @@ def test_what_does_not_fit_takes_the_reference_backend_and_says_why() -> None:
         fb.WholeBodyController(robot, contacts, tasks, solver="cvxpy", backend="compiled")
 
 
-def test_a_replaced_controller_is_like_a_new_one() -> None:
+def test_a_replaced_controller_is_like_a_new_one():
     robot = judges.load("go2")
     both = judges.pair(robot, judges.stance(robot), facets=6)
     state = robot.random_state(3, 0.1)
@@ -441,7 +438,7 @@ def test_a_replaced_controller_is_like_a_new_one() -> None:
         aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
 
 
-def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend() -> None:
+def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend():
     robot = judges.load("go2")
     state = robot.standing()
     mirrored = fb.OrientationTask(
@@ -453,7 +450,7 @@ def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend(
         controller(state.q, state.v, 2.0)
 
 
-def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
+def test_a_tick_keeps_its_targets_when_another_tick_comes_between():
     """Two threads may share a controller: one tick's targets must not reach the other's problem."""
     robot = judges.load("go2")
     state, com = robot.standing(), robot.standing().com
@@ -469,7 +466,7 @@ def test_a_tick_keeps_its_targets_when_another_tick_comes_between() -> None:
     assert judges.difference(compiled, reference, state, 1.0) < TORQUE
 
 
-def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
+def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on():
     robot = judges.load("go2")
     state, slider = robot.standing(), {"height": 0.0, "turn": 0.0}
     tasks = [
@@ -490,7 +487,7 @@ def test_the_solution_is_that_of_the_tick_when_a_target_has_moved_on() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_controller_can_be_copied_and_sent_to_another_process(backend: str) -> None:
+def test_a_controller_can_be_copied_and_sent_to_another_process(backend):
     controller = judges.controller_of("go2", backend=backend)
     state = judges.load("go2").random_state(1, 0.1)
     for other in (
@@ -505,9 +502,7 @@ def test_a_controller_can_be_copied_and_sent_to_another_process(backend: str) ->
 
 
 @pytest.mark.parametrize(("name", "weight"), [("solo12", 1e3), ("solo12", 1e5), ("go2", 1e5)])
-def test_weights_far_apart_give_the_optimum_or_the_reference_backend(
-    name: str, weight: float
-) -> None:
+def test_weights_far_apart_give_the_optimum_or_the_reference_backend(name, weight):
     """Rounding can end the search at the wrong active set: Newton's method detects it."""
     robot = judges.load(name)
     at = robot.standing()
@@ -517,9 +512,7 @@ def test_weights_far_apart_give_the_optimum_or_the_reference_backend(
     prove_all(compiled, judges.states(name, 40, 0.3))
 
 
-def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend() -> (
-    None
-):
+def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend():
     robot = judges.load("go2")
     state = robot.random_state(2, 0.1)
     exact = judges.rotation([0.1, -0.2, 0.3])
@@ -535,7 +528,7 @@ def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_com
             assert np.max(np.abs(found.tau - other(state.q, state.v).tau)) < TORQUE
 
 
-def test_a_whole_number_of_facets_may_be_written_with_a_point() -> None:
+def test_a_whole_number_of_facets_may_be_written_with_a_point():
     robot = judges.load("go2")
     state, contacts = robot.standing(), judges.stance(robot)
     for each in ("compiled", "reference"):
@@ -548,9 +541,7 @@ def test_a_whole_number_of_facets_may_be_written_with_a_point() -> None:
         assert np.array_equal(eight(state.q, state.v).tau, same(state.q, state.v).tau)
 
 
-def test_a_new_controller_has_run_a_tick_before_the_loop_does(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_new_controller_has_run_a_tick_before_the_loop_does(monkeypatch):
     robot = judges.load("go2")
     warmed: list[CompiledTick] = []
     monkeypatch.setattr(CompiledTick, "warm_up", lambda self: warmed.append(self))

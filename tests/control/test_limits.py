@@ -48,7 +48,7 @@ def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequal
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(name: str) -> None:
+def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(name):
     robot = judges.load(name)
     contacts = judges.stance(robot)
     inequalities = user_inequalities(robot, contacts)
@@ -73,7 +73,7 @@ def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(na
     assert {"acceleration limit", "total force", "joined torques"} <= kinds
 
 
-def test_user_defined_inequalities_against_cvxpy() -> None:
+def test_user_defined_inequalities_against_cvxpy():
     robot = judges.load("go2")
     contacts = judges.stance(robot)
     controller = judges.pair(
@@ -88,7 +88,7 @@ def test_user_defined_inequalities_against_cvxpy() -> None:
         assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
 
 
-def test_conflicting_inequalities_are_reported_by_name() -> None:
+def test_conflicting_inequalities_are_reported_by_name():
     robot = judges.load("go2")
     light = LinearInequality("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
     for controller in judges.pair(
@@ -106,7 +106,7 @@ def test_conflicting_inequalities_are_reported_by_name() -> None:
 # forces over time ---------------------------------------------------------------------------------
 
 
-def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
+def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time():
     robot = judges.load("go2")
     share = 0.25 * robot.weight
     windows = {
@@ -129,7 +129,7 @@ def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time() -> None:
     assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
 
 
-def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners() -> None:
+def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners():
     robot = judges.load("talos")
     contacts = fb.Contacts.flat_feet(robot)
     windows = {"min_normal_force": {contacts.names[0]: 40.0}, "max_normal_force": 150.0}
@@ -148,7 +148,7 @@ class Heel(PointContact):
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str) -> None:
+def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend):
     robot = judges.load("go2")
     state = robot.standing()  # each foot carries more than the bound of 20 N
     tasks = list(fb.standing_tasks(state))
@@ -187,7 +187,7 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend: str
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_time_varying_bound_is_evaluated_once_at_a_time(backend: str) -> None:
+def test_a_time_varying_bound_is_evaluated_once_at_a_time(backend):
     robot = judges.load("go2")
     asked: list[float] = []
     bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
@@ -203,7 +203,7 @@ def test_a_time_varying_bound_is_evaluated_once_at_a_time(backend: str) -> None:
     assert asked == [0.0, 0.5, 0.0]
 
 
-def test_a_bound_that_goes_wrong_is_reported_on_both_backends() -> None:
+def test_a_bound_that_goes_wrong_is_reported_on_both_backends():
     robot = judges.load("go2")
     bound = {"FL_foot": lambda t: 50.0 if t < 1.0 else np.nan}
     for controller in judges.pair(robot, judges.stance(robot), [], max_normal_force=bound):
@@ -213,7 +213,7 @@ def test_a_bound_that_goes_wrong_is_reported_on_both_backends() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_replaced_controller_is_checked(backend: str) -> None:
+def test_a_replaced_controller_is_checked(backend):
     controller = judges.controller_of("go2", backend=backend)
     with raises(InputError, "r", "tau", 3, 12):
         controller.replace(

@@ -6,7 +6,6 @@ import copy
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import judges
 import numpy as np
@@ -156,7 +155,7 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: analytic(state=SOLO.standing()), "state", "go2"),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     call, *wanted = case
     refused(call, InputError, *wanted)
 
@@ -175,16 +174,16 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
         (lambda: analytic(contacts=fb.Contacts.points(SOLO)), "go2", "FL_FOOT", "FL_foot"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case: tuple[Any, ...]) -> None:
+def test_an_unknown_name_is_refused_with_the_names_like_it(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 
 
-def test_an_error_in_a_user_defined_task_reaches_the_user() -> None:
+def test_an_error_in_a_user_defined_task_reaches_the_user():
     refused(lambda: controller(own(lambda eom, t: 1 + "")), TypeError)
 
 
-def test_the_error_of_a_trajectory_that_begins_later_says_that_it_was_evaluated_at_0() -> None:
+def test_the_error_of_a_trajectory_that_begins_later_says_that_it_was_evaluated_at_0():
     def later(t: float) -> np.ndarray:
         if t < 1.0:
             raise ArithmeticError(f"nothing at {t}")
@@ -201,7 +200,7 @@ def test_the_error_of_a_trajectory_that_begins_later_says_that_it_was_evaluated_
 
 
 @pytest.mark.parametrize("number", ["10", np.array(10.0), np.float32(10.0), 10])
-def test_a_number_of_another_type_is_used_or_refused(number: object) -> None:
+def test_a_number_of_another_type_is_used_or_refused(number):
     """Gains and weights that pass their check can be used in computations."""
     try:
         task = fb.CoMTask(UP, kp=number, kd=number, weight=number)
@@ -213,7 +212,7 @@ def test_a_number_of_another_type_is_used_or_refused(number: object) -> None:
 
 
 @pytest.mark.parametrize("name", ["backend", "tasks", "limits", "problem"])
-def test_what_a_controller_was_made_with_cannot_be_set(name: str) -> None:
+def test_what_a_controller_was_made_with_cannot_be_set(name):
     made = controller(fb.ForceTask(), backend="reference")
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
         with raises(AttributeError, name):
@@ -221,6 +220,6 @@ def test_what_a_controller_was_made_with_cannot_be_set(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["task", "facets", "torque_limits", "on_infeasible"])
-def test_a_controller_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+def test_a_controller_takes_no_attribute_that_it_would_not_read(name):
     with raises(AttributeError, name):
         setattr(controller(fb.ForceTask(), backend="reference"), name, 3)

@@ -85,7 +85,7 @@ def stance(robot: Robot) -> fb.Contacts:
 
 
 @pytest.mark.parametrize("name", HANDS)
-def test_a_user_defined_task_does_what_the_same_built_in_task_does(name: str) -> None:
+def test_a_user_defined_task_does_what_the_same_built_in_task_does(name):
     robot = judges.load(name)
     at, frame, contacts = robot.standing(), HANDS[robot.name], stance(robot)
     hand = at.point(frame) + [0.0, 0.0, 0.05]
@@ -106,7 +106,7 @@ def test_a_user_defined_task_does_what_the_same_built_in_task_does(name: str) ->
     assert active > 8, "nothing was saturated: these states try nothing"
 
 
-def test_user_defined_tasks_on_torques_and_forces() -> None:
+def test_user_defined_tasks_on_torques_and_forces():
     robot = judges.load("go2")
     tasks = [
         *fb.standing_tasks(robot.standing()),
@@ -135,7 +135,7 @@ class Looks:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(name: str) -> None:
+def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(name):
     robot = judges.load(name)
     seen: list[EquationsOfMotion] = []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
@@ -182,7 +182,7 @@ def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(n
         seen[0].M = np.eye(robot.nv)
 
 
-def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> None:
+def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone():
     """The memory of a state is reused by states of later ticks."""
     robot = judges.load("go2")
     seen: list[EquationsOfMotion] = []
@@ -213,7 +213,7 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone() -> No
     )
 
 
-def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
+def test_a_task_may_have_more_rows_in_one_tick_than_in_another():
     robot = judges.load("go2")
     task = Looks([], rows=0)
     compiled, reference = judges.pair(
@@ -225,7 +225,7 @@ def test_a_task_may_have_more_rows_in_one_tick_than_in_another() -> None:
         ) < judges.agreement(robot)
 
 
-def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_on() -> None:
+def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_on():
     robot = judges.load("go2")
     task, slider, pull = MyCoM(np.array(robot.standing().com)), {"bound": 40.0}, np.ones(1)
 
@@ -264,7 +264,7 @@ def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_o
     assert np.allclose(solution["tau"], command.tau)
 
 
-def test_threads_may_share_a_controller_whose_task_calls_another_controller() -> None:
+def test_threads_may_share_a_controller_whose_task_calls_another_controller():
     robot, states = judges.load("go2"), judges.states("go2", 40, 0.1)
     inner = judges.controller_of("go2", backend="compiled")
 
@@ -316,9 +316,7 @@ def _fail() -> object:
         (_fail, RuntimeError, ("the sensor is gone",)),
     ],
 )
-def test_a_task_that_goes_wrong_is_reported_on_both_backends(
-    later: Callable[[], object], kind: type[Exception], named: tuple[str | float, ...]
-) -> None:
+def test_a_task_that_goes_wrong_is_reported_on_both_backends(later, kind, named):
     robot = judges.load("go2")
     for controller in judges.pair(robot, judges.stance(robot), [_Wrong(later)]):
         assert controller(robot.standing().q, np.zeros(18)).backend == controller.backend
@@ -326,7 +324,7 @@ def test_a_task_that_goes_wrong_is_reported_on_both_backends(
             controller(robot.standing().q, np.zeros(18), 1.0)
 
 
-def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
+def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
     from numba.core import event
 
     robot = judges.load("go2")
@@ -358,7 +356,7 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change() -> None:
     assert not recorder.buffer
 
 
-def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_end() -> None:
+def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_end():
     psutil = pytest.importorskip("psutil")
     robot = judges.load("go2")
     tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
@@ -393,7 +391,7 @@ def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_user_defined_constraints_are_kept_with_the_same_torques(name: str) -> None:
+def test_user_defined_constraints_are_kept_with_the_same_torques(name):
     robot = judges.load(name)
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
@@ -418,7 +416,7 @@ def test_user_defined_constraints_are_kept_with_the_same_torques(name: str) -> N
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend: str) -> None:
+def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend):
     robot = judges.load("go2")
     asked: list[float] = []
     held = LinearConstraint(
@@ -433,7 +431,7 @@ def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend: str) -> 
     assert asked == [0.3]
 
 
-def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows() -> None:
+def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows():
     """λ acts on two joints, and the rows constrain one of them."""
 
     class Coupled(LinearConstraint):
@@ -464,7 +462,7 @@ class Reuses(PointContact):
         return self.rows
 
 
-def test_user_defined_contacts_may_write_into_the_same_arrays_again() -> None:
+def test_user_defined_contacts_may_write_into_the_same_arrays_again():
     robot = judges.load("go2")
     others = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"])
     frames = ("FL_foot", "FR_foot")
@@ -481,7 +479,7 @@ def test_user_defined_contacts_may_write_into_the_same_arrays_again() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(backend: str) -> None:
+def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(backend):
     class Short(PointContact):
         def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             A, b = super().constraint(state, t)
@@ -492,7 +490,7 @@ def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(back
         fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], backend=backend)
 
 
-def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones() -> None:
+def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones():
     class MyPoint(PointContact):
         """A subclass of a built-in contact, which the tick treats as user-defined."""
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import judges
 import numpy as np
 import pytest
@@ -100,7 +98,7 @@ def wheel(**wrong: object) -> RollingWheel:
             "omega", 2, 3),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     call, *wanted = case
     refused(call, InputError, *wanted)
 
@@ -120,6 +118,6 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
         (lambda: bias_forces(STATE, axes="body"), "axes", "body", "base", "world"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case: tuple[Any, ...]) -> None:
+def test_an_unknown_name_is_refused_with_the_names_like_it(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)

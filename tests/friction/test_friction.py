@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cvxpy as cp
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +34,7 @@ def any_force(rng: np.random.Generator) -> Array:
 
 
 @given(seeds)
-def test_the_two_parts_of_figure_3_add_up_and_are_at_right_angles(seed: int) -> None:
+def test_the_two_parts_of_figure_3_add_up_and_are_at_right_angles(seed):
     rng = np.random.default_rng(seed)
     n, f = any_normal(rng), any_force(rng)
     parts, size = decompose(f, 3.0 * n), np.linalg.norm(f)
@@ -49,7 +47,7 @@ def test_the_two_parts_of_figure_3_add_up_and_are_at_right_angles(seed: int) -> 
     assert parts.alpha_par >= 0
 
 
-def test_the_cone_opens_by_arctan_mu() -> None:
+def test_the_cone_opens_by_arctan_mu():
     cone = FrictionCone(UP, 1.0)
     assert cone.angle == pytest.approx(np.pi / 4)
     for angle, held in ((cone.angle - 1e-6, True), (cone.angle + 1e-6, False)):
@@ -57,9 +55,7 @@ def test_the_cone_opens_by_arctan_mu() -> None:
 
 
 @given(seeds, mus)
-def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_slips(
-    seed: int, mu: float
-) -> None:
+def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_slips(seed, mu):
     rng = np.random.default_rng(seed)
     cone = FrictionCone(any_normal(rng), mu)
     f = cone.normal * rng.uniform(1, 100) + 0.9 * mu * rng.uniform(-0.7, 0.7, 2) @ tangents(
@@ -75,7 +71,7 @@ def test_the_margin_is_the_tangential_force_that_may_be_added_before_the_foot_sl
     assert np.linalg.norm(nearest - f) == pytest.approx(margin / np.sqrt(1 + mu**2))
 
 
-def test_the_tolerance_is_in_newton() -> None:
+def test_the_tolerance_is_in_newton():
     cone = FrictionCone(UP, 0.5)
     polyhedron = FrictionPolyhedron(UP, 0.5, 4, inner_approximation=False)
     slipping = [50.02, 0.0, 100.0]
@@ -86,16 +82,14 @@ def test_the_tolerance_is_in_newton() -> None:
 
 
 @given(seeds, facets, mus, st.booleans())
-def test_the_area_ratio_follows_the_number_of_facets(
-    seed: int, n: int, mu: float, inside: bool
-) -> None:
+def test_the_area_ratio_follows_the_number_of_facets(seed, n, mu, inside):
     polyhedron = FrictionPolyhedron(any_normal(np.random.default_rng(seed)), mu, n, inside)
     corners = polyhedron.rays - polyhedron.normal
     turns = np.cross(corners, np.roll(corners, -1, axis=0)) @ polyhedron.normal
     assert 0.5 * np.sum(turns) / (np.pi * mu**2) == pytest.approx(polyhedron.area_ratio)
 
 
-def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97() -> None:
+def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97():
     assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == [
         0.64,
         0.90,
@@ -110,7 +104,7 @@ def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97() -> None:
 
 @settings(max_examples=25)
 @given(seeds, facets, mus, st.booleans())
-def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, inside: bool) -> None:
+def test_rows_and_rays_describe_the_same_set(seed, n, mu, inside):
     """The largest force in any direction is the same over the rows and over the rays.
 
     The set is cut off at normal component 1.
@@ -123,7 +117,7 @@ def test_rows_and_rays_describe_the_same_set(seed: int, n: int, mu: float, insid
         assert -best.fun == pytest.approx(max(0.0, np.max(polyhedron.rays @ direction)), abs=1e-9)
 
 
-def test_a_ray_lies_on_the_two_facets_beside_it_and_a_force_in_the_middle_on_none() -> None:
+def test_a_ray_lies_on_the_two_facets_beside_it_and_a_force_in_the_middle_on_none():
     polyhedron = FrictionPolyhedron([0.2, -0.3, 0.9], 0.7, 5)
     assert np.allclose(polyhedron.rays @ polyhedron.normal, 1.0)
     for i, ray in enumerate(polyhedron.rays):
@@ -132,7 +126,7 @@ def test_a_ray_lies_on_the_two_facets_beside_it_and_a_force_in_the_middle_on_non
         assert polyhedron.active_facets(force) == ()
 
 
-def test_the_status_changes_at_the_friction_limit() -> None:
+def test_the_status_changes_at_the_friction_limit():
     cone = FrictionCone(UP, 0.6)
     for slide, status in ((0.0, "inside"), (5.8, "inside"), (6.0, "active"), (6.2, "outside")):
         for angle in np.linspace(0, 2 * np.pi, 7):
@@ -140,7 +134,7 @@ def test_the_status_changes_at_the_friction_limit() -> None:
     assert cone.status(-UP) == "outside"
 
 
-def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it() -> None:
+def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_it():
     force = [5.0, 0.0, 10.0]
     inner = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True)
     outer = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False)
@@ -159,9 +153,7 @@ def slips(force: Array, normal: Array, mu: float) -> float:
 
 
 @given(seeds, facets, mus)
-def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(
-    seed: int, n: int, mu: float
-) -> None:
+def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(seed, n, mu):
     rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
     cone = FrictionPolyhedron(normal, mu, n)
     for weights in rng.exponential(size=(20, n)):
@@ -171,9 +163,7 @@ def test_every_force_of_the_inner_polyhedron_lies_in_the_exact_cone(
 
 
 @given(seeds, facets, mus)
-def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(
-    seed: int, n: int, mu: float
-) -> None:
+def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(seed, n, mu):
     rng, normal = np.random.default_rng(seed), any_normal(np.random.default_rng(seed))
     cone, (t1, t2) = FrictionPolyhedron(normal, mu, n, inner_approximation=False), tangents(normal)
     for angle, part in zip(rng.uniform(0, 2 * np.pi, 50), rng.uniform(0, 1, 50), strict=True):
@@ -182,9 +172,7 @@ def test_every_force_of_the_exact_cone_lies_in_the_outer_polyhedron(
 
 
 @given(seeds, facets, mus)
-def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(
-    seed: int, n: int, mu: float
-) -> None:
+def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_between(seed, n, mu):
     normal = any_normal(np.random.default_rng(seed))
     inner = FrictionPolyhedron(normal, mu, n)
     outer = FrictionPolyhedron(normal, mu, n, inner_approximation=False)
@@ -198,7 +186,7 @@ def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_be
         assert outer.margin(normal + mu * direction) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet() -> None:
+def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet():
     cone = FrictionPolyhedron([0.0, 0.0, 1.0], 0.5, 4, inner_approximation=False)
     assert cone.margin([0.0, 0.0, 10.0]) == pytest.approx(5.0)
     assert cone.margin([3.0, 0.0, 10.0]) == pytest.approx(2.0)
@@ -206,16 +194,14 @@ def test_the_margin_is_the_force_that_may_be_added_along_the_nearest_facet() -> 
     assert cone.margin([0.0, 0.0, -1.0]) < 0
 
 
-def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y() -> None:
+def test_facet_0_looks_along_the_worlds_x_and_the_next_one_along_y():
     cone = FrictionPolyhedron([0.0, 0.0, 1.0], 1.0, 4, inner_approximation=False)
     assert np.allclose(cone.face_matrix[0], [1.0, 0.0, -1.0])
     assert np.allclose(cone.face_matrix[1], [0.0, 1.0, -1.0])
 
 
 @given(seeds, facets, mus, st.booleans(), st.floats(-10.0, 10.0))
-def test_turned_facets_are_the_facets_turned_about_the_normal(
-    seed: int, n: int, mu: float, inside: bool, turn: float
-) -> None:
+def test_turned_facets_are_the_facets_turned_about_the_normal(seed, n, mu, inside, turn):
     normal = any_normal(np.random.default_rng(seed))
     turned, straight = (FrictionPolyhedron(normal, mu, n, inside, angle) for angle in (turn, 0.0))
     about = Rotation.from_rotvec(turn * normal).as_matrix()
@@ -231,7 +217,7 @@ def test_turned_facets_are_the_facets_turned_about_the_normal(
 
 
 @given(seeds)
-def test_tangents_are_right_handed_with_the_normal(seed: int) -> None:
+def test_tangents_are_right_handed_with_the_normal(seed):
     normal = any_normal(np.random.default_rng(seed))
     t1, t2 = tangents(normal)
     assert np.allclose(np.cross(t1, t2), normal, atol=1e-12)
@@ -246,7 +232,7 @@ def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parame
     return problem, f, tangential, pressing, x
 
 
-def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone() -> None:
+def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone():
     problem, f, tangential, pressing, x = nearest_in_cone()
     rng, cases = np.random.default_rng(3), set()
     for _ in range(60):
@@ -266,9 +252,7 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
 
 
 @given(seeds, facets, mus, st.booleans())
-def test_a_projection_is_the_nearest_point_of_the_cone(
-    seed: int, n: int, mu: float, inside: bool
-) -> None:
+def test_a_projection_is_the_nearest_point_of_the_cone(seed, n, mu, inside):
     """Moreau: three conditions make p the nearest point.
 
     p in K, (f - p) · p = 0, and (f - p) · k ≤ 0 for all k in K.
@@ -307,5 +291,5 @@ def test_a_projection_is_the_nearest_point_of_the_cone(
         (lambda: decompose([1.0, 2.0, 3.0], [0.0, 0.0, np.inf]), InputError, "normal", np.inf),
     ],
 )
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     refused(*case)

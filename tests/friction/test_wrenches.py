@@ -115,7 +115,7 @@ class Judge:
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
 @pytest.mark.parametrize(("name", "feet"), STANCES)
-def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: float) -> None:
+def test_membership_and_margin_are_what_cvxpy_finds(name, feet, tilt):
     state, contacts = stance(name, feet, tilt)
     wrenches = wrench_set(state, contacts)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
@@ -133,9 +133,7 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
 
 
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("talos", 2)])
-def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(
-    name: str, feet: int
-) -> None:
+def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(name, feet):
     state, contacts = stance(name, feet, 0.5)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=True)
     inner = wrench_set(state, contacts, facets=6)
@@ -146,7 +144,7 @@ def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra
         assert exact < 1e-4 or outer.margin(w) > -1e-4
 
 
-def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
+def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays():
     state, contacts = stance("go2", 3, 0.5)
     wrenches = wrench_set(state, contacts, facets=5)
     G = com_wrench_map(state, contacts).A
@@ -158,7 +156,7 @@ def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
 
 @pytest.mark.parametrize("facets", [4, 7])
 @pytest.mark.parametrize(("name", "feet"), STANCES)
-def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: int) -> None:
+def test_rows_and_rays_describe_the_same_wrenches(name, feet, facets):
     state, contacts = stance(name, feet, 0.4)
     wrenches = wrench_set(state, contacts, facets=facets)
     rows, E, rays = wrenches.face_matrix, wrenches.equalities, wrenches.rays
@@ -184,9 +182,7 @@ def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: 
 
 
 @pytest.mark.parametrize(("feet", "missing"), [(1, 3), (2, 1), (3, 0), (4, 0)])
-def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(
-    feet: int, missing: int
-) -> None:
+def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(feet, missing):
     state, contacts = stance("go2", feet)
     wrenches = wrench_set(state, contacts)
     assert len(wrenches.equalities) == missing
@@ -201,7 +197,7 @@ def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line
         assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
 
 
-def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
+def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench():
     state, contacts = stance("go2", 4)
     wrenches = wrench_set(state, contacts)
     carrying = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
@@ -218,7 +214,7 @@ def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
 # limits on the normal force
 
 
-def test_limits_make_the_set_bounded() -> None:
+def test_limits_make_the_set_bounded():
     state, contacts = stance("go2", 4, 0.4)
     limited = wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
     for direction in np.random.default_rng(0).normal(size=(20, 6)):
@@ -232,7 +228,7 @@ def test_limits_make_the_set_bounded() -> None:
         assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or best.fun == 0
 
 
-def test_the_maximum_scaling_is_where_membership_ends() -> None:
+def test_the_maximum_scaling_is_where_membership_ends():
     state, contacts = stance("talos", 2, 0.3)
     wrenches = wrench_set(state, contacts, max_normal_force=400.0)
     start = wrenches.rays @ np.full(wrenches.rays.shape[1], 30.0)
@@ -244,7 +240,7 @@ def test_the_maximum_scaling_is_where_membership_ends() -> None:
         assert wrenches.max_scaling(5.0 * direction, start) == pytest.approx(far / 5.0, rel=1e-6)
 
 
-def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
+def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight():
     """If the CoM is at ground level, only friction limits the push."""
     wrenches = of(
         [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]],
@@ -265,7 +261,7 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
         wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
-def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
+def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2():
     """A facet allows μ cos(π/n), an edge μ.
 
     If edges face the push, it is limited when the outer feet carry everything.
@@ -293,9 +289,7 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
 
 @pytest.mark.parametrize("limit", [None, 90.0])
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2)])
-def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(
-    name: str, feet: int, limit: float | None
-) -> None:
+def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(name, feet, limit):
     state, contacts = stance(name, feet, 0.4)
     limit = None if limit is None else limit / 150.0 * state.robot.weight
     wrenches = wrench_set(state, contacts, max_normal_force=limit)
@@ -329,7 +323,7 @@ def wrenches_limits(wrenches: WrenchSet) -> tuple[Array | None, Array | None]:
     return np.kron(np.eye(len(wrenches.points)), np.ones(4)), wrenches.max_normal_force
 
 
-def test_slices_of_stances_without_area_are_flat() -> None:
+def test_slices_of_stances_without_area_are_flat():
     state, contacts = stance("go2", 1)
     f = wrench_set(state, contacts).cones[0].rays[0] * 40.0
     one = wrench_set(state, contacts).moment_vertices(f)
@@ -339,7 +333,7 @@ def test_slices_of_stances_without_area_are_flat() -> None:
     assert np.linalg.matrix_rank(two - two[0], tol=1e-7) == 2
 
 
-def test_a_force_that_pulls_has_no_torques() -> None:
+def test_a_force_that_pulls_has_no_torques():
     state, contacts = stance("go2", 4)
     assert wrench_set(state, contacts).moment_vertices([0.0, 0.0, -1.0]).shape == (0, 3)
     assert np.allclose(wrench_set(state, contacts).moment_vertices(np.zeros(3)), np.zeros((1, 3)))
@@ -364,9 +358,7 @@ def depth(polygon: Array, at: Array) -> float:
 @pytest.mark.parametrize(
     ("name", "feet"), [("go2", 4), ("go2", 3), ("solo8", 4), ("talos", 2), ("talos", 1)]
 )
-def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(
-    name: str, feet: int, mu: float
-) -> None:
+def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(name, feet, mu):
     robot, state = judges.load(name), judges.load(name).standing()
     contacts = judges.stance(robot, mu).only(*[foot.frame for foot in robot.feet][:feet])
     region = wrench_set(state, contacts).support_region()
@@ -379,7 +371,7 @@ def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(
 
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 8))
-def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> None:
+def test_on_level_ground_this_holds_for_feet_anywhere(seed, feet):
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(-1, 1, (feet, 2)) + 5.0, np.full(feet, 0.3)])
     region = of(points, [UP] * feet, mu=rng.uniform(0.05, 1)).support_region()
@@ -389,7 +381,7 @@ def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> N
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed: int) -> None:
+def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed):
     wrenches = next(
         feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2
     )
@@ -413,7 +405,7 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
     assert seen == {True, False}
 
 
-def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() -> None:
+def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet():
     feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
     area = ConvexHull(feet[:, :2]).volume
     # feet on a hilltop: friction must hold them
@@ -429,7 +421,7 @@ def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() ->
     assert np.max(wall.support_region()[:, 0]) > 0.5 + 0.1
 
 
-def test_too_steep_a_slope_carries_nothing() -> None:
+def test_too_steep_a_slope_carries_nothing():
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
         region = of(
@@ -442,7 +434,7 @@ def test_too_steep_a_slope_carries_nothing() -> None:
         assert region.shape == ((3, 2) if stands else (0, 2))
 
 
-def test_limits_on_the_normal_force_cut_the_corners_off() -> None:
+def test_limits_on_the_normal_force_cut_the_corners_off():
     square = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
     region = of(square, [UP] * 4, limit=50.0).support_region()
     assert {tuple(np.round(corner, 9)) for corner in region} == {
@@ -454,7 +446,7 @@ def test_limits_on_the_normal_force_cut_the_corners_off() -> None:
     assert of(square, [UP] * 4, limit=20.0).support_region().shape == (0, 2)
 
 
-def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
+def test_walls_that_face_each_other_can_be_squeezed_without_end():
     chimney = of(
         [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]],
         [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
@@ -469,7 +461,7 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
     assert len(limited.moment_vertices()) >= 4
 
 
-def test_a_grip_from_all_sides_makes_every_wrench() -> None:
+def test_a_grip_from_all_sides_makes_every_wrench():
     directions = np.vstack([np.eye(3), -np.eye(3)])
     grip = of(directions, -directions, 0.7)
     assert grip.face_matrix.shape == (0, 6) and grip.equalities.shape == (0, 6)
@@ -481,7 +473,7 @@ def test_a_grip_from_all_sides_makes_every_wrench() -> None:
 
 @settings(max_examples=6)
 @given(seeds)
-def test_moving_everything_changes_nothing(seed: int) -> None:
+def test_moving_everything_changes_nothing(seed):
     here = feet_on_slopes(seed)
     step = np.random.default_rng(seed).normal(size=3)
     there = WrenchSet(
@@ -501,7 +493,7 @@ def test_moving_everything_changes_nothing(seed: int) -> None:
 
 @settings(max_examples=12)
 @given(seeds)
-def test_turning_everything_turns_the_wrenches(seed: int) -> None:
+def test_turning_everything_turns_the_wrenches(seed):
     """The facets may start elsewhere after the rotation.
 
     Inner polyhedra stay within outer ones, nearly the same.
@@ -520,16 +512,14 @@ def test_turning_everything_turns_the_wrenches(seed: int) -> None:
 # input
 
 
-def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
+def test_contacts_that_make_no_set_of_wrenches_are_refused():
     state, contacts = stance("go2", 4)
     rope = LinearConstraint("rope", 1, lambda s, t: (np.eye(1, s.robot.nv), np.zeros(1)))
     for call, *named in (
         (lambda: wrench_set(state, fb.Contacts.none()),),
         (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope"),
         (lambda: wrench_set(contacts, contacts), "state", "State", "Contacts"),
-        # type: ignore[arg-type]
         (lambda: wrench_set(state, state), "contacts", "Contacts", "State"),
-        # type: ignore[arg-type]
         (lambda: wrench_set(state, contacts, facets=2), "facets", 2),
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cvxpy as cp
 import judges
 import mujoco
@@ -78,7 +76,7 @@ def mujocos_momentum_rate(
     return (ends[0] - ends[1]) / (2.0 * dt), np.linalg.solve(judge.T, qacc)
 
 
-def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
+def test_momentum_and_its_rate_are_mujocos(name):
     """In motion, under random forces and torques. The rate is compared with differences of MuJoCo's
     momentum along MuJoCo's motion.
     """
@@ -97,7 +95,7 @@ def test_momentum_and_its_rate_are_mujocos(name: str) -> None:
         assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
 
 
-def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> None:
+def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point():
     """Eqs. (20), (21) against the definition, Σ f_i and Σ (x_i - x_c) × f_i. Without points, the
     matrix has no columns.
     """
@@ -112,9 +110,7 @@ def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point() -> Non
 # (20)(21) -----------------------------------------------------------------------------------------
 
 
-def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravity(
-    name: str,
-) -> None:
+def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravity(name):
     """Σ f = ṗ - m g and Σ (x_i - x_c) × f_i = L̇ in motion, with and without joint torques, since
     these are internal.
     """
@@ -131,9 +127,7 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         assert np.allclose(wrench["moment"](forces), rate[3:], atol=1e-6 * scale)
 
 
-def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would_roll_it_left() -> (
-    None
-):
+def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would_roll_it_left():
     """By (x_i - x_c) × f_i, an upward force at y > 0 turns about +x. Footnote 10 of the course text
     prints x_c - x_i, which has the opposite sign.
     """
@@ -152,7 +146,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would
     assert np.allclose(footnote, -rate, atol=1e-5)
 
 
-def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name: str) -> None:
+def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name):
     """Eq. (20) is printed with three blocks for four feet."""
     contacts = judges.stance(judges.load(name))
     G_f = objectives.net_force_matrix(contacts)
@@ -163,7 +157,7 @@ def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name: str
         assert G_f.shape == (3, 12)
 
 
-def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name: str) -> None:
+def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name):
     state = judges.load(name).random_state(0)
     contacts = judges.stance(state.robot)
     eom = fb.equations_of_motion(state, contacts)
@@ -176,7 +170,7 @@ def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name:
 # (22) ---------------------------------------------------------------------------------------------
 
 
-def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name: str) -> None:
+def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name):
     """On a full stance, the minimum of eq. (22) is zero, and the minimizing forces produce the
     desired motion of centre of mass and momentum.
     """
@@ -194,7 +188,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name:
         assert np.allclose(rate[3:], spin, atol=1e-4 * state.robot.weight)
 
 
-def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
+def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed():
     """Eq. (22) adds N² and (N·m)². In N·mm, a moment has a million times the weight. solo8 cannot
     push sideways without a moment.
     """
@@ -216,7 +210,7 @@ def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed() -> None:
     assert np.linalg.matrix_rank(only_moment.H) == 3
 
 
-def test_the_wrench_objective_has_the_value_of_its_formula() -> None:
+def test_the_wrench_objective_has_the_value_of_its_formula():
     """One or two feet cannot produce all six numbers, so the minimum is above zero."""
     rng = np.random.default_rng(0)
     state = judges.load("go2").standing()
@@ -243,7 +237,7 @@ def split(f: Array, n: Array) -> tuple[float, float]:
     return float(np.sqrt(max(0.0, f @ f - normal**2))), normal
 
 
-def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_from_a() -> None:
+def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_from_a():
     rng = np.random.default_rng(0)
     contacts = fb.Contacts.points(judges.load("go2"), normals=LEAN)
     for _ in range(20):
@@ -258,7 +252,7 @@ def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_fr
         )
 
 
-def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() -> None:
+def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys():
     """Eq. (22) plus w times eq. (23), the purpose of section 3.1.1: without the bias, six
     directions have no cost.
     """
@@ -292,9 +286,7 @@ def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys() ->
 @pytest.mark.parametrize(
     ("name", "sign"), [("solo8", -1), ("go2", 0), ("solo12", 0), ("anymal_kinova", 1)]
 )
-def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(
-    name: str, sign: int
-) -> None:
+def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(name, sign):
     eom = judges.at_rest(name, 0)
     found = objectives.torques_from_forces(eom)
     assert np.sign(eom.d - eom.k) == sign
@@ -305,7 +297,7 @@ def test_the_catalogue_shows_too_few_torques_exactly_enough_and_redundancy(
 
 @pytest.mark.parametrize("seed", [None, 0, 1])
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: int | None) -> None:
+def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name, seed):
     """Minimize ½‖τ‖² over (q̈, τ) with eq. (7) and given λ. Random torques produce the forces that
     solo8 can reach.
     """
@@ -332,7 +324,7 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name: str, seed: i
         assert np.allclose(tau, tau0, atol=1e-6)
 
 
-def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> None:
+def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is():
     eom = judges.at_rest("anymal_kinova", 0)
     found = objectives.torques_from_forces(eom)
     rng = np.random.default_rng(0)
@@ -346,9 +338,7 @@ def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is() -> N
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])
-def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(
-    exponent: int,
-) -> None:
+def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_rank(exponent):
     """solo8 is nearly symmetric with 0.1 rad/s of noise. Eq. (25) taken literally needs hundreds of
     N·m and more.
     """
@@ -365,7 +355,7 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 
-def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxpys() -> None:
+def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxpys():
     rng = np.random.default_rng(0)
     for seed in (None, 0, 1):
         eom = judges.at_rest("solo8", seed)
@@ -386,7 +376,7 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
 
 
 @pytest.mark.parametrize("name", ["go2", "anymal_kinova"])
-def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
+def test_with_three_joints_a_leg_every_force_can_be_had(name):
     eom = judges.at_rest(name, 1)
     found = objectives.torques_from_forces(eom)
     desired = 30.0 * np.random.default_rng(0).normal(size=eom.k)
@@ -395,7 +385,7 @@ def test_with_three_joints_a_leg_every_force_can_be_had(name: str) -> None:
     assert np.allclose(dynamics.forces_from_torques(eom)(found.torque(desired)), desired, atol=1e-6)
 
 
-def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration() -> None:
+def test_torques_for_forces_out_of_reach_leave_the_smallest_contact_acceleration():
     """For d < k, `TorquesFromForces` minimizes ‖J q̈ - b‖ with this λ, and then τ."""
     eom = judges.at_rest("solo8", 0)
     desired = 10.0 * np.random.default_rng(3).normal(size=12)
@@ -442,6 +432,6 @@ NONE = np.zeros(3)
         ),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     call, *named = case
     refused(call, InputError, *named)

@@ -74,9 +74,7 @@ def least(
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(
-    name: str,
-) -> None:
+def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(name):
     """Eq. (15) at random torques, with the acceleration from one solution of the whole system."""
     rng = np.random.default_rng(0)
     for seed in (None, 0):
@@ -93,7 +91,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name: str) -> None:
+def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name):
     eom = judges.at_rest(name)
     residuals = {"qdd": costs(eom)["qdd"]}
     seen = as_quadratics(residuals)["qdd"].pullback(fb.accelerations_from_torques(eom))
@@ -102,9 +100,7 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("feet", [1, 4])
-def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(
-    name: str, feet: int
-) -> None:
+def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(name, feet):
     """Eq. (18) with costs on q̈, τ and λ together."""
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
@@ -117,7 +113,7 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
     ) == pytest.approx(seen(beta), rel=1e-9)
 
 
-def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
+def test_costs_may_be_given_on_any_of_the_three_and_add_up():
     eom = judges.at_rest("go2", feet=3)
     space, parts = dynamics.feasible_space(eom), as_quadratics(costs(eom))
     beta = np.random.default_rng(0).normal(size=space.dimension)
@@ -130,7 +126,7 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
     assert objectives.cost_on_space(space)(beta) == 0.0
 
 
-def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
+def test_a_cost_on_all_three_at_once_may_couple_them():
     """Eq. (18) for a Q(q̈, τ, λ) that is not a sum of three costs, such as (τ - K q̈)²."""
     eom = judges.at_rest("go2", feet=2)
     space = dynamics.feasible_space(eom)
@@ -149,9 +145,7 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("block", BLOCKS)
 @pytest.mark.parametrize("feet", [1, 2, 4])
-def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
-    name: str, block: str, feet: int
-) -> None:
+def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name, block, feet):
     """Every block, against the minimum with this block fixed and everything else free. The literal
     reading is never lower.
     """
@@ -174,9 +168,7 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(
-    name: str,
-) -> None:
+def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(name):
     """V_q̈ has full column rank on one foot, but not on four. On four feet, the literal reading has
     a clearly higher cost.
     """
@@ -195,7 +187,7 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
             assert (smallest(x) == pytest.approx(best(x), rel=1e-7)) == agree
 
 
-def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
+def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19():
     """go2 with a cost on squared friction and a little torque: the smallest β leaves friction that
     the best β removes by internal forces.
     """
@@ -221,7 +213,7 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
 
-def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
+def test_where_nothing_can_move_the_block_has_no_say_in_beta():
     """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
     β must not contain 1 / rounding.
     """
@@ -238,7 +230,7 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
     )
 
 
-def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
+def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused():
     """A reward for internal forces has no minimum, and the error says so."""
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
@@ -250,7 +242,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     assert np.isfinite(objectives.minimum_norm_pullback(reward, space, "qdd")(np.zeros(18)))
 
 
-def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
+def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused():
     """A cost with negative curvature has no minimum either: its stationary point is the worst, not
     the best.
     """
@@ -261,7 +253,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
         objectives.partial_minimum(hill, space, "qdd")
 
 
-def test_directions_that_cost_nothing_are_left_alone() -> None:
+def test_directions_that_cost_nothing_are_left_alone():
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     free = Quadratic.zero(space.dimension)
@@ -270,7 +262,7 @@ def test_directions_that_cost_nothing_are_left_alone() -> None:
     assert np.allclose(objectives.argmin_coordinates(free, space, "qdd")(x), smallest)
 
 
-def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
+def test_weights_ten_orders_apart_do_not_blind_the_best_reading():
     """A force cost of 1e-10 beside a torque cost of 1 still decides where the torque cost is
     constant.
 

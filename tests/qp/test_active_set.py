@@ -73,13 +73,13 @@ def check_record(run: ActiveSetRun) -> None:
 # the course text's table --------------------------------------------------------------------------
 
 
-def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:
+def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there():
     run = active_set(table_top(minimum=(0.5, 1.0)))
     assert np.allclose(run.solution.x, [0.5, 1.0])
     assert run.solution.active == () == run.working_set
 
 
-def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality() -> None:
+def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality():
     qp = table_top(minimum=(0.5, -1.0))
     found = active_set(qp).solution
     equality = solve(QP(qp.H, qp.g, qp.G, qp.h, np.zeros((0, 2)), np.zeros(0)))
@@ -90,7 +90,7 @@ def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equal
     assert found.multipliers["table"] == pytest.approx(1.0)
 
 
-def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
+def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it():
     first, second = active_set(table_top((0.5, -1.0)), start=(0.0, 1.0)).iterations
     assert (first.working_set, first.blocking, first.step_length) == ((), "table", 0.5)
     assert np.allclose(first.direction, [0.5, -2.0])
@@ -100,7 +100,7 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> No
     assert second.multipliers == {"table": pytest.approx(1.0)} and second.dropped is None
 
 
-def test_a_row_that_would_have_to_pull_is_dropped() -> None:
+def test_a_row_that_would_have_to_pull_is_dropped():
     first, second = active_set(
         table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]
     ).iterations
@@ -109,7 +109,7 @@ def test_a_row_that_would_have_to_pull_is_dropped() -> None:
     assert np.allclose(second.x_next, [0.5, 1.0])
 
 
-def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised() -> None:
+def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised():
     run = active_set(table_top((0.5, -1.0)), start=(0.0, -3.0))
     assert run.phase_one[0].objective == pytest.approx(3.0)  # the largest violation, m
     assert np.allclose(run.iterations[0].x, [0.0, 0.0])
@@ -120,7 +120,7 @@ def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised(
 # stopped before the end ---------------------------------------------------------------------------
 
 
-def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so() -> None:
+def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so():
     for qp in [*controller_qps("go2", 4, torque=0.3), table_top()]:
         whole = active_set(qp)
         rounds = [*whole.phase_one, *whole.iterations]
@@ -133,7 +133,7 @@ def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so(
             assert run.converged or not np.any(run.solution.inequality_multipliers)
 
 
-def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may() -> None:
+def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may():
     seen = set()
     for qp in controller_qps("go2", 6, torque=0.3):
         whole = active_set(qp)
@@ -147,7 +147,7 @@ def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may()
     assert {(True, False), (False, True)} <= seen
 
 
-def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
+def test_a_stopped_run_can_be_taken_up_again_where_it_ended():
     for qp in controller_qps("go2", 6, torque=0.3):
         run = active_set(qp, max_iterations=1)
         for _ in range(60):
@@ -177,7 +177,7 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_an_honest_way(name: str) -> None:
+def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_an_honest_way(name):
     active, infeasible = "", 0
     for qp in controller_qps(name, 20, torque=0.3):
         try:
@@ -219,7 +219,7 @@ def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
 
 
 @pytest.mark.parametrize(("name", "ticks"), [("go2", 50), ("talos", 8)])
-def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks: int) -> None:
+def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name, ticks):
     cold, warm, last = [], [], None
     for qp in swaying_qps(name, ticks):
         run = active_set(qp)
@@ -235,7 +235,7 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name: str) -> None:
+def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name):
     robot = judges.load(name)
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
     controller = fb.WholeBodyController(
@@ -289,7 +289,7 @@ DEGENERATE = {
 
 @pytest.mark.parametrize("name", DEGENERATE)
 @pytest.mark.parametrize("start", [None, (0.0, 0.0, 0.0), (7.0, -5.0, 3.0)])
-def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, ...] | None) -> None:
+def test_degenerate_problems_end_at_the_optimum(name, start):
     qp = DEGENERATE[name]
     run = active_set(qp, None if start is None else start[: qp.n])
     check_optimum(run)
@@ -300,7 +300,7 @@ def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, .
     assert np.allclose(again.solution.objective, run.solution.objective)
 
 
-def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None:
+def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends():
     """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back
     to its start.
     """
@@ -331,7 +331,7 @@ def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None
         problem(np.eye(2), [1, 2], [[1, 0], [-1, 0]], [1, -1 - 1e-6]),
     ],
 )
-def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP) -> None:
+def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp):
     for start in (None, (0.0, 0.0), (50.0, -20.0)):
         with pytest.raises(InfeasibleError) as caught:
             active_set(qp, start)
@@ -340,7 +340,7 @@ def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP)
         solve(qp, "active_set")
 
 
-def test_curvature_only_counts_where_the_equalities_hold() -> None:
+def test_curvature_only_counts_where_the_equalities_hold():
     found = active_set(problem(np.diag([1.0, -1.0]), [-2, 0], (), (), [[0, 1]], [3])).solution
     assert np.allclose(found.x, [2.0, 3.0])
 
@@ -388,7 +388,7 @@ def verdict(qp: QP) -> str:
 
 @given(st.integers(0, 10**9))
 @hypothesis_settings(max_examples=150)
-def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: int) -> None:
+def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed):
     qp, expected = random_qp(seed), verdict(random_qp(seed))
     try:
         run = active_set(qp)
@@ -405,7 +405,7 @@ def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: in
 
 @given(st.integers(0, 10**9), st.integers(0, 10**9))
 @hypothesis_settings(max_examples=80)
-def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, other: int) -> None:
+def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed, other):
     qp, rng = random_qp(seed), np.random.default_rng(other)
     if verdict(qp) != "optimal":
         return
@@ -418,7 +418,7 @@ def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, othe
     )
 
 
-def test_a_run_is_a_value() -> None:
+def test_a_run_is_a_value():
     run = active_set(table_top())
     assert not run.iterations[0].x.flags.writeable
     assert not run.solution.x.flags.writeable

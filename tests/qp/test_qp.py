@@ -6,7 +6,6 @@ import copy
 import pickle
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
 
 import judges
 import numpy as np
@@ -51,9 +50,7 @@ def empty(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 @settings(max_examples=60)
 @given(seeds, st.integers(2, 8), st.integers(0, 3), st.integers(0, 12))
-def test_every_solver_gives_the_same_optimum_and_proves_it(
-    seed: int, n: int, m: int, inequalities: int
-) -> None:
+def test_every_solver_gives_the_same_optimum_and_proves_it(seed, n, m, inequalities):
     qp = random_qp(np.random.default_rng(seed), n, min(m, n - 1), inequalities)
     found = {solver: solve(qp, solver) for solver in solvers()}
     for solution in found.values():
@@ -65,7 +62,7 @@ def test_every_solver_gives_the_same_optimum_and_proves_it(
         assert solution.objective <= found["cvxpy"].objective + 1e-6
 
 
-def test_active_rows_are_named_and_their_multipliers_say_what_room_is_worth() -> None:
+def test_active_rows_are_named_and_their_multipliers_say_what_room_is_worth():
     """min ½‖x - (3, 1)‖² with x0 ≤ 1, x1 ≤ 5: the first row is active with the multiplier 2, the
     second is not.
     """
@@ -90,9 +87,7 @@ def test_active_rows_are_named_and_their_multipliers_say_what_room_is_worth() ->
 
 
 @given(seeds, st.integers(3, 8), st.integers(1, 3), st.integers(0, 2))
-def test_the_equality_space_holds_all_solutions_and_nothing_else(
-    seed: int, n: int, rank: int, repeated: int
-) -> None:
+def test_the_equality_space_holds_all_solutions_and_nothing_else(seed, n, rank, repeated):
     rng = np.random.default_rng(seed)
     rank = min(rank, n - 1)
     A = rng.normal(size=(rank, n))
@@ -108,7 +103,7 @@ def test_the_equality_space_holds_all_solutions_and_nothing_else(
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver: str) -> None:
+def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver):
     problems = {
         right: QP(
             np.eye(2),
@@ -147,7 +142,7 @@ def answer(x: list[float], nu: float, mu: list[float]) -> Residuals:
     ).residuals
 
 
-def test_an_optimum_found_by_hand_leaves_nothing() -> None:
+def test_an_optimum_found_by_hand_leaves_nothing():
     assert answer([1.0, 1.0], -1.0, [2.0, 0.0]) == Residuals(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -161,9 +156,7 @@ def test_an_optimum_found_by_hand_leaves_nothing() -> None:
         (answer([1.0, 1.0], -1.0, [1.0, -1.0]), {"dual": 1.0, "complementarity": 5.0}),
     ],
 )
-def test_each_residual_measures_its_own_mistake(
-    residuals: Residuals, fields: dict[str, float]
-) -> None:
+def test_each_residual_measures_its_own_mistake(residuals, fields):
     for name in ("stationarity", "equality", "inequality", "complementarity", "dual"):
         assert getattr(residuals, name) == pytest.approx(fields.get(name, 0.0), abs=1e-12), name
 
@@ -173,9 +166,7 @@ def test_each_residual_measures_its_own_mistake(
 
 @settings(max_examples=40)
 @given(seeds, st.integers(1, 3), st.integers(2, 8))
-def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(
-    seed: int, n: int, rows: int
-) -> None:
+def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed, n, rows):
     rng = np.random.default_rng(seed)
     G, h = rng.normal(size=(rows, n)), rng.normal(size=rows) - 0.5
     qp, found = QP(np.eye(n), np.zeros(n), *empty(n), G, h), conflicting_constraints(G, h)
@@ -205,14 +196,12 @@ def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(
         (np.zeros((0, 3)), np.zeros(0), ()),
     ],
 )
-def test_rows_in_conflict_are_told_from_those_that_can_be_met(
-    G: np.ndarray, h: np.ndarray, conflict: tuple[int, ...]
-) -> None:
+def test_rows_in_conflict_are_told_from_those_that_can_be_met(G, h, conflict):
     assert conflicting_constraints(G, h) == conflict
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_the_error_of_an_infeasible_problem_names_its_rows(solver: str) -> None:
+def test_the_error_of_an_infeasible_problem_names_its_rows(solver):
     G, h = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]), np.array([1.0, -2.0, 3.0])
     qp = QP(np.eye(2), np.zeros(2), *empty(2), G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
     with raises(InfeasibleError, "x ≤ 1", "x ≥ 2") as caught:
@@ -220,7 +209,7 @@ def test_the_error_of_an_infeasible_problem_names_its_rows(solver: str) -> None:
     assert caught.value.constraints == ("x ≤ 1", "x ≥ 2")
 
 
-def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
+def test_problems_solutions_and_maps_can_be_pickled_and_copied():
     qp = QP(
         np.eye(2),
         np.ones(2),
@@ -244,7 +233,7 @@ def test_problems_solutions_and_maps_can_be_pickled_and_copied() -> None:
     )
 
 
-def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
+def test_labels_are_texts_that_know_their_kind_owner_and_number():
     label = ConstraintLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
@@ -261,7 +250,7 @@ def test_labels_are_texts_that_know_their_kind_owner_and_number() -> None:
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
 
 
-def test_rows_can_be_left_out_by_kind() -> None:
+def test_rows_can_be_left_out_by_kind():
     """Facets say already that no foot pulls, for their rows add up to -n μ' nᵀ f ≤ 0; without both
     kinds a foot does pull.
     """
@@ -285,7 +274,7 @@ def test_rows_can_be_left_out_by_kind() -> None:
     assert least("friction") == pytest.approx(0.0, abs=1e-6)
 
 
-def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_name() -> None:
+def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_name():
     """Six variables, each at least 1, whose sum is at most 5."""
     normal = [
         ConstraintLabel(f"{foot} normal force", "normal force", foot) for foot in ("FL", "FR", "RL")
@@ -343,11 +332,11 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
             "True"),
     ],
 )  # fmt: skip
-def test_problems_that_do_not_fit_together_are_refused(case: tuple[Any, ...]) -> None:
+def test_problems_that_do_not_fit_together_are_refused(case):
     refused(*case)
 
 
-def test_a_linear_program_says_optimal_infeasible_or_unbounded() -> None:
+def test_a_linear_program_says_optimal_infeasible_or_unbounded():
     one = np.ones(1)
     assert linear_program(one, (np.eye(1), one)).status == OPTIMAL
     assert linear_program(one, (np.eye(1), -one)).status == INFEASIBLE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import judges
 import numpy as np
@@ -43,7 +42,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: GO2.frame_id("FL_fot"), "FL_fot", "FL_foot"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case: tuple[Any, ...]) -> None:
+def test_an_unknown_name_is_refused_with_the_names_like_it(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 
@@ -82,12 +81,12 @@ def test_an_unknown_name_is_refused_with_the_names_like_it(case: tuple[Any, ...]
         (lambda: fb.State(GO2, 1.1 * Q), "q", 1.1),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     call, *wanted = case
     refused(call, InputError, *wanted)
 
 
-def test_all_errors_of_the_package_can_be_caught_by_one_name() -> None:
+def test_all_errors_of_the_package_can_be_caught_by_one_name():
     for make in (lambda: fb.load("go3"), lambda: fb.State(GO2, Q[:5]), lambda: fb.Contacts([1])):
         with pytest.raises(fb.FloatbaseError):
             make()
@@ -98,7 +97,7 @@ def test_all_errors_of_the_package_can_be_caught_by_one_name() -> None:
         fb.State(GO2, Q[:5])
 
 
-def test_unknown_names_list_the_near_ones_or_all_of_a_few() -> None:
+def test_unknown_names_list_the_near_ones_or_all_of_a_few():
     near = str(unknown_name("frame", "FL_fot", ["FL_foot", "base", "x", "y", "z", "w", "v"]))
     assert not missing(near, "FL_fot", "FL_foot") and missing(near, "base") == ["base"]
     assert not missing(
@@ -126,7 +125,7 @@ class Unprintable:
     [Unprintable(), [Unprintable()], [10**5000], 10**5000, "a" * 10**5, "\ud800", b"x" * 999],
     ids=["object", "list", "digits in a list", "digits", "text", "surrogate", "bytes"],
 )
-def test_any_value_has_a_short_message(value: Any) -> None:
+def test_any_value_has_a_short_message(value):
     for call in (
         lambda: fb.load(value), lambda: fb.Push(value), lambda: GO2.frame_id(value),
         lambda: fb.solve(controller().qp(GO2.standing()), value),
@@ -138,7 +137,7 @@ def test_any_value_has_a_short_message(value: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["a\0b", "\ud800"])
-def test_a_name_that_no_file_can_hold_is_refused(name: str, tmp_path: Path) -> None:
+def test_a_name_that_no_file_can_hold_is_refused(name, tmp_path):
     view = fb.Viewer(GO2)
     view.show(GO2.standing())
     for call in (
@@ -149,7 +148,7 @@ def test_a_name_that_no_file_can_hold_is_refused(name: str, tmp_path: Path) -> N
             call()
 
 
-def test_bytes_are_no_numbers_and_the_smallest_numbers_have_a_quotient() -> None:
+def test_bytes_are_no_numbers_and_the_smallest_numbers_have_a_quotient():
     with pytest.raises(InputError):
         fb.ForceTask(bytearray(12))
     for number in (1e-320, 1e-31):

@@ -7,7 +7,6 @@ import pickle
 import warnings
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
 
 import judges
 import numpy as np
@@ -69,7 +68,7 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
             "go2", "solo12"),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_bad_input_is_refused_by_name(case):
     call, *wanted = case
     refused(call, InputError, *wanted)
 
@@ -81,31 +80,31 @@ def test_bad_input_is_refused_by_name(case: tuple[Any, ...]) -> None:
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), "bse", "base"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case: tuple[Any, ...]) -> None:
+def test_an_unknown_name_is_refused_with_the_names_like_it(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 
 
-def test_a_foot_needs_a_body_in_mujoco() -> None:
+def test_a_foot_needs_a_body_in_mujoco():
     robot = fb.load("go2", feet=["FL_foot_joint"])
     refused(lambda: fb.Simulation(robot), SimulationError, "FL_foot_joint")
 
 
 @pytest.mark.parametrize("name", ["timestep", "ground", "robot", "model", "data", "q", "time"])
-def test_what_a_simulation_was_made_with_cannot_be_set(name: str) -> None:
+def test_what_a_simulation_was_made_with_cannot_be_set(name):
     for sim in (SIM, copy.deepcopy(SIM), pickle.loads(pickle.dumps(SIM))):
         with raises(AttributeError, name):
             setattr(sim, name, getattr(sim, name))
 
 
 @pytest.mark.parametrize("name", ["mu", "link_colisions"])
-def test_a_simulation_takes_no_attribute_that_it_would_not_read(name: str) -> None:
+def test_a_simulation_takes_no_attribute_that_it_would_not_read(name):
     for sim in (SIM, copy.deepcopy(SIM)):
         with raises(AttributeError, name):
             setattr(sim, name, True)
 
 
-def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
+def test_a_timestep_changed_in_mujocos_model_is_refused():
     sim = fb.Simulation(GO2)
     sim.model.opt.timestep = 0.002
     refused(lambda: fb.rollout(sim, limp, 0.01), InputError, "timestep", 0.002, 0.001)
@@ -114,9 +113,7 @@ def test_a_timestep_changed_in_mujocos_model_is_refused() -> None:
 @pytest.mark.parametrize(
     ("start", "numbers"), [(0.0, (0, 0.01, 0.02, 0.03)), (0.03, (0.01, 0.02, 0.03, 0.04))]
 )
-def test_a_push_that_does_not_act_in_a_rollout_is_said(
-    start: float, numbers: tuple[float, ...]
-) -> None:
+def test_a_push_that_does_not_act_in_a_rollout_is_said(start, numbers):
     sim = fb.Simulation(GO2)
     idle, near = (fb.Push(UP, start=start, duration=0.01), fb.Push(UP, start=0.02, duration=0.01))
     with warnings.catch_warnings(action="error"):

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,7 +65,7 @@ def assert_marked(table: pd.DataFrame) -> None:
     )
 
 
-def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
+def test_the_table_is_the_same_for_one_worker_and_for_two():
     one, two = (fb.sweep(spectrum, GRID, workers=w, progress=False) for w in (1, 2))
     assert_same_results(one, two)
     assert list(one.columns) == ["n", "scale", "values", "sum", "process", "error"]
@@ -77,7 +76,7 @@ def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
 
 
 @pytest.mark.front_end
-def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     """After a kill at a random time, only the points in progress are computed again."""
     after = np.random.default_rng(0).integers(2, 45)
     (tmp_path / "script.py").write_text(SCRIPT)
@@ -102,7 +101,7 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     assert len(calls) - 60 <= 2 * 2  # for each of two workers, its present point and the next
 
 
-def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path: Path) -> None:
+def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path):
     def root(i: int, folder: str) -> float:
         with open(f"{folder}/calls", "a") as calls:
             calls.write(f"{i}")
@@ -120,9 +119,7 @@ def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path: Path) -> No
     assert_frame_equal(read_sweep(file), second)
 
 
-def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
-    tmp_path: Path,
-) -> None:
+def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tmp_path):
     script = tmp_path / "script.py"
     limit = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400, -1))  # bytes, of a "
@@ -142,7 +139,7 @@ def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
     assert len((tmp_path / "calls").read_text().split()) - before == 60 - len(kept)
 
 
-def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path: Path) -> None:
+def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path):
     def patient(made: None, i: int) -> int:
         (tmp_path / "begun").touch()
         until = time.monotonic() + 60.0
@@ -168,7 +165,7 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path:
 
 
 @pytest.mark.front_end
-def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
+def test_workers_of_a_dask_cluster_give_the_same_table():
     distributed = pytest.importorskip(
         "distributed", reason="Dask is not installed: pip install floatbase[cluster]"
     )
@@ -206,7 +203,7 @@ def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
     assert found <= workers and os.getpid() not in found
 
 
-def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path):
     path = tmp_path / "rows.jsonl"
 
     def square(x: float) -> float:
@@ -246,9 +243,7 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -
         fb.sweep(square, {"x": [1]}, file=3, progress=False)
 
 
-def test_what_does_not_fit_is_told_before_any_process_is_started(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_what_does_not_fit_is_told_before_any_process_is_started(capfd):
     def square(x: float) -> float:
         return x * x
 
@@ -274,16 +269,14 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(
     assert capfd.readouterr().err == ""
 
 
-def test_a_function_that_ends_its_program_ends_its_point_only() -> None:
+def test_a_function_that_ends_its_program_ends_its_point_only():
     table = fb.sweep(
         lambda x: sys.exit(f"no {x}") if x == 1 else x, {"x": [0, 1, 2]}, workers=1, progress=False
     )
     assert table["error"][1] == "SystemExit: no 1" and table["error"].isna().tolist() == [1, 0, 1]
 
 
-def test_the_bar_counts_points_and_failures_and_can_be_switched_off(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd):
     fb.sweep(lambda x: 1 / x, {"x": [0, 1]}, workers=1)
     bar = capfd.readouterr().err
     assert "2/2" in bar and "failed=1" in bar

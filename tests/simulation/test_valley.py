@@ -56,7 +56,7 @@ def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options:
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.04])  # m, of the valley's bottom to the left
-def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
+def test_go2_stands_in_a_valley_with_a_level_base(shift):
     robot, (left, right) = judges.load("go2"), sides(20.0)
     sim = fb.Simulation(
         robot, Ground(normal=[left, right], offset=[shift * left[1], shift * right[1]])
@@ -88,7 +88,7 @@ def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
     )
 
 
-def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() -> None:
+def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet():
     """The lower feet push the upper ones into the slope; the CoM is not between the feet."""
     robot, (left, right) = judges.load("go2"), sides(40.0)
     slope, y_high, y_low = np.tan(np.deg2rad(40.0)), 0.16, -0.06
@@ -122,7 +122,7 @@ def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() 
     assert wrench_set(spot, level, facets=8).support_region()[:, 1].max() < spot.com[1]
 
 
-def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> None:
+def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides():
     robot, (left, right) = judges.load("go2"), sides(30.0)
     home = robot.standing()
     contacts = fb.Contacts.points(robot)
@@ -150,7 +150,7 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> Non
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name: str) -> None:
+def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name):
     robot, normal, offset = judges.load(name), np.array([0.1, 0.05, 1.0]), 0.3
     near, far = (fb.Simulation(robot, Ground(normal=normal, offset=at)) for at in (0.0, offset))
     shift = offset * near.ground.normals[0]
@@ -165,7 +165,7 @@ def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(n
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_standing_on_a_slope_may_keep_the_base_level(name: str) -> None:
+def test_standing_on_a_slope_may_keep_the_base_level(name):
     robot, normal = judges.load(name), np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
     state, home = robot.standing(normal=normal, offset=0.2), robot.standing()
     for foot in robot.feet:

@@ -66,7 +66,7 @@ def vertices(item: Item) -> np.ndarray:
     )
 
 
-def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_marks_are_where_the_walk_plans(viewer, walked):
     run, walk = walked
     state, look = run.final, viewer.walk_overlay(walk, run.final)
     assert walk.plan is not None and walk.time == run.time[-1]
@@ -93,9 +93,7 @@ def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, W
         assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
 
 
-def test_a_line_follows_the_swing_to_its_foothold(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_line_follows_the_swing_to_its_foothold(viewer, walked):
     run, walk = walked
     look = viewer.walk_overlay(walk, run.final)
     for foot, path in walk.swings.items():
@@ -111,9 +109,7 @@ def test_a_line_follows_the_swing_to_its_foothold(
         assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
 
 
-def test_a_swing_with_a_new_target_costs_no_new_shape(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_swing_with_a_new_target_costs_no_new_shape(viewer, walked):
     run, walk = walked
     viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final))
     shapes = {path: item.shape for path, item in viewer.renderer.picture.items()}
@@ -134,9 +130,7 @@ def test_a_swing_with_a_new_target_costs_no_new_shape(
     )
 
 
-def test_a_stored_step_is_drawn_as_it_was_planned(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_stored_step_is_drawn_as_it_was_planned(viewer, walked):
     run, walk = walked
     step, t = walk.history[2], walk.history[2].time + 0.1
     row = int(np.searchsorted(run.time, t - 1e-9))
@@ -150,16 +144,12 @@ def test_a_stored_step_is_drawn_as_it_was_planned(
         assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
-def test_a_walk_has_no_marks_before_its_first_control_step(
-    viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_a_walk_has_no_marks_before_its_first_control_step(viewer, go2, standing):
     walk = Walk(go2, Contacts.feet(go2), Gait.trot(go2))
     assert viewer.walk_overlay(walk, standing) == {} and walk.time is None
 
 
-def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
-    biped: tuple[Rollout, Walk],
-) -> None:
+def test_soles_are_outlined_with_position_and_rotation_at_touchdown(biped):
     run, walk = biped
     viewer = Viewer(run.robot)
     try:
@@ -181,9 +171,7 @@ def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
         viewer.close()
 
 
-def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(viewer, walked):
     run, walk = walked
     viewer.show(
         run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final), title="go2 trots"
@@ -201,7 +189,7 @@ def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(
     assert len(kinds) == 4 and not {MEASURED, PLANNED, *CONE.values()} & set(kinds.values())
 
 
-def test_invalid_overlays_are_refused_by_name(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_invalid_overlays_are_refused_by_name(viewer, walked):
     run, walk = walked
     refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
     refused(
@@ -237,7 +225,7 @@ def arm() -> Rollout:
     return fb.rollout(Simulation(robot), ConstantTorques(np.zeros(6)), 0.01)
 
 
-def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_a_recorded_walk_plays_with_its_marks(viewer, walked):
     run, walk = walked
     viewer.play(run, steps=walk.history)
     (command,) = (
@@ -268,7 +256,7 @@ def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Roll
     }
 
 
-def test_a_followed_path_is_smooth_without_the_sway_of_steps() -> None:
+def test_a_followed_path_is_smooth_without_the_sway_of_steps():
     t = np.linspace(0.0, 4.0, 121)
     straight = np.stack([0.3 * t, -0.1 * t, np.full_like(t, 0.3)], axis=1)
     assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
@@ -280,7 +268,7 @@ def test_a_followed_path_is_smooth_without_the_sway_of_steps() -> None:
     refused(lambda: recording.smoothed(t, straight[:3]), InputError, 121, 3)
 
 
-def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, standing: State) -> None:
+def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer, standing):
     q = standing.q.copy()
     q[:2] = 40.0, -21.0
     viewer.show(State(viewer.robot, q))
@@ -291,7 +279,7 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     assert_allclose(lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3)
 
 
-def test_a_gait_diagram_shows_stances_and_measured_contacts(walked: tuple[Rollout, Walk]) -> None:
+def test_a_gait_diagram_shows_stances_and_measured_contacts(walked):
     run, _ = walked
     axis = plots.plot_gait(run)
     names = [label.get_text() for label in axis.get_yticklabels()]
@@ -312,7 +300,7 @@ def test_a_gait_diagram_shows_stances_and_measured_contacts(walked: tuple[Rollou
     plt.close("all")
 
 
-def test_normal_forces_are_plotted_for_each_foot(biped: tuple[Rollout, Walk]) -> None:
+def test_normal_forces_are_plotted_for_each_foot(biped):
     run, _ = biped
     _, grid = plt.subplots(3, 1, sharex=True)
     plots.plot_gait(run, grid[0])

@@ -51,7 +51,7 @@ def framed(
     page.goto("about:blank")
 
 
-def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(framed) -> None:
+def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(framed):
     page, inner = framed
     home = inner.evaluate(CAMERA)
     page.mouse.move(450, 500)
@@ -74,7 +74,7 @@ def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(fra
     page.wait_for_function("scrollY > 60")
 
 
-def test_views_parts_and_keys(framed) -> None:
+def test_views_parts_and_keys(framed):
     page, inner = framed
     home = inner.evaluate(CAMERA)
     inner.evaluate("document.querySelector('#tools details').open = true")

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
-from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -24,21 +23,19 @@ from floatbase.robots import Robot, catalogue, load
 from .looks import picture
 
 
-def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_robots_are_listed(capsys):
     assert main(["robots"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(catalogue())
 
 
-def test_a_wrong_name_or_port_is_a_message_not_a_traceback(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
     assert main(["view", "go3", "--no-browser"]) == 2
     assert not missing(capsys.readouterr().err, "go3", "go2")
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
     assert not missing(capsys.readouterr().err, "port", 99999)
 
 
-def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_urdf_of_ones_own_is_shown(tmp_path, capsys):
     file, solo = tmp_path / "mine.urdf", load("solo12")
     file.write_text(solo.urdf)
     assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
@@ -56,7 +53,7 @@ def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
+def test_ctrl_c_ends_it_cleanly(number):
     command = [sys.executable, "-m", "floatbase", "view", "ur5", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -71,7 +68,7 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 @pytest.mark.front_end
-def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
+def test_the_robot_waits_for_its_first_page(page, go2):
     with closing(Playground(go2)) as playground, ThreadPoolExecutor(1) as other:
         ended = Event()
         begun = other.submit(start_when_connected, playground, ended)
@@ -86,7 +83,7 @@ def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
             ended.set()
 
 
-def test_the_end_of_the_program_ends_the_wait_for_a_page(go2: Robot) -> None:
+def test_the_end_of_the_program_ends_the_wait_for_a_page(go2):
     ended = Event()
     ended.set()
     with closing(Playground(go2)) as playground:
@@ -102,7 +99,7 @@ def playground(go2: Robot) -> Iterator[Playground]:
     started.close()
 
 
-def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:
+def test_the_controls_reach_the_robot(page, playground, go2):
     def work() -> None:
         page.wait_for_timeout(20)
 
@@ -136,9 +133,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
 
 
 @pytest.mark.front_end
-def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
-    page, playground: Playground
-) -> None:
+def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground):
     def work() -> None:
         page.wait_for_timeout(20)
 
@@ -173,9 +168,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
 
 
 @pytest.mark.front_end
-def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
-    page, playground: Playground
-) -> None:
+def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground):
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
     page.goto(playground.url)
@@ -208,7 +201,7 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
-def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
+def test_a_window_that_closes_first_stops_the_run(playground):
     until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
@@ -216,7 +209,7 @@ def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> Non
     playground.run.close()
 
 
-def test_the_pace_is_simulated_time_over_time() -> None:
+def test_the_pace_is_simulated_time_over_time():
     now = [0.0]
     pace = RealTimeFactor(lambda: now[0])
     for i in range(101):
@@ -232,7 +225,7 @@ def test_the_pace_is_simulated_time_over_time() -> None:
 
 
 @pytest.mark.parametrize("name", ["ur5", "talos"])
-def test_robots_without_point_feet_run_too(name: str) -> None:
+def test_robots_without_point_feet_run_too(name):
     playground = Playground(load(name))
     playground.start()
     until(lambda: playground.session.sim.time >= 0.05)

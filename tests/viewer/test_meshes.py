@@ -24,7 +24,7 @@ BOX = 0.01
 REACH = 0.03
 
 
-def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
+def test_light_meshes_are_under_400_kb_and_good_triangles():
     for name in catalogue():
         assert (MESHES / f"{name}.npz").stat().st_size < 400_000, name
         for mesh in robot_meshes(load(name)):
@@ -33,9 +33,7 @@ def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
 
 
 @pytest.mark.parametrize("name", catalogue())
-def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(
-    name: str,
-) -> None:
+def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(name):
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
@@ -55,7 +53,7 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
         assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
 
 
-def test_light_meshes_reach_down_to_the_contacts() -> None:
+def test_light_meshes_reach_down_to_the_contacts():
     for name in catalogue():
         robot = load(name)
         if not robot.feet:
@@ -71,13 +69,13 @@ def test_light_meshes_reach_down_to_the_contacts() -> None:
             assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < REACH, name
 
 
-def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
+def test_a_robot_outside_the_catalogue_shows_its_own_meshes():
     pytest.importorskip("trimesh", reason="other robots' meshes are read with trimesh")
     robot = load("hyq", feet=["lf_foot", "rf_foot", "lh_foot", "rh_foot"])
     assert sum(len(mesh.faces) for mesh in robot_meshes(robot)) > 1000
 
 
-def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     robot = load_urdf(
         load("go2").urdf.replace("package://", "package://unheard/of/"), feet=["RR_foot"]
@@ -89,7 +87,7 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     assert np.linalg.norm(calf - foot, axis=1).min() < REACH
 
 
-def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
+def test_light_meshes_belong_to_a_urdf_and_not_to_a_name():
     """Light meshes are found for the same visuals, whatever the name of the robot.
 
     Another name, other masses and legs further apart keep them. Other feet, another joint or
@@ -118,7 +116,7 @@ def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
     assert len(robot_meshes(other)) < len(light)
 
 
-def test_the_base_of_a_floating_arm_moves_with_it() -> None:
+def test_the_base_of_a_floating_arm_moves_with_it():
     arm = load("ur5")
     bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
     loose = with_floating_base(arm)
@@ -128,7 +126,7 @@ def test_the_base_of_a_floating_arm_moves_with_it() -> None:
         assert_array_equal(free[joint + 1].vertices, mesh.vertices)
 
 
-def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
+def test_parts_of_a_locked_joint_move_with_its_parent():
     arm = load("ur5")
     stiff = load("ur5", locked=["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"])
     meshes = robot_meshes(stiff)

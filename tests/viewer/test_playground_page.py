@@ -43,7 +43,7 @@ def opened(page, field: Playground) -> None:
     page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")
 
 
-def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> None:
+def test_every_control_can_be_moved_to_both_ends(page, field):
     opened(page, field)
     page.evaluate(ENDS)
     for count in ("#panel input[type=checkbox]", "#board button", "#panel .buttons button"):
@@ -76,7 +76,7 @@ def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> Non
     page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
 
 
-def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> None:
+def test_the_push_slider_pushes_when_it_is_released(page, field):
     opened(page, field)
     box = page.locator("input[aria-label='push [N]']").bounding_box()
     y = box["y"] + 0.5 * box["height"]
@@ -94,7 +94,7 @@ def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> 
     assert field.last_push is None
 
 
-def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) -> None:
+def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field):
     opened(page, field)
     page.wait_for_timeout(500)
     # the middle of the base on the page, and the same point moved in the direction of +y
@@ -123,9 +123,7 @@ def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) 
 
 
 @pytest.mark.parametrize("size", [(1200, 700), (390, 780)])
-def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
-    page, field: Playground, size: tuple[int, int]
-) -> None:
+def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(page, field, size):
     page.set_viewport_size({"width": size[0], "height": size[1]})
     opened(page, field)
     assert "Push the robot" in page.evaluate(
@@ -143,7 +141,7 @@ def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
     until(lambda: field.run.status == "paused", lambda: page.wait_for_timeout(20))
 
 
-def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
+def test_a_challenge_is_started_and_solved(page, field):
     number = next(
         i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?"
     )
@@ -158,7 +156,7 @@ def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
     picture(page, "playground_solved")
 
 
-def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: Playground) -> None:
+def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field):
     """The plan lacks 0.5 m g. The CoM task makes up for it at an error of 0.5 g / kp = 49 mm."""
     opened(page, field)
 
@@ -181,7 +179,7 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: P
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
 
-def test_a_notebook_shows_and_runs_the_playground() -> None:
+def test_a_notebook_shows_and_runs_the_playground():
     shown = playground("solo12")
     try:
         assert "image/png" in shown._repr_mimebundle_()[0]
@@ -191,7 +189,7 @@ def test_a_notebook_shows_and_runs_the_playground() -> None:
         shown.close()
 
 
-def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
+def test_a_push_after_a_fall_is_seen_by_the_new_judge(field):
     """The push puts the robot back on its feet, which starts a new judge."""
     field.start_challenge(
         next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side")
@@ -203,7 +201,7 @@ def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None
         until(lambda seen=size: f"{0.1 * seen:.1f} N·s toppled" in field.judge.message)
 
 
-def test_challenges_can_be_changed_during_a_run(field: Playground) -> None:
+def test_challenges_can_be_changed_during_a_run(field):
     for challenge in (CHALLENGES[0], None, *CHALLENGES[6:9], None):
         field.start_challenge(challenge)
         before = field.session.sim.time
@@ -213,7 +211,7 @@ def test_challenges_can_be_changed_during_a_run(field: Playground) -> None:
     assert field.run.error is None
 
 
-def test_a_paused_challenge_continues_with_run(field: Playground) -> None:
+def test_a_paused_challenge_continues_with_run(field):
     number, challenge = next(
         (i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused
     )
@@ -229,9 +227,7 @@ def test_a_paused_challenge_continues_with_run(field: Playground) -> None:
     until(lambda: field.session.sim.time > 0.2)
 
 
-def test_reset_everything_includes_the_push_the_speed_and_the_terms(
-    page, field: Playground
-) -> None:
+def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field):
     first = (field.force, field.towards)
     controls = ("speed", "push [N]", "show forces", "show gravity")
 
@@ -270,7 +266,7 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
-def test_an_unknown_setting_is_refused_and_the_run_continues(field: Playground) -> None:
+def test_an_unknown_setting_is_refused_and_the_run_continues(field):
     with raises(UnknownNameError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
@@ -278,7 +274,7 @@ def test_an_unknown_setting_is_refused_and_the_run_continues(field: Playground) 
     assert field.session.settings.facets == 6 and field.run.status == "paused"
 
 
-def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
+def test_undo_restores_the_settings_before_the_last_change(go2):
     """Steps of one drag are one change, and a refused change is none."""
     paused = Playground(go2)
     try:
@@ -301,7 +297,7 @@ def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
         paused.close()
 
 
-def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
+def test_ctrl_z_undoes_a_change_of_the_page(page, field):
     opened(page, field)
     for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
@@ -315,7 +311,7 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
         page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
 
 
-def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> None:
+def test_the_address_has_the_settings_and_sets_them(page, field):
     opened(page, field)
     assert page.evaluate("location.hash") == ""
     page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
@@ -342,7 +338,7 @@ def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> 
     assert field.session.settings.friction == (0.7, 0.7)
 
 
-def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
+def test_wrong_arguments_raise_our_own_errors(field):
     force = field.force
     with raises(InputError, "robot", 5):
         playground(5)
@@ -362,9 +358,7 @@ def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
     assert field.force == force and field.challenge is None
 
 
-def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(
-    go2: Robot,
-) -> None:
+def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(go2):
     """The physics accepts a slope of 89°, but the picture does not."""
     paused = Playground(go2)
     try:
@@ -384,7 +378,7 @@ def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_wa
         paused.close()
 
 
-def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: Playground) -> None:
+def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field):
     field.set(gait="trot", actual_off=("gravity",))
     until(lambda: field.run.status == "fell")
     until(lambda: field.outcome.startswith("left the ground"))
@@ -395,7 +389,7 @@ def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: P
     until(lambda: field.outcome.startswith("fell"))
 
 
-def test_reset_everything_works_for_an_arm() -> None:
+def test_reset_everything_works_for_an_arm():
     arm = Playground(fb.load("ur5"))
     try:
         arm.start().reset_all()
@@ -405,7 +399,7 @@ def test_reset_everything_works_for_an_arm() -> None:
         arm.close()
 
 
-def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field: Playground) -> None:
+def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field):
     page.set_viewport_size({"width": 390, "height": 844})
     opened(page, field)
     page.wait_for_function("viewer.camera.zoom > 0.3 && viewer.camera.zoom < 1")
@@ -413,7 +407,7 @@ def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field: Playground
     picture(page, "playground_phone")
 
 
-def test_the_actual_slope_is_drawn(field: Playground) -> None:
+def test_the_actual_slope_is_drawn(field):
     field.set(slope=(0.0, 20.0))
     until(
         lambda: (

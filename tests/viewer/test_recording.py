@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -72,9 +71,7 @@ def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
     )
 
 
-def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(viewer, go2):
     stairs = fb.Ground.stairs(2, 0.1, 0.3, 0.5)
     sim = fb.Simulation(go2, stairs)
     state = go2.standing()
@@ -88,9 +85,7 @@ def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(
     assert not hasattr(viewer.painter.drawn_ground, "boxes")
 
 
-def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer, go2):
     made = record(go2, 0.2)
     held = LinearConstraint("held", 2, lambda state, t: (np.eye(2, go2.nv), np.zeros(2)))
     forces = np.hstack([made.measured, np.full((len(made), 2), np.nan)])
@@ -103,14 +98,14 @@ def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(
     assert drawn == {f"measured/{name}" for name in made.contacts.names}
 
 
-def test_a_record_is_thinned_to_thirty_pictures_a_second() -> None:
+def test_a_record_is_thinned_to_thirty_pictures_a_second():
     rows = recording.sampled_rows(np.arange(0.0, 2.0, 1e-3), 30.0)
     assert rows[0] == 0 and rows[-1] == 1999
     assert 60 <= rows.size <= 62
     assert list(recording.sampled_rows([0.0], 30.0)) == [0]
 
 
-def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -> None:
+def test_the_robot_and_its_forces_move_as_recorded(viewer, go2):
     rollout = record(go2)
     viewer.play(rollout)
     moving = tracks(viewer)
@@ -124,9 +119,7 @@ def test_the_robot_and_its_forces_move_as_recorded(viewer: Viewer, go2: Robot) -
     assert times[-1] == pytest.approx(rollout.time[-1])
 
 
-def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hidden(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hidden(viewer, go2):
     viewer.play(record(go2))
     moving = tracks(viewer)
     times, colours = moving["cone/FL_foot/surface", "shape.material.color"]
@@ -145,7 +138,7 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     assert_array_equal(pushed[:, 0], (times >= 0.3 - 1e-6) & (times < 0.5 - 1e-6))
 
 
-def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, go2: Robot) -> None:
+def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer, go2):
     rollout = record(go2)
     swings = (rollout.time > 0.4) & (rollout.time < 1.0)
     stance = rollout.contacts.without("FL_foot")
@@ -168,7 +161,7 @@ def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer: Viewer, g
     assert {3, 4} <= {len(numbers) // 6 for numbers in points}
 
 
-def test_quaternions_do_not_jump(go2: Robot, viewer: Viewer) -> None:
+def test_quaternions_do_not_jump(go2, viewer):
     rollout = record(go2)
     angle = 4 * np.pi * rollout.time / rollout.time[-1]
     rollout.q.flags.writeable = True
@@ -180,7 +173,7 @@ def test_quaternions_do_not_jump(go2: Robot, viewer: Viewer) -> None:
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.2
 
 
-def test_facets_that_light_up_become_tracks(go2: Robot) -> None:
+def test_facets_that_light_up_become_tracks(go2):
     viewer = Viewer(go2, facets=4)
     viewer.play(record(go2))
     lit = {path for path, name in tracks(viewer) if "facet" in path and name == ".visible"}
@@ -188,9 +181,7 @@ def test_facets_that_light_up_become_tracks(go2: Robot) -> None:
     viewer.close()
 
 
-def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(
-    viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer, go2, standing):
     viewer.show(standing)
     before = {
         key: value
@@ -209,9 +200,7 @@ def on_its_feet(robot: Robot) -> Contacts:
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
-def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(
-    tmp_path: Path,
-) -> None:
+def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(tmp_path):
     sizes, outside = {}, []
     for name in catalogue():
         robot = load(name)
@@ -235,9 +224,7 @@ def test_every_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less
     assert outside == []
 
 
-def test_wrong_records_and_file_names_are_refused(
-    viewer: Viewer, go2: Robot, standing: State, tmp_path: Path
-) -> None:
+def test_wrong_records_and_file_names_are_refused(viewer, go2, standing, tmp_path):
     refused(lambda: viewer.play(record(load("solo12"))), InputError, "go2", "solo12")
     refused(lambda: viewer.play(record(go2, duration=0.0)), InputError)
     refused(lambda: viewer.play(record(go2), speed=0), InputError, "speed", 0)
@@ -248,9 +235,7 @@ def test_wrong_records_and_file_names_are_refused(
     refused(lambda: viewer.save(tmp_path / "nowhere" / "x.html"), ViewerError, "nowhere/x.html")
 
 
-def test_a_saved_animation_plays_from_disk_without_network(
-    page, viewer: Viewer, go2: Robot, tmp_path: Path
-) -> None:
+def test_a_saved_animation_plays_from_disk_without_network(page, viewer, go2, tmp_path):
     rollout = record(go2)
     viewer.play(rollout, paused=True, title="saved")
     viewer.close()
@@ -286,7 +271,7 @@ TARGET = "viewer.controls.target.toArray()"
 STEP = 0.01  # m: what the eye does not see in a page that follows a robot through metres
 
 
-def test_the_camera_goes_with_the_robot(page, viewer: Viewer, go2: Robot, standing: State) -> None:
+def test_the_camera_goes_with_the_robot(page, viewer, go2, standing):
     page.set_viewport_size(SMALL)
     viewer.play(record(go2, walk=1.0), paused=True)
     page.goto(viewer.url)
@@ -329,9 +314,7 @@ WITHHOLD = """() => {
 
 
 @pytest.mark.front_end
-def test_a_busy_page_shows_the_second_record_as_it_is(
-    page, viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer, standing, contacts):
     page.set_viewport_size(SMALL)
     viewer.play_pictures(
         [0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True
@@ -357,7 +340,7 @@ def test_a_busy_page_shows_the_second_record_as_it_is(
     assert arrow[1] == pytest.approx(length, rel=1e-3)
 
 
-def test_plots_show_the_record_in_the_colours_of_the_scene(go2: Robot) -> None:
+def test_plots_show_the_record_in_the_colours_of_the_scene(go2):
     rollout = record(go2)
     used = plots.friction_used(rollout, rollout.measured)
     assert used[0, 1000] == pytest.approx(0.9 / 0.6) and used[1, 1000] == 0.0

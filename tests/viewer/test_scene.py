@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
-from floatbase.robots import Robot, State, catalogue, load
+from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
 from floatbase.viewer.scene.colours import ALARM, CALM, IDLE, WARNING
@@ -50,7 +50,7 @@ def material(viewer: Viewer, path: str) -> dict[str, Any]:
     return viewer.window.scene.commands()[path, "set_object", ""]["object"]["materials"][0]
 
 
-def test_every_joint_is_where_the_state_says(viewer: Viewer, go2: Robot) -> None:
+def test_every_joint_is_where_the_state_says(viewer, go2):
     state = go2.random_state(3)
     viewer.show(state)
     placed = matrices(viewer, "/meshcat/robot/")
@@ -60,9 +60,7 @@ def test_every_joint_is_where_the_state_says(viewer: Viewer, go2: Robot) -> None
 
 
 @pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
-def test_arrows_start_at_contacts(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray, factor: float
-) -> None:
+def test_arrows_start_at_contacts(viewer, standing, contacts, forces, factor):
     viewer.show(standing, contacts, forces=factor * forces, planned=0.5 * factor * forces)
     for kind, share in (("measured", 1.0), ("planned", 0.5)):
         arrows = matrices(viewer, f"/meshcat/{kind}/")
@@ -79,8 +77,8 @@ def test_arrows_start_at_contacts(
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
 @pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
 def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
-    viewer: Viewer, go2: Robot, standing: State, normal: tuple[float, ...], mu: float
-) -> None:
+    viewer, go2, standing, normal, mu
+):
     contacts = Contacts.points(go2, mu=mu, normals=normal)
     viewer.show(standing, contacts)
     cones = matrices(viewer, "/meshcat/cone/")
@@ -94,9 +92,7 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
         assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_the_colour_of_a_cone_shows_where_its_force_is(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_the_colour_of_a_cone_shows_where_its_force_is(viewer, standing, contacts, forces):
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
     for shown in (
         {"forces": forces},
@@ -110,9 +106,7 @@ def test_the_colour_of_a_cone_shows_where_its_force_is(
 
 
 @pytest.mark.parametrize("facets", [None, 4])
-def test_a_cone_without_a_force_is_grey_and_faint(
-    go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, facets: int | None
-) -> None:
+def test_a_cone_without_a_force_is_grey_and_faint(go2, standing, contacts, forces, facets):
     viewer = Viewer(go2, facets=facets)
     names = contacts.point_names
 
@@ -143,9 +137,7 @@ def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3])
-def test_the_ground_lies_under_the_contacts_of_a_slope(
-    viewer: Viewer, go2: Robot, height: float
-) -> None:
+def test_the_ground_lies_under_the_contacts_of_a_slope(viewer, go2, height):
     slope = np.array([0.3, -0.15, 1.0]) / np.linalg.norm([0.3, -0.15, 1.0])
     state = Simulation(go2, Ground(normal=slope)).state
     q = state.q.copy()
@@ -167,7 +159,7 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(
         assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
 
 
-def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing: State) -> None:
+def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2, standing):
     slope = np.array([0.6, 0.0, 0.8])
     ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
     viewer = Viewer(go2)
@@ -189,7 +181,7 @@ def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing
     viewer.close()
 
 
-def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> None:
+def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2):
     ground = Ground(normal=[[0.0, -0.4, 1.0], [0.1, 0.4, 1.0]], offset=[0.1, 0.0])
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
@@ -208,9 +200,7 @@ def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> 
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
-def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(
-    go2: Robot,
-) -> None:
+def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(go2):
     ground = Ground.stairs(2, 0.1, start=0.0, width=1.0)
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
@@ -234,9 +224,7 @@ def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_
     viewer.close()
 
 
-def test_polyhedra_highlight_their_active_facets(
-    go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_polyhedra_highlight_their_active_facets(go2, standing, contacts):
     viewer = Viewer(go2, facets=4)
     force = np.tile([0.0, 0.0, 40.0], (4, 1))
     force[0, 0] = 40 * 0.6 * np.cos(np.pi / 4)  # facet 0 looks along x
@@ -254,9 +242,7 @@ def test_polyhedra_highlight_their_active_facets(
     viewer.close()
 
 
-def test_only_given_items_are_drawn(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_only_given_items_are_drawn(viewer, standing, contacts, forces):
     viewer.show(standing, com=False)
     bare = paths(viewer)
     viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
@@ -276,18 +262,14 @@ def test_only_given_items_are_drawn(
     assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""
 
 
-def test_showing_twice_sends_nothing(
-    viewer: Viewer, go2: Robot, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_showing_twice_sends_nothing(viewer, go2, contacts, forces):
     viewer.show(go2.standing(), contacts, forces=forces, title="twice")
     newest = viewer.window.scene.newest
     viewer.show(go2.standing(), contacts, forces=forces.ravel(), title="twice")
     assert viewer.window.scene.newest == newest
 
 
-def test_a_change_sends_only_what_changed(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_a_change_sends_only_what_changed(viewer, standing, contacts, forces):
     viewer.show(standing, contacts, forces=forces)
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
@@ -317,11 +299,11 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
 
 
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
-def test_a_scene_shows_the_last_picture_however_paths_are_spelt(pictures: list[Picture]) -> None:
+def test_a_scene_shows_the_last_picture_however_paths_are_spelt(pictures):
     assert scene_after(pictures) == scene_after(pictures[-1:])
 
 
-def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> None:
+def test_a_path_without_a_name_is_refused(viewer, standing):
     viewer.show(standing)
     before = viewer.window.scene.commands()
     for path in ("", "/", "//"):
@@ -330,28 +312,24 @@ def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> No
     assert viewer.window.scene.commands() == before
 
 
-def test_an_interrupted_picture_is_drawn_again(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_an_interrupted_picture_is_drawn_again(viewer, standing, contacts):
     viewer.show(standing)
     put, viewer.window.put = (
         viewer.window.put,
         lambda updates: (_ for _ in ()).throw(KeyboardInterrupt),
-    )  # type: ignore
+    )
     with pytest.raises(KeyboardInterrupt):
         viewer.show(standing, contacts)
-    viewer.window.put = put  # type: ignore[method-assign]
+    viewer.window.put = put
     viewer.show(standing)
     assert not any("/cone/" in path for path in paths(viewer))
     assert "/meshcat/robot/root_joint" in paths(viewer)
 
 
-def test_the_scale_bar_is_as_long_as_the_force_on_its_label(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer, standing, contacts):
     viewer.show(standing, contacts)
     label = viewer.painter.picture(standing, contacts)["scale/label"].shape.name
-    force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
+    force = float(re.fullmatch(r"([\d.]+) N", label)[1])
     assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(
         viewer.scale * force, rel=1e-5
     )
@@ -361,9 +339,7 @@ def legend(viewer: Viewer) -> list[str]:
     return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
-def test_the_legend_explains_what_is_shown(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
     viewer.show(
         standing,
         contacts,
@@ -399,9 +375,7 @@ def test_the_legend_explains_what_is_shown(
     assert legend(viewer) == []
 
 
-def test_forces_that_are_not_drawn_still_colour_their_cones(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_forces_that_are_not_drawn_still_colour_their_cones(viewer, standing, contacts, forces):
     def cones() -> dict:
         return {
             path: item.colour
@@ -418,7 +392,7 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(
     ]
 
 
-def test_a_view_chosen_before_the_first_picture_is_kept(go2: Robot, standing: State) -> None:
+def test_a_view_chosen_before_the_first_picture_is_kept(go2, standing):
     def eye(view: Viewer) -> list[float]:
         return list(view.window.scene.commands()["/", "set_camera", ""]["position"])
 
@@ -429,9 +403,7 @@ def test_a_view_chosen_before_the_first_picture_is_kept(go2: Robot, standing: St
     view.close()
 
 
-def test_only_a_call_of_camera_moves_the_camera_again(
-    viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_only_a_call_of_camera_moves_the_camera_again(viewer, go2, standing):
     def looked() -> int:
         return viewer.window.scene.since(0)[0]
 
@@ -445,7 +417,7 @@ def test_only_a_call_of_camera_moves_the_camera_again(
     assert looked() == before
 
 
-def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
+def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu():
     robot = load("talos")
     view, contacts = Viewer(robot), Contacts.flat_feet(robot, mu=0.7)
     view.show(robot.standing(), contacts)
@@ -459,9 +431,7 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     view.close()
 
 
-def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer, go2):
     state = go2.random_state(1)
     viewer.show(state)
     drawn = matrices(viewer, "/meshcat/com/")
@@ -469,7 +439,7 @@ def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(
     assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
 
 
-def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> None:
+def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers():
     for robot in map(load, catalogue()):
         viewer = Viewer(robot)
         viewer.show(robot.standing())
@@ -487,16 +457,14 @@ def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> N
         ), robot.name
 
 
-def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
+def test_the_name_of_a_robot_is_text_in_the_notebook(go2):
     view = Viewer(dataclasses.replace(go2, name='a "<b>"'))
     assert view.widget().name == 'a "<b>"'
     view.close()
     assert 'title="a &quot;&lt;b&gt;&quot;"' in view._repr_mimebundle_()["text/html"]
 
 
-def test_wrong_input_is_refused_by_name(
-    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_wrong_input_is_refused_by_name(viewer, go2, standing, contacts):
     other, locked = load("solo12").standing(), load("go2", locked=["FL_hip_joint"]).standing()
     for wrong, *named in (
         (lambda: viewer.show(other), "go2", "solo12"),
@@ -507,7 +475,7 @@ def test_wrong_input_is_refused_by_name(
         (lambda: viewer.show(standing, contacts, np.zeros(9)), "forces", 9, 12),
         (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), "planned", np.nan),
         (lambda: viewer.camera("above"), "above", "front"),
-        (lambda: viewer.camera(90.0), 90, "View"),  # type: ignore[arg-type]
+        (lambda: viewer.camera(90.0), 90, "View"),
         (lambda: Viewer("go2"), "robot", "Robot", "go2"),
         (lambda: Viewer(go2, background="pink"), "background", "pink", "white", "light", "dark"),
         (lambda: Viewer(go2, ground=[1, 0, 0]), "ground", 1),

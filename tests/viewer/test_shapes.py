@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,8 +17,7 @@ from floatbase.friction import FrictionPolyhedron, wrench_set
 from floatbase.lessons import FIGURES, props
 from floatbase.objectives import CoMTask, standing_tasks
 from floatbase.qp import Solution
-from floatbase.robots import Robot, State
-from floatbase.viewer import Viewer, markers, shapes
+from floatbase.viewer import markers, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, PLANNED, hex_code
@@ -35,9 +33,7 @@ from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, PLANNED, hex_c
     ],
     ids=["ball", "rod", "cylinder", "cone"],
 )
-def test_closed_meshes_face_outwards_and_have_their_volume(
-    mesh: geometry.Mesh, volume: float
-) -> None:
+def test_closed_meshes_face_outwards_and_have_their_volume(mesh, volume):
     vertices, faces = mesh
     a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=0.06)
@@ -46,14 +42,14 @@ def test_closed_meshes_face_outwards_and_have_their_volume(
 @pytest.mark.parametrize(
     "direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)]
 )
-def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
+def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction):
     turned = geometry.rotation_with_z_axis(direction)
     assert_allclose(turned[:, 2], direction, atol=1e-12)
     assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turned) == pytest.approx(1.0)
 
 
-def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
+def test_the_curled_arrow_turns_around_the_moment_with_its_radius():
     moment = np.array([0.1, -0.2, 0.2])
     item = markers.curled_arrow([1.0, 2.0, 3.0], moment)
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
@@ -93,24 +89,24 @@ NAN = float("nan")
         (lambda: props.bolts([0, 0, 0], 0.0), "radius", 0),
     ],
 )
-def test_invalid_shapes_are_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_invalid_shapes_are_refused_by_name(case):
     draw, *named = case
     refused(draw, InputError, *named)
 
 
-def test_a_push_ends_where_it_acts() -> None:
+def test_a_push_ends_where_it_acts():
     item = markers.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
     assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
 
 
-def test_two_points_have_no_support_polygon() -> None:
+def test_two_points_have_no_support_polygon():
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
     assert set(markers.support_region(square, 0.0)) == {""}
     assert markers.support_region(square[:2], 0.0) == {}
     assert markers.support_region(np.outer(np.arange(4.0), [1.0, 2.0, 0.0]), 0.0) == {}
 
 
-def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
+def test_a_wheel_that_rolls_forward_turns_its_mark_forward():
     # about +y, a quarter turn takes the mark from the top to the front
     start, quarter = (
         props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2)
@@ -119,13 +115,13 @@ def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
     assert_allclose(quarter, [1, 0, 0], atol=1e-12)
 
 
-def test_a_turntable_turns_to_the_left_below_its_given_top() -> None:
+def test_a_turntable_turns_to_the_left_below_its_given_top():
     table = props.turntable([1, 0, 0.5], 0.4, np.pi / 2).matrix
     assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
     assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
 
 
-def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> None:
+def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it():
     def middle(length: float) -> float:
         items = props.hydraulic_cylinder([0, 0, 0], [0, 0, length], (0.3, 0.5))
         rod = items["/rod"].matrix
@@ -138,7 +134,7 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
     assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
 
 
-def test_braces_make_a_subscript_in_a_label() -> None:
+def test_braces_make_a_subscript_in_a_label():
     images = [
         shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"]
         for text in ("fc", "f{c}")
@@ -170,7 +166,7 @@ DEFICIENCIES = {
 }
 
 
-def test_colours_are_distinct_for_colour_blind_readers() -> None:
+def test_colours_are_distinct_for_colour_blind_readers():
     for name, deficiency in DEFICIENCIES.items():
         for one, other in [
             (MEASURED, PLANNED),
@@ -185,9 +181,7 @@ def test_colours_are_distinct_for_colour_blind_readers() -> None:
             ), name
 
 
-def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(viewer, standing, contacts):
     wrenches = wrench_set(standing, contacts)
     forces = wrenches.max_horizontal_forces(8)[1]
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
@@ -225,9 +219,7 @@ def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
 
 
 @pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
-def test_multipliers_are_at_the_middle_of_their_facets(
-    viewer: Viewer, go2: Robot, standing: State, facets: int, turn: float
-) -> None:
+def test_multipliers_are_at_the_middle_of_their_facets(viewer, go2, standing, facets, turn):
     slopes = {foot.frame: [0.2, -0.1 if foot.frame[1] == "L" else 0.3, 1.0] for foot in go2.feet}
     contacts = Contacts.points(go2, mu=0.6, normals=slopes)
     task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
@@ -267,7 +259,7 @@ def test_multipliers_are_at_the_middle_of_their_facets(
         viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
 
-def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: State) -> None:
+def test_a_relatively_small_multiplier_has_no_label(viewer, standing):
     contacts = Contacts.points(standing.robot)
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
@@ -278,7 +270,7 @@ def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: St
     assert set(picture) == {"multiplier/FL_foot facet 0", "multiplier/FL_foot facet 2"}
 
 
-def test_figure_1_adds_up() -> None:
+def test_figure_1_adds_up():
     """The force f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
     right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
     drawn = right.renderer.picture
@@ -292,9 +284,7 @@ def test_figure_1_adds_up() -> None:
     right.close(), left.close()
 
 
-def test_no_path_of_a_picture_lies_below_another(
-    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_no_path_of_a_picture_lies_below_another(viewer, go2, standing, contacts):
     forces = np.tile([20.0, 0.0, 30.0], (4, 1))
     drawn = viewer.painter.picture(
         standing, contacts, forces, forces, support=True, wrench=np.ones(6),
