@@ -49,6 +49,12 @@ KINDS = ("go2", "solo8", "talos", "ur5")
 BALLS = tuple(name for name in FLOATING if name not in FLAT)
 
 
+def sampled(names: Iterable[str], *kept: str) -> list[object]:
+    """Names as parameters of a test, those that are not kept in `make test-all` only."""
+    later = pytest.mark.front_end
+    return [name if name in kept else pytest.param(name, marks=later) for name in names]
+
+
 def states(name: str, n: int, spread: float = 0.3) -> list[State]:
     """n random states of a robot, the same ones every time."""
     return [load(name).random_state(seed, spread) for seed in range(n)]

@@ -17,32 +17,23 @@ import floatbase
 PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
-LAYERS = (
-    (
-        "conventions",
-        "errors",
-        "_validation",
-        "_assets",
-        "_files",
-        "_geometry",
-        "affine",
-        "linear_algebra",
-    ),
-    ("qp",),
-    ("robots",),
-    ("dynamics",),
-    ("objectives",),
-    ("friction",),
-    ("control",),
-    ("actuators",),
-    ("simulation",),
-    ("behaviours",),
-    ("viewer",),
-    ("playground",),
-    ("lessons",),
-    ("__main__",),
-)
-LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
+LAYERS = """
+    conventions errors _validation _assets _files _geometry affine linear_algebra
+    qp
+    robots
+    dynamics
+    objectives
+    friction
+    control
+    actuators
+    simulation
+    behaviours
+    viewer
+    playground
+    lessons
+    __main__
+"""
+LAYER_OF = {name: layer for layer, line in enumerate(LAYERS.split("\n")) for name in line.split()}
 MAX_LINES = 400  # of a module, without docstrings
 MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
@@ -88,13 +79,12 @@ def layer(path: Path) -> int:
     return LAYER_OF[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
 
+@cache
 def file_of(module: str) -> Path | None:
     """The file of a module of the package."""
     folder = ROOT.joinpath(*module.split("."))
-    return next(
-        (path for path in (folder / "__init__.py", folder.with_suffix(".py")) if path in MODULES),
-        None,
-    )
+    files = (folder / "__init__.py", folder.with_suffix(".py"))
+    return next((path for path in files if path in MODULES), None)
 
 
 @cache
@@ -110,16 +100,21 @@ def parsed(path: Path) -> ast.Module:
 
 
 @cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(parsed(path)))
+
+
+@cache
 def imports(path: Path) -> list[Import]:
     """All imports of the package's modules at run time, also inside functions."""
     blocks = [
         node
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
     ]
     for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
     found = []
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import) and node not in for_types:
             found += [Import(node.lineno, alias.name, None) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node not in for_types:
@@ -173,7 +168,7 @@ def test_no_module_of_the_package_is_imported_by_a_string():
     """Except by an `__init__`, which is lazy; lessons are found by the names of their folders."""
     wrong = []
     for path in [path for path in MODULES if path.name != "__init__.py"]:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if not isinstance(node, ast.Call) or not node.args:
                 continue
             called, module = ast.unparse(node.func).rpartition(".")[2], node.args[0]
@@ -291,7 +286,7 @@ def test_floatbase_has_at_most_32_names_and_lists_them():
 def test_tests_use_public_names():
     wrong = []
     for path in TESTS:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if (
                 isinstance(node, ast.Attribute)
                 and is_private(node.attr)
@@ -392,7 +387,7 @@ def test_nothing_depends_on_the_order_of_a_set():
     returning = {
         f"{node.name}()"
         for path in MODULES
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.FunctionDef) and is_set_type(node.returns)
     }
     wrong = {

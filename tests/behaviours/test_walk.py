@@ -652,7 +652,7 @@ def test_what_does_not_fit_is_told_when_it_is_made():
             setattr(walk, name, getattr(walk, name, 0.2))
 
 
-@pytest.mark.parametrize("name", ["anymal_kinova", "hyq", "g1"])
+@pytest.mark.parametrize("name", judges.sampled(("anymal_kinova", "hyq", "g1"), "hyq"))
 def test_the_other_robots_walk_with_the_same_settings(name):
     record = run(walk_of(name, Gait.walk if name == "g1" else Gait.trot, (0.2, 0.0)), 3.0)
     assert record.outcome == "completed"
@@ -673,6 +673,7 @@ print(*record.contacts.names, *(hashlib.sha256(each.tobytes()).hexdigest() for e
 """
 
 
+@pytest.mark.front_end
 def test_a_walk_does_not_depend_on_the_hash_seed():
     answers = {
         subprocess.run(
@@ -696,7 +697,7 @@ def test_a_walk_that_is_used_again_gives_the_same_record():
         assert np.array_equal(getattr(third, name), getattr(first, name), equal_nan=True)
 
 
-@pytest.mark.parametrize("velocity", [(-0.3, 0.0), (0.0, 0.2)])
+@pytest.mark.parametrize("velocity", [(-0.3, 0.0)])
 def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity):
     """With straight knees, solo12 fell within 3 s; half a step was longer than its legs reach."""
     with warns(SimulationWarning, "solo12", 2.0):
@@ -756,7 +757,7 @@ def hexapod() -> Robot:
 HEXAPOD_FEET = [f"{side}{row}" for side in "LR" for row in "FMH"]
 
 
-@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.0), (0.0, 0.15)])
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.15)])
 def test_six_feet_walk_as_a_tripod(velocity):
     """The middle of three feet swayed a low body from side to side, and it fell within 1 s."""
     robot = hexapod()

@@ -134,7 +134,7 @@ def test_a_process_forked_while_threads_tick_ticks_on(backend):
     for thread in threads:
         thread.start()
     into, out = multiprocessing.Pipe(duplex=False)
-    for _ in range(20):
+    for _ in range(5):
         child = multiprocessing.get_context("fork").Process(target=answer, args=(out,))
         child.start()
         # s: a tick takes at most a few milliseconds
@@ -146,7 +146,7 @@ def test_a_process_forked_while_threads_tick_ticks_on(backend):
     ended.set()
     for thread in threads:
         thread.join()
-    assert answers == 20 * [expected]
+    assert answers == 5 * [expected]
 
 
 def test_a_replaced_controller_compiles_nothing():
@@ -284,6 +284,7 @@ def edit_copied(copy: Path) -> None:
     )
 
 
+@pytest.mark.front_end
 def test_edited_code_is_recompiled_and_installed_code_is_loaded(copied, tmp_path):
     """The installation compiles beside the source; the users' caches are elsewhere."""
     user = tmp_path / "user"

@@ -75,7 +75,7 @@ def lowest(state: fb.State) -> dict[str, float]:
     return low
 
 
-@pytest.mark.parametrize("towards", [20.0, 90.0, 110.0, 180.0, 290.0])
+@pytest.mark.parametrize("towards", [20.0, 110.0, 180.0])
 def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards):
     record = pushed("go2", 400.0, towards)
     assert record.outcome in ("fell", "controller failed")
@@ -85,8 +85,7 @@ def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards):
     assert np.abs(record.final.v).max() < SLOW  # at rest
 
 
-@pytest.mark.parametrize("name", ["talos", "anymal_kinova"])
-@pytest.mark.parametrize("towards", [80.0, 190.0])
+@pytest.mark.parametrize(("name", "towards"), [("talos", 80.0), ("anymal_kinova", 190.0)])
 def test_other_robots_lie_on_the_ground_too(name, towards):
     record = pushed(name, 4.0 * judges.load(name).weight, towards, settling_time=2.5)
     assert record.outcome in ("fell", "controller failed")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def assert_marked(table: pd.DataFrame) -> None:
     )
 
 
-def test_the_table_is_the_same_for_one_worker_and_for_two():
+def test_the_table_is_the_same_for_one_worker_and_for_two() -> None:
     one, two = (fb.sweep(spectrum, GRID, workers=w, progress=False) for w in (1, 2))
     assert_same_results(one, two)
     assert list(one.columns) == ["n", "scale", "values", "sum", "process", "error"]
@@ -76,7 +77,7 @@ def test_the_table_is_the_same_for_one_worker_and_for_two():
 
 
 @pytest.mark.front_end
-def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     """After a kill at a random time, only the points in progress are computed again."""
     after = np.random.default_rng(0).integers(2, 45)
     (tmp_path / "script.py").write_text(SCRIPT)
@@ -94,14 +95,15 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert said == "(60, 3) i result error\n"
     assert_marked(read_sweep(rows))
-    # no point has two lines, and the incomplete line is gone
-    assert rows.read_bytes().count(b"\n") == 61
+    assert (
+        rows.read_bytes().count(b"\n") == 61
+    )  # no point has two lines, and the incomplete line is gone
     calls = (tmp_path / "calls").read_text().split()
     assert set(calls) == {str(i) for i in range(60)}
     assert len(calls) - 60 <= 2 * 2  # for each of two workers, its present point and the next
 
 
-def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path):
+def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path: Path) -> None:
     def root(i: int, folder: str) -> float:
         with open(f"{folder}/calls", "a") as calls:
             calls.write(f"{i}")
@@ -119,7 +121,9 @@ def test_a_sweep_that_resumes_computes_failed_points_again(tmp_path):
     assert_frame_equal(read_sweep(file), second)
 
 
-def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tmp_path):
+def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(
+    tmp_path: Path,
+) -> None:
     script = tmp_path / "script.py"
     limit = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400, -1))  # bytes, of a "
@@ -139,7 +143,7 @@ def test_a_file_that_takes_no_more_is_told_and_the_sweep_goes_on_when_it_does(tm
     assert len((tmp_path / "calls").read_text().split()) - before == 60 - len(kept)
 
 
-def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path):
+def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path: Path) -> None:
     def patient(made: None, i: int) -> int:
         (tmp_path / "begun").touch()
         until = time.monotonic() + 60.0
@@ -165,7 +169,7 @@ def test_a_sweep_that_fails_in_one_thread_leaves_that_of_another_alone(tmp_path)
 
 
 @pytest.mark.front_end
-def test_workers_of_a_dask_cluster_give_the_same_table():
+def test_workers_of_a_dask_cluster_give_the_same_table() -> None:
     distributed = pytest.importorskip(
         "distributed", reason="Dask is not installed: pip install floatbase[cluster]"
     )
@@ -203,7 +207,7 @@ def test_workers_of_a_dask_cluster_give_the_same_table():
     assert found <= workers and os.getpid() not in found
 
 
-def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path):
+def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
 
     def square(x: float) -> float:
@@ -221,7 +225,10 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path):
     ):
         with raises(InputError, "rows.jsonl", *named):
             fb.sweep(function, grid, file=path, progress=False)
-    for again in (fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False), read_sweep(path)):
+    for again in (
+        fb.sweep(square, {"x": [1, 2.5]}, file=path, progress=False),
+        read_sweep(path),
+    ):
         assert_frame_equal(first, again, check_exact=True)
     assert path.read_bytes() == kept
     for content in ("a diary", "a diary\nof two lines\n", json.dumps({"point": 0}) + "\n"):
@@ -243,7 +250,9 @@ def test_a_file_of_something_else_is_refused_and_left_as_it_is(tmp_path):
         fb.sweep(square, {"x": [1]}, file=3, progress=False)
 
 
-def test_what_does_not_fit_is_told_before_any_process_is_started(capfd):
+def test_what_does_not_fit_is_told_before_any_process_is_started(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     def square(x: float) -> float:
         return x * x
 
@@ -269,14 +278,16 @@ def test_what_does_not_fit_is_told_before_any_process_is_started(capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_function_that_ends_its_program_ends_its_point_only():
+def test_a_function_that_ends_its_program_ends_its_point_only() -> None:
     table = fb.sweep(
         lambda x: sys.exit(f"no {x}") if x == 1 else x, {"x": [0, 1, 2]}, workers=1, progress=False
     )
     assert table["error"][1] == "SystemExit: no 1" and table["error"].isna().tolist() == [1, 0, 1]
 
 
-def test_the_bar_counts_points_and_failures_and_can_be_switched_off(capfd):
+def test_the_bar_counts_points_and_failures_and_can_be_switched_off(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     fb.sweep(lambda x: 1 / x, {"x": [0, 1]}, workers=1)
     bar = capfd.readouterr().err
     assert "2/2" in bar and "failed=1" in bar
