@@ -266,7 +266,7 @@ def test_the_integrator_agrees_with_a_tight_one():
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 100.0])
-def test_a_torque_step_is_followed_as_fast_as_the_bandwidth_says_and_exactly_in_the_end(bandwidth):
+def test_the_bandwidth_sets_the_speed_of_a_torque_step_which_ends_exactly(bandwidth):
     """10 to 90 % within 0.35 / bandwidth, as a first-order lag would; less than 10 % too much; no
     error that stays.
     """
@@ -347,7 +347,7 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
 
 
 @pytest.mark.parametrize("turn", [-1.0, -0.5, 0.0, 0.5, 1.0])
-def test_torque_saturates_where_the_pressure_says_and_never_beyond(turn):
+def test_the_supply_pressure_limits_the_torque(turn):
     actuators = joints(replace(HYQ, leakage=0.0))
     q, still = actuators.cylinders.max_lever_angle + turn, np.zeros(12)
     high, low = HYQ.supply_pressure, HYQ.tank_pressure
@@ -373,7 +373,7 @@ def test_where_crank_and_cylinder_line_up_there_is_no_torque():
     assert np.max(np.abs(out)) < 1e-6
 
 
-def test_all_joints_behave_alike_in_units_of_their_strength():
+def test_all_joints_have_the_same_response_relative_to_their_strength():
     """Similar cylinders: the same curve for solo12's 2.7 N·m and talos' 300 N·m."""
     curves = []
     for name in ("solo12", "talos"):

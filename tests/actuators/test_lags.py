@@ -96,7 +96,7 @@ def test_a_reset_puts_torques_under_way_or_none(late):
     assert not np.any(got(late, np.zeros((10, 12))))
 
 
-def test_nobody_can_change_torques_under_way_from_outside():
+def test_torques_on_their_way_cannot_be_changed_from_outside():
     late, wanted = Delay(ROBOT, 1e-3), np.ones(12)
     late.step(wanted, STILL, STILL, 1e-3)
     wanted[:] = 9.0

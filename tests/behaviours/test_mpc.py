@@ -298,7 +298,7 @@ def test_a_bound_with_flight_works_with_small_weights_on_pitch():
     assert np.rad2deg(tilt.max()) < 15.0
 
 
-def test_copies_and_restarts_walk_alike():
+def test_copies_and_restarts_give_the_same_torques():
     robot = judges.load("go2")
     walk = MPC(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.0), (0.3, 0.0))
     runs = [

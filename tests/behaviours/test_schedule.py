@@ -11,7 +11,6 @@ import pytest
 from messages import refused
 from scipy.spatial import ConvexHull
 
-import floatbase as fb
 from floatbase.behaviours import (
     LIPM,
     Gait,
@@ -76,7 +75,7 @@ def test_no_foot_lifts_from_the_stop_on_and_endless_standing_is_cut():
     assert gait.phases(3.0, 4, max_duration=1.0) == [(3.0, 4.0, ("a", "b"))]
 
 
-def test_stance_times_bear_the_rounding_of_the_clock():
+def test_stances_do_not_depend_on_the_rounding_of_the_clock():
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
     timestep, stances = 1e-3, []
     t = 0.0
@@ -211,10 +210,6 @@ def test_the_support_margin_is_the_distance_to_the_hull():
     assert np.isclose(support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0)
     assert np.isclose(support_margin([0.0, 1.0], [[0.0, 0.0]]), -1.0)
     refused(lambda: support_margin([0.0, 0.0], np.zeros((0, 2))), InputError, "feet")
-
-
-def test_names_of_the_front_door_are_untouched():
-    assert not {"Gait", "Walk"} & set(fb.__all__)  # they are exported by their package only
 
 
 def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_over():

@@ -108,7 +108,7 @@ def test_every_tick_of_a_walk_is_compiled():
     assert set(backends) == {"compiled"}
 
 
-def test_a_trot_bears_pushes_from_the_side():
+def test_a_trot_withstands_pushes_from_the_side():
     record, _ = trot(60.0)
     assert record.outcome == "completed" and abs(record.com[-1, 1]) < 0.15 and tilt(record) < 2.0
     assert trot(200.0)[0].outcome == "completed"
@@ -237,14 +237,14 @@ def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_
         assert next(len(step.stance) for step in stand.history if len(step.stance) < 4) == 2
 
 
-def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside():
+def test_it_stands_without_a_step_while_the_capture_point_is_inside():
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
     assert run(stand, 1.0, fb.Push([0.0, 40.0, 0.0], start=0.2)).outcome == "completed"
     assert all(len(step.stance) == 4 for step in stand.history)
 
 
-def test_contacts_give_way_where_torques_do_not_hold_them():
+def test_soft_contacts_yield_if_the_torques_are_too_small():
     robot = judges.load("talos")
     state, contacts = robot.standing(), judges.stance(robot)
     weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
@@ -263,7 +263,7 @@ def test_contacts_give_way_where_torques_do_not_hold_them():
     assert np.abs(rest).max() < 1e-6 * robot.weight
 
 
-def test_contacts_that_need_not_give_way_stand_as_held_ones_do():
+def test_soft_contacts_give_the_torques_of_hard_ones_if_these_suffice():
     robot = judges.load("go2")
     state, contacts = robot.standing(), judges.stance(robot)
     held, soft = (
@@ -277,7 +277,7 @@ def test_contacts_that_need_not_give_way_stand_as_held_ones_do():
     )
 
 
-def test_a_walk_gives_way_where_no_forces_hold_its_feet():
+def test_a_walk_softens_its_contacts_if_no_forces_hold_its_feet():
     robot = judges.load("talos")
     weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
     moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
@@ -291,7 +291,7 @@ def test_a_walk_gives_way_where_no_forces_hold_its_feet():
     ) and command.forces.shape == (walk.contacts.k,)
 
 
-def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike():
+def test_a_walk_and_its_recovery_do_not_depend_on_the_heading():
     robot, ways = judges.load("go2"), []
     feet = [foot.frame for foot in robot.feet]
     for yaw in (0.0, 2.0):
@@ -342,7 +342,7 @@ def test_a_stance_with_area_does_not_throw_its_feet_away():
     assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
 
 
-def test_posture_gives_way_to_the_walk():
+def test_a_stiff_posture_task_disturbs_the_walk():
     stiff = Gains(posture=(100.0, 1.0))
     fast = speed(run(walk_of("go2", Gait.trot, (0.3, 0.0), gains=stiff), 3.6), 2.5, 3.5)[0]
     assert abs(fast - 0.3) > 5 * abs(speed(trot()[0], 2.5, 3.5)[0] - 0.3)
@@ -401,7 +401,7 @@ def test_endless_standing_has_an_end_to_plan_for():
     assert np.all(np.isfinite(stand(state.q, state.v, 1e4).tau))
 
 
-def test_the_path_gives_way_after_a_long_step():
+def test_the_path_continues_from_where_a_push_moved_the_robot():
     (calm, _), (record, _) = trot(), trot(200.0)
     moved = record.com[-1, 1] - calm.com[-1, 1]
     assert moved > 0.1  # it continues from where it was pushed, and does not run back
@@ -570,7 +570,7 @@ def test_a_least_normal_force_bounds_the_ramps():
 # properties and errors ----------------------------------------------------------------------------
 
 
-def test_a_foothold_of_ones_own_is_taken():
+def test_feet_land_at_user_defined_footholds():
     asked = []
 
     def wider(foot: str, touchdown: float, walk: Walk) -> np.ndarray:
@@ -600,7 +600,7 @@ def test_a_walk_on_a_slope_follows_it():
     assert np.isclose(climbed[2] / climbed[0], np.tan(angle), rtol=0.15)
 
 
-def test_copies_begin_anew_and_walk_alike():
+def test_a_copy_starts_again_and_walks_like_the_original():
     walk = walk_of("go2", Gait.trot, (0.2, 0.0))
     before = run(walk, 1.6)
     for other in (copy.deepcopy(walk), pickle.loads(pickle.dumps(walk))):
@@ -608,7 +608,7 @@ def test_copies_begin_anew_and_walk_alike():
         assert np.array_equal(run(other, 1.6).q, before.q)
 
 
-def test_what_does_not_fit_is_told_when_it_is_made():
+def test_invalid_arguments_are_refused_when_a_walk_is_made():
     robot = judges.load("go2")
     contacts, trot = fb.Contacts.feet(robot), Gait.trot(robot)
     walk, flying = Walk(robot, contacts, trot), Gait(dict.fromkeys(contacts.names, 0.0), 1.0, 0.5)

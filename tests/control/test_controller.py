@@ -157,7 +157,7 @@ def test_an_arm_bolted_to_the_ground_gets_computed_torque():
         assert np.allclose(controller(state.q, state.v).tau, expected, atol=1e-5)
 
 
-def test_nothing_can_hold_a_robot_that_touches_nothing():
+def test_a_robot_without_contacts_falls_freely():
     robot = judges.load("go2")
     state = robot.standing()
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), fb.standing_tasks(state))
@@ -291,7 +291,7 @@ def test_torque_limits_are_the_robots_or_those_given_or_none():
     ]
 
 
-def test_every_row_of_the_problem_has_a_name_of_its_own():
+def test_every_row_of_the_problem_has_a_unique_name():
     for name in judges.ROBOTS:
         qp = judges.controller_of(name).qp(judges.load(name).standing())
         assert len(set(qp.equality_names)) == len(qp.equality_names) == len(qp.A)

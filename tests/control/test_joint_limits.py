@@ -250,7 +250,7 @@ def test_active_limits_are_named_for_joint_kind_and_side():
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_what_cannot_hold_is_violated_and_named(backend):
+def test_impossible_soft_constraints_are_violated_and_named(backend):
     """An impossible inequality, a squeezed force and a joint beyond its limit, all at once."""
     robot = judges.load("go2")
     standing = robot.standing()

@@ -183,7 +183,7 @@ def test_an_error_in_a_user_defined_task_reaches_the_user():
     refused(lambda: controller(own(lambda eom, t: 1 + "")), TypeError)
 
 
-def test_the_error_of_a_trajectory_that_begins_later_says_that_it_was_evaluated_at_0():
+def test_the_error_of_a_trajectory_that_begins_later_mentions_time_zero():
     def later(t: float) -> np.ndarray:
         if t < 1.0:
             raise ArithmeticError(f"nothing at {t}")
@@ -212,7 +212,7 @@ def test_a_number_of_another_type_is_used_or_refused(number):
 
 
 @pytest.mark.parametrize("name", ["backend", "tasks", "limits", "problem"])
-def test_what_a_controller_was_made_with_cannot_be_set(name):
+def test_the_arguments_of_a_controller_cannot_be_set(name):
     made = controller(fb.ForceTask(), backend="reference")
     for one in (made, copy.deepcopy(made), made.replace(contacts=CONTACTS)):
         with raises(AttributeError, name):

@@ -87,7 +87,7 @@ def infeasible(**options: object) -> tuple[fb.WholeBodyController, fb.State]:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_attempt_says_no_where_a_call_gives_the_reasons(backend):
+def test_an_attempt_returns_none_where_a_call_raises_an_error(backend):
     controller, state = infeasible(backend=backend)
     rest = TALOS.standing()
     assert controller.attempt(state.q, state.v) is None

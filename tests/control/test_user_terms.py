@@ -7,15 +7,18 @@ import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar
 
 import judges
 import numpy as np
 import pytest
 from messages import raises
+from numba.core import event
 
 import floatbase as fb
 from floatbase.control import LinearInequality
+from floatbase.control.tick import tick
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint, PointContact, RollingWheel
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.robots import Robot, State
@@ -325,35 +328,24 @@ def test_a_task_that_goes_wrong_is_reported_on_both_backends(later, kind, named)
 
 
 def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
-    from numba.core import event
-
     robot = judges.load("go2")
     controller = judges.controller_of("go2", backend="compiled")
     state, at = robot.random_state(1, 0.1), robot.standing()
     feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"])
+    held = fb.Contacts([LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))])
+    com, hand = MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))
+    push = LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))
+    choices = product(
+        (feet, feet + held), (fb.standing_tasks(at), [com], [com, hand]), ((), [push])
+    )
     with event.install_recorder("numba:compile") as recorder:
-        for contacts in (
-            feet,
-            feet
-            + fb.Contacts(
-                [LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))]
-            ),
-        ):
-            for tasks in (
-                fb.standing_tasks(at),
-                [MyCoM(at.com)],
-                [MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))],
-            ):
-                for rows in (
-                    (),
-                    [LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))],
-                ):
-                    limits = replace(
-                        controller.limits, inequalities=rows, max_normal_force={"FR_foot": 90.0}
-                    )
-                    other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
-                    assert other(state.q, state.v).backend == "compiled"
+        for contacts, tasks, rows in choices:
+            bounds = {"FR_foot": 90.0}
+            limits = replace(controller.limits, inequalities=rows, max_normal_force=bounds)
+            other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
+            assert other(state.q, state.v).backend == "compiled"
     assert not recorder.buffer
+    assert len(tick.tick.signatures) == 1  # numba compiles again for a read-only array
 
 
 def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_end():

@@ -57,7 +57,7 @@ class Pad:
         return self.jacobian(state), -state.frame_drift(self.name)[:3]
 
 
-def test_contacts_of_a_users_own_are_chosen_by_name():
+def test_user_defined_contacts_are_selected_by_name():
     contacts = fb.Contacts(
         [Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))]
     )
@@ -311,7 +311,7 @@ def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(
     assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
 
 
-def test_a_constraint_of_a_users_own_needs_no_friction_and_half_of_it_is_refused():
+def test_a_user_defined_constraint_needs_no_friction_and_an_incomplete_one_is_refused():
     class Rail:
         name, k, row_names = "rail", 1, ("across",)
 

@@ -103,9 +103,7 @@ def test_gravity_is_the_slope_of_the_weights_potential_energy(name):
         assert judges.relative(bias_forces(state).gravity, slope) < 1e-5
 
 
-def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grows_with_the_square(
-    name,
-):
+def test_one_moving_coordinate_has_no_coriolis_force_and_a_quadratic_centrifugal_force(name):
     state = judges.load(name).random_state(3, spread=1.0)
     scale = np.max(np.abs(state.h))
     for i, unit in enumerate(np.eye(state.robot.nv)):

@@ -340,7 +340,7 @@ def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_lo
         assert space.dimension == eom.d + eom.k - dynamics.dimensions(eom).rank_J, exponent
 
 
-def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_forbid_it():
+def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_predicts():
     """An inclination of 1e-4 rad is below the resolution of the contacts, so torques that roll the
     base do not meet a reaction of 500 N.
     """

@@ -376,7 +376,7 @@ def test_forces_that_solo8_cannot_give_have_a_gap_and_the_nearest_it_can_is_cvxp
 
 
 @pytest.mark.parametrize("name", ["go2", "anymal_kinova"])
-def test_with_three_joints_a_leg_every_force_can_be_had(name):
+def test_with_three_joints_per_leg_every_force_is_possible(name):
     eom = judges.at_rest(name, 1)
     found = objectives.torques_from_forces(eom)
     desired = 30.0 * np.random.default_rng(0).normal(size=eom.k)

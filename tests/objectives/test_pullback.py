@@ -213,7 +213,7 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
 
-def test_where_nothing_can_move_the_block_has_no_say_in_beta():
+def test_accelerations_that_cannot_change_do_not_determine_beta():
     """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
     β must not contain 1 / rounding.
     """

@@ -135,7 +135,7 @@ def test_targets_may_be_functions_of_time():
     assert np.array_equal(rows.residual(eom).b, fb.CoMTask(p, v, a).residual(eom).b)
 
 
-def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag():
+def test_a_moving_target_is_evaluated_once_a_tick_and_followed_without_lag():
     """A critically damped task lags behind a slow target by (kd / kp) times the target's velocity,
     unless it knows this velocity.
     """

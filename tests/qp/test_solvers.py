@@ -136,7 +136,7 @@ def test_every_solver_gives_the_controller_the_same_torques(name):
         QP(np.diag([1.0, 0.0]), [0.0, -1.0], *NONE, [[1.0, -1.0], [-1.0, -1.0]], [0.0, 0.0]),
     ],
 )
-def test_every_solver_calls_an_objective_that_falls_for_ever_just_that(solver, qp):
+def test_every_solver_refuses_an_unbounded_objective(solver, qp):
     refused(lambda: solve(qp, solver), SolverError)
 
 
@@ -159,7 +159,7 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver, gap):
 
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
-def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name):
+def test_an_infeasible_controller_names_a_smallest_set_of_rows(name):
     """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says,
     never anything else.
     """
@@ -319,7 +319,7 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method():
     )
 
 
-def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict():
+def test_small_force_weights_do_not_make_a_problem_infeasible():
     """DAQP calls these problems infeasible: weights from 1e-9 to 100, feet that must press. The
     truth is a linear program's.
     """

@@ -220,7 +220,7 @@ def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equa
     assert abs(robot.random_state(0, spread=3.0).q[0]) > 0.0
 
 
-def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told():
+def test_joints_without_a_posture_stand_at_their_nearest_limit_and_weak_motors_are_reported():
     heavy = two_links(mass=20).replace("<mass", '<origin xyz="0.1 0 0"/><mass')
     with warns(RobotWarning, "elbow", 17.2, 5):
         arm = fb.load_urdf(heavy, floating=False)

@@ -28,7 +28,7 @@ def floating(request: pytest.FixtureRequest):
     return judges.load(request.param)
 
 
-def test_the_catalogue_holds_the_robots_of_the_course_and_says_what_each_is_for():
+def test_the_catalogue_holds_the_robots_of_the_course_with_their_descriptions():
     assert {"go2", "solo12", "solo8", "anymal_kinova", "talos", "ur5"} <= set(fb.catalogue())
     assert all(len(text) > 10 for text in fb.catalogue().values())
 
@@ -61,7 +61,7 @@ def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot):
         tau[i] = 0.0
 
 
-def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(robot):
+def test_torque_limits_are_positive_and_equal_the_urdfs_unless_another_source_is_named(robot):
     assert np.all(robot.torque_limits > 0)
     assert robot.torque_limits.shape == (robot.d,)
     joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
@@ -104,7 +104,7 @@ def test_a_robot_stands_at_the_requested_height(floating):
     assert np.allclose(judges.stance(floating).positions(state)[:, 2], 0.0, atol=1e-9)
 
 
-def test_a_robot_that_stands_low_keeps_its_joint_limits_or_says_which_are_in_the_way():
+def test_a_robot_that_stands_low_keeps_its_joint_limits_or_names_those_that_prevent_it():
     """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by
     1.5 rad too much.
     """

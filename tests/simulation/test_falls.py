@@ -301,7 +301,7 @@ def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
 FALL = [400.0 * np.cos(0.35), 400.0 * np.sin(0.35), 0.0]
 
 
-def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(run, slices):
+def test_a_live_fall_is_reported_at_once_and_simulated_until_rest(run, slices):
     told: list[tuple[str, int]] = []
     run.on_status(lambda status: told.append((status, len(slices))))
     run.push(FALL)
@@ -357,7 +357,7 @@ def test_another_simulation_in_mid_fall_does_not_fall(run, slices):
     assert other.time == 0.0 and not other.link_collisions
 
 
-def test_an_error_while_a_fall_is_drawn_is_said():
+def test_an_error_while_a_fall_is_drawn_is_reported():
     seen: list[fb.Rollout] = []
 
     def show(record: fb.Rollout) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import judges
 import mujoco
 import numpy as np
@@ -181,16 +178,6 @@ def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has():
     sim.data.qpos[2] = 0.55
     mujoco.mj_forward(sim.model, sim.data)
     assert sim.fallen
-
-
-def test_a_copied_ground_is_equal_and_refuses_changes():
-    ground = GROUNDS["tiles"]
-    loaded = pickle.loads(pickle.dumps(ground))
-    assert copy.copy(ground) is ground
-    assert np.array_equal(loaded.box_bounds, ground.box_bounds)
-    assert loaded.height([1.0, 0.3]) == ground.height([1.0, 0.3])
-    with pytest.raises(AttributeError):
-        ground.mu = 0.5
 
 
 @pytest.mark.parametrize(

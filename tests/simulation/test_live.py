@@ -58,7 +58,9 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run, slices):
 @pytest.mark.parametrize(
     "error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")]
 )
-def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run, slices, error):
+def test_an_error_of_a_controller_is_reported_and_the_run_can_go_on_with_another(
+    run, slices, error
+):
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         raise error
 
@@ -84,7 +86,7 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(run, slices, er
         ("stopped", "0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
 )  # fmt: skip
-def test_what_stopped_a_run_is_told_in_one_sentence(status, reason, line):
+def test_the_status_message_is_one_sentence(status, reason, line):
     message = status_message(status, reason)
     assert message.startswith(line) and not {"\n", "Why", "6"} & {*message, *message.split()}
 
@@ -243,7 +245,7 @@ def test_it_runs_after_a_start_that_crosses_a_close(run, slices):
     assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))
 
 
-def test_a_status_is_told_as_it_comes(run, slices):
+def test_each_change_of_status_is_reported(run, slices):
     told: list[str] = []
     run.on_status(told.append)
     run.start()
@@ -329,7 +331,7 @@ def test_another_world_controller_and_period_are_taken_between_slices(run, slice
     assert seen[0] is not threading.main_thread()
 
 
-def test_a_change_that_fails_is_said(run, slices):
+def test_an_error_in_a_change_is_reported(run, slices):
     def fail() -> None:
         raise ValueError("no such world")
 

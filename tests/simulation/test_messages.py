@@ -91,7 +91,7 @@ def test_a_foot_needs_a_body_in_mujoco():
 
 
 @pytest.mark.parametrize("name", ["timestep", "ground", "robot", "model", "data", "q", "time"])
-def test_what_a_simulation_was_made_with_cannot_be_set(name):
+def test_the_arguments_of_a_simulation_cannot_be_set(name):
     for sim in (SIM, copy.deepcopy(SIM), pickle.loads(pickle.dumps(SIM))):
         with raises(AttributeError, name):
             setattr(sim, name, getattr(sim, name))
@@ -113,7 +113,7 @@ def test_a_timestep_changed_in_mujocos_model_is_refused():
 @pytest.mark.parametrize(
     ("start", "numbers"), [(0.0, (0, 0.01, 0.02, 0.03)), (0.03, (0.01, 0.02, 0.03, 0.04))]
 )
-def test_a_push_that_does_not_act_in_a_rollout_is_said(start, numbers):
+def test_a_push_that_does_not_act_in_a_rollout_causes_a_warning(start, numbers):
     sim = fb.Simulation(GO2)
     idle, near = (fb.Push(UP, start=start, duration=0.01), fb.Push(UP, start=0.02, duration=0.01))
     with warnings.catch_warnings(action="error"):

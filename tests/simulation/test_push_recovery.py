@@ -41,7 +41,7 @@ def survives(controller: fb.WholeBodyController, angle: float, force: float) -> 
     return fb.rollout(sim, controller, 0.1 + 0.1 + WATCH, [push]).outcome == "completed"
 
 
-def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(recovery, standing):
+def test_the_push_recovery_map_separates_survival_from_falls_and_is_symmetric(recovery, standing):
     assert np.allclose(recovery.directions, np.deg2rad([0, 60, 120, 180, 240, 300]))
     left, right = recovery.pushes[1:3], recovery.pushes[:3:-1]
     assert np.all(np.abs(left - right) <= STEP)  # go2 is symmetric
@@ -93,7 +93,7 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
     assert np.all(recovery.static_bound < recovery.pushes)  # a short push can be larger
 
 
-def test_the_rose_is_plotted_and_drawn_to_scale(recovery):
+def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
     axis = push_recovery_plots.plot(recovery)
     measured = axis.get_lines()[0]
     assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
@@ -141,7 +141,7 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery):
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 
 
-def test_factories_and_what_does_not_fit(standing):
+def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
     robot = standing.robot
 
     def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:

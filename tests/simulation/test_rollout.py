@@ -19,7 +19,7 @@ def sim() -> fb.Simulation:
     return fb.Simulation(judges.load("go2"))
 
 
-def test_a_limp_robot_falls_and_the_record_says_so(sim):
+def test_a_limp_robot_falls_and_the_outcome_is_fell(sim):
     record = fb.rollout(sim, limp, 3.0)
     assert record.outcome == "fell" and record.time[-1] < 2.0
     assert record.final.q[2] < 0.2 and record.error is None
@@ -304,7 +304,7 @@ def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics
     assert np.array_equal(found.v, expected.v)
 
 
-def test_a_record_says_which_torques_the_motors_gave_and_which_were_desired():
+def test_a_record_has_applied_and_desired_torques():
     robot = judges.load("solo12")
     sim = fb.Simulation(robot)
 

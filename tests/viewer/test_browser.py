@@ -134,7 +134,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ],
     ids=["WebGL", "DecompressionStream"],
 )
-def test_a_page_says_what_its_browser_lacks(
+def test_a_page_names_what_its_browser_lacks(
     browser, viewer, standing, tmp_path, lacks, pages, words
 ):
     viewer.show(standing)

@@ -79,7 +79,7 @@ def test_a_gif_repeats_and_an_image_is_its_first_picture(view, tmp_path):
     assert np.ptp(np.array(image), axis=(0, 1)).min() > 100  # a robot is in it
 
 
-def test_what_a_film_needs_is_told(view, tmp_path, monkeypatch):
+def test_the_errors_of_a_film_name_what_it_needs(view, tmp_path, monkeypatch):
     refused(lambda: view.save(tmp_path / "nowhere" / "push.gif"), ViewerError, "nowhere/push.gif")
     refused(
         lambda: view.save(tmp_path / "push.avi"),
@@ -103,7 +103,7 @@ def test_what_a_film_needs_is_told(view, tmp_path, monkeypatch):
 
 
 @needs_chromium
-def test_a_machine_without_a_browser_is_told(view, tmp_path, monkeypatch):
+def test_a_machine_without_a_browser_is_reported(view, tmp_path, monkeypatch):
     pytest.importorskip("playwright", reason="playwright is not installed")
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))

@@ -35,7 +35,7 @@ def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
     assert not missing(capsys.readouterr().err, "port", 99999)
 
 
-def test_a_urdf_of_ones_own_is_shown(tmp_path, capsys):
+def test_a_user_defined_urdf_is_shown(tmp_path, capsys):
     file, solo = tmp_path / "mine.urdf", load("solo12")
     file.write_text(solo.urdf)
     assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
@@ -168,7 +168,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground)
 
 
 @pytest.mark.front_end
-def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(page, playground):
+def test_the_page_pushes_where_the_handle_points_and_shows_what_stopped_the_run(page, playground):
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
     page.goto(playground.url)

@@ -174,7 +174,7 @@ def test_a_long_cell_does_not_make_a_page_look_lost(shell, window_of_shell, monk
     assert newest(client.commands()) == -1 and window.n_pages == 1
 
 
-def test_a_page_that_is_let_go_is_told_and_comes_back(window, monkeypatch):
+def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     put(window, 0)
     client = Client(window.widget("a", 100))
@@ -226,7 +226,7 @@ def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window):
     assert window.n_pages == 0
 
 
-def test_what_no_page_of_a_notebook_says_is_ignored(window, caplog):
+def test_unknown_messages_of_a_notebook_page_are_ignored(window, caplog):
     put(window, 1)
     widget = window.widget("a", 100)
     client = Client(widget)
@@ -259,7 +259,7 @@ def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window):
     until(lambda: window.n_pages == 50)
 
 
-def test_a_closed_window_says_so_to_its_pages_once_and_to_those_that_ask(window):
+def test_a_closed_window_informs_its_pages_once_and_new_ones_on_request(window):
     widget = window.widget("a", 100)
     put(window, 1)
     client = Client(widget)
@@ -387,7 +387,7 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
-def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
+def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_has_gone(
     notebook, page, viewer, standing, how
 ):
     viewer.show(standing)
@@ -401,7 +401,7 @@ def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
     picture(page, f"notebook_without_{how}")
 
 
-def test_an_output_has_the_widget_and_an_image_or_when_asked_the_scene(
+def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
     viewer, standing, monkeypatch
 ):
     viewer.show(standing)

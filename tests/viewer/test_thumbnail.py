@@ -50,7 +50,7 @@ def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
     assert differing(full[lower_left], image(viewer.show(standing, com=False))[lower_left]) > 500
 
 
-def test_what_is_nearer_hides_what_is_behind_and_translucent_things_do_not(viewer):
+def test_near_objects_hide_far_ones(viewer):
     viewer.show(viewer.robot.standing(), com=False)
     viewer.camera("front")
 

@@ -76,7 +76,7 @@ def test_the_scene_does_not_grow_when_things_are_drawn_again(window):
     assert len(window.scene) <= 4
 
 
-def test_what_is_deleted_is_gone_with_all_below_it_and_may_come_back(window):
+def test_deleted_paths_are_gone_with_their_children_and_can_come_back(window):
     window.put([BALL("/meshcat/a/b"), BALL("/meshcat/ab"), protocol.delete("/meshcat/a")])
     assert [path for path, *_ in window.scene.commands()] == ["/meshcat/ab"]
     window.put([BALL("/meshcat/a/b")])
@@ -114,7 +114,7 @@ def listening() -> set[int]:
     }
 
 
-def test_a_picture_has_a_port_only_once_its_address_is_asked_for(viewer, standing, tmp_path):
+def test_a_picture_has_a_port_only_after_its_address_is_read(viewer, standing, tmp_path):
     before = listening()
     viewer.show(standing)
     viewer.widget()
@@ -153,7 +153,7 @@ def test_fifty_windows_opened_and_dropped_leave_no_thread_no_port_and_no_process
     assert {child.pid for child in psutil.Process().children(recursive=True)} <= children
 
 
-def test_a_closed_window_says_so():
+def test_a_closed_window_refuses_updates():
     window = Window()
     window.close()
     window.close()
@@ -369,7 +369,7 @@ STRANGE = [
 ]  # fmt: skip
 
 
-def test_what_no_page_says_is_ignored(window, caplog):
+def test_unknown_messages_of_a_page_are_ignored(window, caplog):
     heard = []
 
     def hear(name: str, value: Any) -> None:
