@@ -47,6 +47,9 @@ def empty(n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.zeros((0, n)), np.zeros(0)
 
 
+NONE = empty(2)
+
+
 @settings(max_examples=60)
 @given(seeds, st.integers(2, 8), st.integers(0, 3), st.integers(0, 12))
 def test_every_solver_gives_the_same_optimum_and_proves_it(seed, n, m, inequalities):
@@ -68,7 +71,7 @@ def test_multipliers_of_active_rows_are_the_slopes_of_the_objective():
     qp = QP(
         np.eye(2),
         [-3.0, -1.0],
-        *empty(2),
+        *NONE,
         np.eye(2),
         [1.0, 5.0],
         inequality_names=("left wall", "roof"),
@@ -202,7 +205,7 @@ def test_conflicting_rows_are_found(G, h, conflict):
 @pytest.mark.parametrize("solver", solvers())
 def test_the_error_of_an_infeasible_problem_names_its_rows(solver):
     G, h = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]), np.array([1.0, -2.0, 3.0])
-    qp = QP(np.eye(2), np.zeros(2), *empty(2), G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
+    qp = QP(np.eye(2), np.zeros(2), *NONE, G, h, inequality_names=("x ≤ 1", "x ≥ 2", "y ≤ 3"))
     with raises(InfeasibleError, "x ≤ 1", "x ≥ 2") as caught:
         solve(qp, solver)
     assert caught.value.constraints == ("x ≤ 1", "x ≥ 2")
@@ -218,9 +221,7 @@ def test_labels_are_texts_that_know_their_kind_owner_and_number():
             "FL_foot",
             2,
         )
-    qp = QP(
-        np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2), inequality_names=(label, "roof")
-    )
+    qp = QP(np.eye(2), np.zeros(2), *NONE, np.eye(2), np.ones(2), inequality_names=(label, "roof"))
     assert [name.kind for name in qp.inequality_names] == ["friction", "other constraints"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
 
@@ -257,58 +258,54 @@ def test_many_rows_in_conflict_are_counted_by_kind_and_listed_by_owner_or_by_nam
     facets = [ConstraintLabel(f"FL facet {i}", "friction", "FL", i) for i in (2, 3)]
     G, h = np.vstack([-np.eye(6), np.ones(6)]), np.append(-np.ones(6), 5.0)
     with pytest.raises(InfeasibleError) as caught:
-        solve(
-            QP(
-                np.eye(6),
-                np.zeros(6),
-                *empty(6),
-                G,
-                h,
-                inequality_names=(*normal, *facets, "sixth", "sum"),
-            )
-        )
-    for line, named in zip(
-        str(caught.value).splitlines()[1:-1],
-        (
-            (3, "normal force", "FL", "FR", "RL"),
-            (2, "friction", "FL facet 2", "FL facet 3"),
-            (2, "sixth", "sum"),
-        ),
-        strict=True,
-    ):
+        names = (*normal, *facets, "sixth", "sum")
+        solve(QP(np.eye(6), np.zeros(6), *empty(6), G, h, inequality_names=names))
+    expected = (
+        (3, "normal force", "FL", "FR", "RL"),
+        (2, "friction", "FL facet 2", "FL facet 3"),
+        (2, "sixth", "sum"),
+    )
+    for line, named in zip(str(caught.value).splitlines()[1:-1], expected, strict=True):
         assert not missing(line, *named)
 
 
 # bad input ----------------------------------------------------------------------------------------
 
 
+def two(g: object = (0.0, 0.0), A: object = NONE, G: object = NONE, **more: object) -> QP:
+    """A problem of two variables with rows (matrix, right side)."""
+    return QP(np.eye(2), g, *A, *G, **more)
+
+
 @pytest.mark.parametrize(
     "case",
     [
-        (lambda: QP(np.eye(3), np.zeros(2), *empty(2), *empty(2)), InputError, "H", 3, 2),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(3), *empty(2)), InputError, "A", 3, 2),
-        (lambda: QP(np.eye(2), np.zeros(2), np.eye(2), [1.0], *empty(2)), InputError, "b", 1, 2),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), [1.0]), InputError, "h", 1, 2),
-        (lambda: QP(np.eye(2), [0.0, np.nan], *empty(2), *empty(2)), InputError, "g", np.nan),
-        (lambda: QP(np.eye(2), [0.0, 0.0], *empty(2), np.eye(2), [np.inf, 0.0]), InputError, "h",
-            np.inf),
-        (lambda: QP(np.eye(2), np.zeros(2), *empty(2), np.eye(2), np.ones(2),
-            inequality_names=("a",)), InputError, 1, 2),
-        (lambda: QP(np.eye(1), np.zeros(1), *empty(1), [[1], [1]], [1, 1],
-            inequality_names=("a", "a")), InputError, "a"),
-        (lambda: solve(SQUARE)["torques"], InputError, "torques"),
-        (lambda: check_solver("activeset"), UnknownNameError, "solver", "activeset", "active_set"),
-        (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), InputError, "start", 3, 2),
-        (lambda: active_set(table_top(), working_set=["tabel"]), UnknownNameError, "tabel",
-            "table"),
-        (*[(lambda most=most: active_set(table_top(), max_iterations=most), InputError,
-            "max_iterations", most) for most in (0, -1, 1.5, "3")],),
-        (lambda: active_set(table_top(), max_iterations=True), InputError, "max_iterations",
-            "True"),
+        (lambda: QP(np.eye(3), np.zeros(2), *NONE, *NONE), "H", 3, 2),
+        (lambda: two(A=empty(3)), "A", 3, 2),
+        (lambda: two(A=(np.eye(2), [1.0])), "b", 1, 2),
+        (lambda: two(G=(np.eye(2), [1.0])), "h", 1, 2),
+        (lambda: two(g=[0.0, np.nan]), "g", np.nan),
+        (lambda: two(G=(np.eye(2), [np.inf, 0.0])), "h", np.inf),
+        (lambda: two(G=(np.eye(2), np.ones(2)), inequality_names=("a",)), 1, 2),
+        (lambda: two(G=(np.eye(2), np.ones(2)), inequality_names=("a", "a")), "a"),
+        (lambda: solve(SQUARE)["torques"], "torques"),
+        (lambda: active_set(table_top(), start=(0.0, 0.0, 0.0)), "start", 3, 2),
+        (lambda: active_set(table_top(), max_iterations=0), "max_iterations", 0),
+        (lambda: active_set(table_top(), max_iterations=1.5), "max_iterations", 1.5),
+        (lambda: active_set(table_top(), max_iterations="3"), "max_iterations", 3),
+        (lambda: active_set(table_top(), max_iterations=True), "max_iterations", "True"),
     ],
-)  # fmt: skip
+)
 def test_problems_that_do_not_fit_together_are_refused(case):
-    refused(*case)
+    call, *named = case
+    refused(call, InputError, *named)
+
+
+def test_unknown_names_are_refused_with_the_names_like_them():
+    with raises(UnknownNameError, "solver", "activeset", "active_set"):
+        check_solver("activeset")
+    with raises(UnknownNameError, "tabel", "table"):
+        active_set(table_top(), working_set=["tabel"])
 
 
 def test_a_linear_program_is_optimal_infeasible_or_unbounded():

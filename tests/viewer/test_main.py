@@ -20,7 +20,7 @@ from floatbase.__main__ import main, start_when_connected
 from floatbase.playground import Playground, RealTimeFactor
 from floatbase.robots import Robot, catalogue, load
 
-from .looks import picture
+from .looks import control, eventually, picture
 
 
 def test_the_robots_are_listed(capsys):
@@ -100,71 +100,63 @@ def playground(go2: Robot) -> Iterator[Playground]:
 
 
 def test_the_controls_reach_the_robot(page, playground, go2):
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    def control(name: str, call: str) -> None:
-        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
-
     def drawn() -> set[str]:
         return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    control("CoM x [m]", "setValue(0.04)")
-    until(
-        lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work
+    control(page, "CoM x [m]", "setValue(0.04)")
+    eventually(
+        page, lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01
     )
-    control("facets", "setValue(6)")
-    control("friction model", "setValue(0.3)")
-    until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
-    until(
-        lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work
+    control(page, "facets", "setValue(6)")
+    control(page, "friction model", "setValue(0.3)")
+    eventually(page, lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9)
+    eventually(
+        page, lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6)
     )
     picture(page, "bare_page")
-    control("pause", "fire()")
-    until(lambda: playground.run.status == "paused", work)
+    control(page, "pause", "fire()")
+    eventually(page, lambda: playground.run.status == "paused")
     playground.run.close()  # waits for the last slice
     stopped = playground.session.sim.time
-    control("stand on FL_foot", "setValue(false)")
-    control("run", "fire()")
-    until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
+    control(page, "stand on FL_foot", "setValue(false)")
+    control(page, "run", "fire()")
+    eventually(
+        page, lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn()
+    )
     assert "measured/FR_foot" in drawn()
 
 
 @pytest.mark.front_end
 def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground):
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    def control(name: str, call: str) -> None:
-        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
-
     def place() -> np.ndarray:
         return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
-    control("forwards [m/s]", "setValue(0.5)")
-    control("turn left [rad/s]", "setValue(0.5)")
-    control("gait", "setValue(2)")
-    until(lambda: place()[0] > 0.3, work)
+    control(page, "forwards [m/s]", "setValue(0.5)")
+    control(page, "turn left [rad/s]", "setValue(0.5)")
+    control(page, "gait", "setValue(2)")
+    eventually(page, lambda: place()[0] > 0.3)
     picture(page, "bare_page_walking")
-    control("gait", "setValue(0)")
-    until(
+    control(page, "gait", "setValue(0)")
+    eventually(
+        page,
         lambda: (
             playground.session.last.contacts_at(-1).names
             == tuple(foot.frame for foot in playground.robot.feet)
         ),
-        work,
     )
     stopped = place()
-    control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
-    until(lambda: place()[2] < stopped[2] - 0.01, work)
+    control(page, "CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
+    eventually(page, lambda: place()[2] < stopped[2] - 0.01)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
-    control("gait", "setValue(1)")
-    control("reset", "fire()")
-    until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
+    control(page, "gait", "setValue(1)")
+    control(page, "reset", "fire()")
+    eventually(
+        page, lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05
+    )
 
 
 @pytest.mark.front_end
@@ -173,14 +165,14 @@ def test_the_page_pushes_where_the_handle_points_and_shows_what_stopped_the_run(
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    page.evaluate("viewer.gui_controllers['towards [°]'].setValue(-90)")
-    page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
+    control(page, "towards [°]", "setValue(-90)")
+    control(page, "push [N]", "setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
     arrow = None
     for _ in range(
         8
     ):  # the arrow stays for half a second, in which a busy machine may draw no frame
-        page.evaluate("viewer.gui_controllers['push'].fire()")
+        control(page, "push", "fire()")
         with suppress(PlaywrightTimeoutError):
             # its shape comes with one message, its direction, which is not up, with the next
             turned = f"{drawn}.children.length > 0 && {drawn}.matrix.elements[10] < 0.5"
@@ -195,7 +187,7 @@ def test_the_page_pushes_where_the_handle_points_and_shows_what_stopped_the_run(
     page.wait_for_function(
         "document.getElementById('title').textContent.includes('fell: press reset')"
     )
-    page.evaluate("viewer.gui_controllers['reset'].fire()")
+    control(page, "reset", "fire()")
     page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")
     assert playground.run.status == "running"
 

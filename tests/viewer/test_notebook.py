@@ -57,6 +57,14 @@ def newest(commands: list[dict]) -> float:
     return float(commands[-1]["matrix"][0])
 
 
+def shown(window: Window, in_cell: bool = False) -> Client:
+    """Return a page that has drawn the first frame."""
+    put(window, 0)
+    client = Client(window.widget("a", 100), in_cell=in_cell)
+    client.commands()
+    return client
+
+
 def draw_for(window: Window, seconds: float) -> int:
     """Draw something new repeatedly; return how often."""
     drawn, until_then = 0, time.monotonic() + seconds
@@ -87,9 +95,7 @@ def test_a_page_that_does_not_answer_gets_two_frames_and_then_the_newest(window)
 
 
 def test_a_page_that_answers_gets_the_pace_and_no_more(window):
-    put(window, 0)
-    client = Client(window.widget("a", 100))
-    client.commands()
+    client = shown(window)
     until_then, drawn, times = time.monotonic() + 1.0, 0, []
     while time.monotonic() < until_then:
         drawn += 1
@@ -108,7 +114,7 @@ def shell() -> Iterator[InteractiveShell]:
 
 
 @pytest.fixture
-def window_of_shell(shell: InteractiveShell) -> Iterator[Window]:
+def cell_window(shell: InteractiveShell) -> Iterator[Window]:
     with Window() as opened:
         shell.events.trigger("post_run_cell", None)  # the cell that opened it
         yield opened
@@ -122,56 +128,42 @@ def busy(shell: InteractiveShell) -> Iterator[None]:
     shell.events.trigger("post_run_cell", None)
 
 
-def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell, window_of_shell):
-    window = window_of_shell
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell, cell_window):
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
+        draw_for(cell_window, 1.0)
         frames = frames_of(client)
         assert 4 <= frames <= 1.1 / BLIND + 2
-    put(window, -1)
+    put(cell_window, -1)
     assert client.hears_nothing()  # what is under way has not been answered yet, now that it can be
     client.drawn(1 + frames)
     assert newest(client.commands()) == -1
 
 
-def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(
-    shell, window_of_shell
-):
-    window = window_of_shell
-    put(window, 0)
-    client = Client(window.widget("a", 100))
-    client.commands()
+def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(shell, cell_window):
+    client = shown(cell_window)
     with busy(shell):
-        draw_for(window, 0.5)
+        draw_for(cell_window, 0.5)
         assert frames_of(client) == 2
 
 
-def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(shell, window_of_shell, monkeypatch):
-    window = window_of_shell
+def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(shell, cell_window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.MAX_UNANSWERED", 1000)
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
+        draw_for(cell_window, 1.0)
         assert 2 <= frames_of(client) <= 10  # of 119 bytes each
 
 
-def test_a_long_cell_does_not_make_a_page_look_lost(shell, window_of_shell, monkeypatch):
-    window = window_of_shell
+def test_a_long_cell_does_not_make_a_page_look_lost(shell, cell_window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.4)
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
-    put(window, -1)
+        draw_for(cell_window, 1.0)
+    put(cell_window, -1)
     frames = frames_of(client)
     client.drawn(1 + frames)
-    assert newest(client.commands()) == -1 and window.n_pages == 1
+    assert newest(client.commands()) == -1 and cell_window.n_pages == 1
 
 
 def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):

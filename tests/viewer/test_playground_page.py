@@ -17,7 +17,7 @@ from floatbase.errors import FloatbaseError, InputError, UnknownNameError
 from floatbase.playground import CHALLENGES, Playground, Settings, mean_force_error, playground
 from floatbase.robots import Robot
 
-from .looks import picture
+from .looks import control, eventually, picture
 
 pytestmark = pytest.mark.front_end
 
@@ -62,12 +62,9 @@ def test_every_control_can_be_moved_to_both_ends(page, field):
             page.locator("#panel select").nth(number).select_option(str(option), force=True)
             page.wait_for_timeout(30)
     picture(page, "playground_ends")
-    page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
-    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
-    until(
-        lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0,
-        lambda: page.wait_for_timeout(20),
-    )
+    control(page, "challenge", "setValue(0)")
+    control(page, "reset everything", "fire()")
+    eventually(page, lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0)
     assert field.session.settings.friction == (0.7, 0.7) and field.session.refusal == ""
     said = page.evaluate(
         "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
@@ -86,11 +83,11 @@ def test_the_push_slider_pushes_when_it_is_released(page, field):
     page.wait_for_timeout(300)
     assert field.last_push is None
     page.mouse.up()
-    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.last_push is not None)
     assert field.last_push.force[0] == field.force > 0.0
     field.last_push = None
-    page.evaluate("viewer.gui_controllers['push [N]'].setValue(0)")
-    until(lambda: field.force == 0.0, lambda: page.wait_for_timeout(20))
+    control(page, "push [N]", "setValue(0)")
+    eventually(page, lambda: field.force == 0.0)
     assert field.last_push is None
 
 
@@ -117,7 +114,7 @@ def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field):
     assert field.last_push is None
     page.mouse.up()
     page.keyboard.up("Shift")
-    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.last_push is not None)
     assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
     assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)
 
@@ -138,7 +135,7 @@ def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(page, field, size)
         }).map((one) => one.textContent)"""
         assert page.evaluate(hidden) == []
     page.locator("#panel .head button", has_text="pause").click()
-    until(lambda: field.run.status == "paused", lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.run.status == "paused")
 
 
 def test_a_challenge_is_started_and_solved(page, field):
@@ -146,11 +143,11 @@ def test_a_challenge_is_started_and_solved(page, field):
         i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?"
     )
     opened(page, field)
-    page.evaluate(f"viewer.gui_controllers['challenge'].setValue({number + 1})")
+    control(page, "challenge", f"setValue({number + 1})")
     page.wait_for_function(
         "document.getElementById('panel').textContent.includes('4 facets: the weakest')"
     )
-    page.evaluate("viewer.gui_controllers['facets'].setValue(13)")
+    control(page, "facets", "setValue(13)")
     page.wait_for_function("document.getElementById('panel').textContent.includes('Solved')")
     assert "facets=13" in page.evaluate("document.querySelector('#panel pre').textContent")
     picture(page, "playground_solved")
@@ -163,16 +160,13 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field):
     def sunk() -> float:
         return float(field.robot.standing().com[2] - field.session.sim.state.com[2])
 
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    page.evaluate("viewer.gui_controllers['mass [×] reality'].setValue(1.5)")
-    until(lambda: abs(sunk() - 0.049) < 0.01, work)
+    control(page, "mass [×] reality", "setValue(1.5)")
+    eventually(page, lambda: abs(sunk() - 0.049) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
     )
-    page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
-    until(lambda: abs(sunk()) < 0.01, work)
+    control(page, "mass [×] model", "setValue(1.5)")
+    eventually(page, lambda: abs(sunk()) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel p.plot').textContent.includes('difference between')"
     )
@@ -247,22 +241,14 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field)
         ("show forces", "false"),
         ("show gravity", "true"),
     ):
-        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-    until(
-        lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old],
-        lambda: page.wait_for_timeout(20),
+        control(page, name, f"setValue({value})")
+    eventually(
+        page, lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old]
     )
-    until(
-        lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
-    )
-    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
-    until(
-        lambda: shown() == before and (field.force, field.towards) == first,
-        lambda: page.wait_for_timeout(20),
-    )
-    until(
-        lambda: "measured/FL_foot" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
-    )
+    eventually(page, lambda: "term gravity/m g" in field.view.renderer.picture)
+    control(page, "reset everything", "fire()")
+    eventually(page, lambda: shown() == before and (field.force, field.towards) == first)
+    eventually(page, lambda: "measured/FL_foot" in field.view.renderer.picture)
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
@@ -301,39 +287,38 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field):
     opened(page, field)
     for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
-        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-        until(lambda: field.session.settings != Settings(), lambda: page.wait_for_timeout(20))
+        control(page, name, f"setValue({value})")
+        eventually(page, lambda: field.session.settings != Settings())
         if keys:
             page.keyboard.press(keys)
         else:
             page.locator("#panel button", has_text="undo").click()
-        until(lambda: field.session.settings == Settings(), lambda: page.wait_for_timeout(20))
+        eventually(page, lambda: field.session.settings == Settings())
         page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
 
 
 def test_the_address_has_the_settings_and_sets_them(page, field):
     opened(page, field)
     assert page.evaluate("location.hash") == ""
-    page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
-    page.evaluate("viewer.gui_controllers['stand on FL_foot'].setValue(false)")
-    page.evaluate("viewer.gui_controllers['speed'].setValue(0.5)")
+    control(page, "facets", "setValue(7)")
+    control(page, "stand on FL_foot", "setValue(false)")
+    control(page, "speed", "setValue(0.5)")
     page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
-    page.evaluate("viewer.gui_controllers['undo'].fire()")
+    control(page, "undo", "fire()")
     page.wait_for_function("location.hash == '#facets=7'")
 
     page.goto("about:blank")
     page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
-    until(
+    eventually(
+        page,
         lambda: (
             field.session.settings.gait == "trot" and field.session.settings.friction == (0.7, 0.3)
         ),
-        lambda: page.wait_for_timeout(20),
     )
     page.wait_for_timeout(1500)  # until the page has written its own address
     page.evaluate("location.hash = '#facets=5'")
-    until(
-        lambda: field.session.settings.facets == 5 and field.session.settings.gait is None,
-        lambda: page.wait_for_timeout(20),
+    eventually(
+        page, lambda: field.session.settings.facets == 5 and field.session.settings.gait is None
     )
     assert field.session.settings.friction == (0.7, 0.7)
 
