@@ -14,18 +14,8 @@ IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
 def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path):
-    pip = [
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "-w",
-        str(tmp_path),
-        str(ROOT),
-    ]
+    options = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w"]
+    pip = [sys.executable, *options, str(tmp_path), str(ROOT)]
     subprocess.run(pip, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("floatbase-*.whl")
     packed = set(zipfile.ZipFile(wheel).namelist())

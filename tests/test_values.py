@@ -25,18 +25,10 @@ from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
-WITHOUT_ARRAYS = (
-    "ActiveSetRun",
-    "FeasibleSpace",
-    "Gains",
-    "LinearConstraint",
-    "drive",
-    "Gait",
-    "Problem",
-    "SensorNoise",
-    "Residuals",
-    "LinearInequality",
-)
+WITHOUT_ARRAYS = """
+    ActiveSetRun FeasibleSpace Gains Gait LinearConstraint LinearInequality Problem Residuals
+    SensorNoise drive
+"""
 NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
     "Simulation WholeBodyController",
@@ -110,7 +102,7 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to():
     }
     for kind, value in (values() | own).items():
         arrays = arrays_of(value)
-        assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
+        assert bool(arrays) != (kind in WITHOUT_ARRAYS.split()), kind
         for name, array in arrays.items():
             with pytest.raises(ValueError):
                 array[...] = 0.0

@@ -675,15 +675,10 @@ print(*record.contacts.names, *(hashlib.sha256(each.tobytes()).hexdigest() for e
 
 @pytest.mark.front_end
 def test_a_walk_does_not_depend_on_the_hash_seed():
-    answers = {
-        subprocess.run(
-            [sys.executable, "-c", SEEDED],
-            env={**os.environ, "PYTHONHASHSEED": str(seed)},
-            capture_output=True,
-            check=True,
-        ).stdout
-        for seed in range(4)
-    }
+    command, answers = [sys.executable, "-c", SEEDED], set()
+    for seed in range(4):
+        environment = os.environ | {"PYTHONHASHSEED": str(seed)}
+        answers.add(subprocess.check_output(command, env=environment))
     assert len(answers) == 1
 
 

@@ -230,15 +230,8 @@ def run_copied(copy: Path, cache: Path | str = "") -> list[str]:
     cache: numba's folder, "" for its default, which is beside the source.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
-    done = subprocess.run(
-        [sys.executable, "-c", HITS],
-        capture_output=True,
-        text=True,
-        cwd=copy.parent,
-        env=environment,
-        check=True,
-    )
-    return done.stdout.split()
+    command = [sys.executable, "-c", HITS]
+    return subprocess.check_output(command, text=True, cwd=copy.parent, env=environment).split()
 
 
 def edit_copied(copy: Path) -> None:

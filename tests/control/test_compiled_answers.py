@@ -185,35 +185,25 @@ def test_straight_knees(bend):
 
 def test_every_task_with_targets_that_move():
     robot = judges.load("go2")
-    at, com, foot = robot.standing(), robot.standing().com, robot.standing().point("FL_foot")
+    at, ramp = robot.standing(), np.linspace(-1.0, 1.0, 12)
+    foot = at.point("FL_foot") + [0.0, 0.0, 0.05]
+
+    def rising(t: float) -> tuple[object, ...]:
+        return at.com + [0.0, 0.0, 0.01 * t], [0.0, 0.0, 0.01], [0.0, 0.2, t]
+
+    def turning(t: float) -> tuple[object, ...]:
+        return judges.rotation([0.1 * t, 0.0, 0.2]), [0.1, 0.0, 0.0], [0.0, t, 0.0]
+
     tasks = [
-        fb.CoMTask(
-            lambda t: (com + [0.0, 0.0, 0.01 * t], [0.0, 0.0, 0.01], [0.0, 0.2, t]),
-            kp=50.0,
-            kd=3.0,
-            weight=4.0,
-        ),
-        fb.OrientationTask(
-            "base", lambda t: (judges.rotation([0.1 * t, 0.0, 0.2]), [0.1, 0.0, 0.0], [0.0, t, 0.0])
-        ),
+        fb.CoMTask(rising, kp=50.0, kd=3.0, weight=4.0),
+        fb.OrientationTask("base", turning),
         fb.OrientationTask("FL_calf", judges.rotation([0.3, 0.1, 0.0]), weight=0.3),
-        fb.FrameTask(
-            "FL_foot",
-            lambda t: np.array([foot + [0.0, 0.0, 0.05], np.zeros(3), [0.0, t, 1.0]]),
-            weight=3.0,
-        ),
+        fb.FrameTask("FL_foot", lambda t: np.array([foot, np.zeros(3), [0.0, t, 1.0]]), weight=3.0),
         fb.FrameTask("FL_calf", at.point("FL_calf"), [0.1, 0.0, 0.2], [0.0, 1.0, 0.0]),
-        fb.PostureTask(
-            lambda t: (at.q, np.linspace(-t, t, 12), np.linspace(-1.0, 1.0, 12)), weight=0.2
-        ),
+        fb.PostureTask(lambda t: (at.q, t * ramp, ramp), weight=0.2),
         fb.PostureTask(lambda t: at.q, weight=0.02),
         fb.PostureTask(
-            at.q,
-            np.linspace(1.0, 2.0, 12),
-            np.full(12, 0.5),
-            kp=3.0,
-            weight=0.1,
-            name="soft posture",
+            at.q, 1.5 + 0.5 * ramp, np.ones(12), kp=3.0, weight=0.1, name="soft posture"
         ),
         fb.ForceTask(lambda t: np.full(9, 10.0 + t), weight=1e-4),
         fb.TorqueTask(np.ones(12), weight=1e-3),

@@ -332,14 +332,8 @@ def test_regularisation_is_added_where_it_is_missing_and_shown():
 
 def test_a_controller_is_replaced_rather_than_changed():
     robot = judges.load("go2")
-    controller = judges.controller_of(
-        "go2",
-        facets=8,
-        inner_approximation=False,
-        min_normal_force=3.0,
-        torque_limits=20.0,
-        solver="cvxpy",
-    )
+    limits = {"facets": 8, "inner_approximation": False, "min_normal_force": 3.0}
+    controller = judges.controller_of("go2", torque_limits=20.0, solver="cvxpy", **limits)
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
     assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)

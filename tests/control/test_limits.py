@@ -31,19 +31,15 @@ def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequal
     up[0, contacts.point_force_indices[2::3]] = 1.0
     turns = np.resize([1.0, -1.0], (1, robot.d))
     sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
+    accelerations = (np.vstack([E, -E]), np.full(2 * robot.d, 30.0))
+
+    def joined(eom: fb.EquationsOfMotion, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight)
+
     return [
-        LinearInequality(
-            "acceleration limit", "qdd", (np.vstack([E, -E]), np.full(2 * robot.d, 30.0)), sides
-        ),
+        LinearInequality("acceleration limit", "qdd", accelerations, sides),
         LinearInequality("total force", "forces", (up, [1.05 * robot.weight])),
-        LinearInequality(
-            "joined torques",
-            "tau",
-            lambda eom, t: (
-                np.vstack([turns, -turns]),
-                np.full(2, (0.01 - 0.002 * t) * robot.weight),
-            ),
-        ),
+        LinearInequality("joined torques", "tau", joined),
     ]
 
 

@@ -256,14 +256,8 @@ def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_o
     pull[:] = 50.0
     task.target, task.weight = task.target + 1.0, 3.0
     solution = command.solution
-    assert (
-        max(
-            solution.residuals.stationarity,
-            solution.residuals.equality,
-            solution.residuals.inequality,
-        )
-        < 1e-7
-    )
+    residuals = solution.residuals
+    assert max(residuals.stationarity, residuals.equality, residuals.inequality) < 1e-7
     assert np.allclose(solution["tau"], command.tau)
 
 

@@ -169,14 +169,8 @@ def test_rows_and_rays_describe_the_same_wrenches(name, feet, facets):
     inwards = rays.sum(axis=1)
     for _ in range(8):
         cost = -rng.normal(size=6) / scale
-        best = linprog(
-            cost,
-            np.vstack([rows, inwards / scale**2]),
-            np.append(np.zeros(len(rows)), 100.0),
-            E,
-            np.zeros(len(E)),
-            (None, None),
-        )
+        G, h = np.vstack([rows, inwards / scale**2]), np.append(np.zeros(len(rows)), 100.0)
+        best = linprog(cost, G, h, E, np.zeros(len(E)), (None, None))
         assert best.status == 0
         assert wrenches.contains(best.x, tolerance=1e-5)
 

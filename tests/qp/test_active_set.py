@@ -251,34 +251,22 @@ def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(
 
 CORNER = [[1, 0], [0, 1], [1, 1], [2, 1], [1, 2], [1, 0]]  # six rows through one point of the plane
 
+TURN = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+CONE = np.column_stack([np.cos(TURN), np.sin(TURN), np.full(64, -0.7)])
+WALLS, REPEATED = [[-1, 0], [0, -1], [1, 1]], [[1, 1], [1, 1], [2, 2]]
 DEGENERATE = {
     "duplicate rows": problem(np.eye(2), [-3, -1], [[1, 0], [1, 0], [2, 0], [1, 0]], [1, 1, 2, 1]),
     "dependent rows": problem(np.eye(2), [-3, -3], [[1, 0], [0, 1], [1, 1]], [1, 1, 2]),
     "a vertex of more rows than variables": problem(np.eye(2), [-5, -4], CORNER, np.zeros(6)),
-    "a cone of 64 facets, pushed into its tip": problem(
-        np.eye(3),
-        [0, 0, 1],
-        [[np.cos(a), np.sin(a), -0.7] for a in np.linspace(0, 2 * np.pi, 64, endpoint=False)],
-        np.zeros(64),
-    ),
+    "a cone of 64 facets, pushed into its tip": problem(np.eye(3), [0, 0, 1], CONE, np.zeros(64)),
     "a single point": problem(np.eye(2), [1, 2], BOX, [1, 1, -1, -1]),
-    "a single point between three walls": problem(
-        np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1]], [-1, -1, 2]
-    ),
-    "a single point left by the equalities": problem(
-        np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]
-    ),
+    "a single point between three walls": problem(np.eye(2), [1, 2], WALLS, [-1, -1, 2]),
+    "a point of two equalities": problem(np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]),
     "an equality written as two rows": problem(np.eye(2), [-3, -1], [[1, 1], [-1, -1]], [1, -1]),
-    "equalities that repeat": problem(
-        np.eye(2), [1, 2], -np.eye(2), [0, 0], [[1, 1], [1, 1], [2, 2]], [1, 1, 2]
-    ),
-    "a row that the equalities decide": problem(
-        np.eye(3), [1, 2, 3], [[1, 1, 1]], [1], [[1, 1, 1]], [1]
-    ),
+    "repeated equalities": problem(np.eye(2), [1, 2], -np.eye(2), [0, 0], REPEATED, [1, 1, 2]),
+    "a row that is an equality": problem(np.eye(2), [1, 2], [[1, 1]], [1], [[1, 1]], [1]),
     "a row of zeros": problem(np.eye(2), [1, 2], [[0, 0], [1, 0]], [0, -2]),
-    "the same table in other units": problem(
-        np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]
-    ),
+    "a table in other units": problem(np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]),
     "a weakly active row": problem(np.eye(2), [-1, 0], [[1, 0], [0, -1]], [1, 0]),
     "no curvature, a box": problem(np.zeros((2, 2)), [1, -2], BOX, np.ones(4)),
     "no curvature along one axis": problem(np.diag([1.0, 0.0]), [1, -2], [[1, 1]], [3]),
@@ -374,15 +362,8 @@ def verdict(qp: QP) -> str:
     if not judges.is_feasible(qp, list(range(len(qp.G)))):
         return "infeasible"
     flat = np.vstack([qp.H, qp.A])
-    falls = linprog(
-        qp.g,
-        qp.G,
-        np.zeros(len(qp.G)),
-        flat,
-        np.zeros(len(flat)),
-        bounds=(-1.0, 1.0),
-        method="highs",
-    )
+    none, still = np.zeros(len(qp.G)), np.zeros(len(flat))
+    falls = linprog(qp.g, qp.G, none, flat, still, bounds=(-1.0, 1.0), method="highs")
     return "unbounded" if falls.fun < -1e-9 else "optimal"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import judges
@@ -68,14 +68,8 @@ def test_multipliers_of_active_rows_are_the_slopes_of_the_objective():
     """min ½‖x - (3, 1)‖² with x0 ≤ 1, x1 ≤ 5: the first row is active with the multiplier 2, the
     second is not.
     """
-    qp = QP(
-        np.eye(2),
-        [-3.0, -1.0],
-        *NONE,
-        np.eye(2),
-        [1.0, 5.0],
-        inequality_names=("left wall", "roof"),
-    )
+    names = ("left wall", "roof")
+    qp = QP(np.eye(2), [-3.0, -1.0], *NONE, np.eye(2), [1.0, 5.0], inequality_names=names)
     for solver in solvers():
         solution = solve(qp, solver)
         assert np.allclose(solution.x, [1.0, 1.0], atol=1e-7)
@@ -106,23 +100,14 @@ def test_the_equality_space_holds_all_solutions_and_nothing_else(seed, n, rank, 
 
 @pytest.mark.parametrize("solver", solvers())
 def test_equalities_that_leave_one_point_leave_nothing_to_choose(solver):
-    problems = {
-        right: QP(
-            np.eye(2),
-            [-3.0, 0.0],
-            np.eye(2),
-            [1.0, 2.0],
-            [[1.0, 0.0]],
-            [right],
-            inequality_names=("wall",),
-        )
-        for right in (5.0, 1.0, 0.5)
-    }
+    names = {"inequality_names": ("wall",)}
+    qp = QP(np.eye(2), [-3.0, 0.0], np.eye(2), [1.0, 2.0], [[1.0, 0.0]], [5.0], **names)
     for right in (5.0, 1.0):
-        assert np.allclose(solve(problems[right], solver).x, [1.0, 2.0], atol=1e-8)
-        assert solve(problems[right], solver).residuals.stationarity < 1e-6
+        found = solve(replace(qp, h=[right]), solver)
+        assert np.allclose(found.x, [1.0, 2.0], atol=1e-8)
+        assert found.residuals.stationarity < 1e-6
     with raises(InfeasibleError, "wall") as caught:
-        solve(problems[0.5], solver)
+        solve(replace(qp, h=[0.5]), solver)
     assert caught.value.constraints == ("wall",)
 
 

@@ -60,14 +60,8 @@ def test_the_unit_of_a_row_changes_its_multiplier_only(solver, row_scale):
 def test_the_unit_of_an_equation_does_not_make_it_disappear(solver, equality_scale):
     """An equation in units of 1e-12 beside one in units of 1 must not count as one of rank 0."""
     small = corner(equality_scale=equality_scale)
-    qp = QP(
-        small.H,
-        small.g,
-        np.vstack([small.A, [0.0, 1.0, 0.0]]),
-        np.append(small.b, 0.75),
-        small.G,
-        small.h,
-    )
+    A, b = np.vstack([small.A, [0.0, 1.0, 0.0]]), np.append(small.b, 0.75)
+    qp = QP(small.H, small.g, A, b, small.G, small.h)
     assert qp.equality_space.n_in == 1
     found = solve(qp, solver)
     assert np.allclose(found.x, [1.0, 0.75, 1.0], atol=1e-6)
@@ -170,14 +164,8 @@ def test_an_infeasible_controller_names_a_smallest_set_of_rows(name):
         contacts = judges.stance(robot, rng.choice([0.2, 0.7]))
         tasks = fb.standing_tasks(robot.standing())
         press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
-        controller = fb.WholeBodyController(
-            robot,
-            contacts,
-            tasks,
-            torque_limits=limits,
-            min_normal_force=press,
-            backend="reference",
-        )
+        options = {"torque_limits": limits, "min_normal_force": press, "backend": "reference"}
+        controller = fb.WholeBodyController(robot, contacts, tasks, **options)
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             solve(qp)
@@ -210,14 +198,8 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver, scale):
         G = rng.normal(size=(2 * n, n))
         h = G @ point + scale * np.where(np.arange(2 * n) < meeting, 0.0, rng.uniform(size=2 * n))
         G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
-        qp = QP(
-            np.eye(n),
-            scale * rng.normal(size=n),
-            np.zeros((0, n)),
-            [],
-            G,
-            np.append(h, G[-1] @ point),
-        )
+        h = np.append(h, G[-1] @ point)
+        qp = QP(np.eye(n), scale * rng.normal(size=n), np.zeros((0, n)), [], G, h)
         assert solve(qp, solver).residuals.inequality <= 10.0 * (
             FEASIBILITY_TOLERANCE + 1e-12 * scale
         ), seed
@@ -337,14 +319,8 @@ def test_small_force_weights_do_not_make_a_problem_infeasible():
         if seed >= 10 and "active_set" in answered:
             break
         press = share * robot.weight  # at every foot
-        controller = fb.WholeBodyController(
-            robot,
-            judges.stance(robot),
-            tasks,
-            min_normal_force=press,
-            backend="reference",
-            joint_limits=None,
-        )
+        options = {"min_normal_force": press, "backend": "reference", "joint_limits": None}
+        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, **options)
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             found = solve(qp)

@@ -225,15 +225,8 @@ def test_joints_without_a_posture_stand_at_their_nearest_limit_and_weak_motors_a
     with warns(RobotWarning, "elbow", 17.2, 5):
         arm = fb.load_urdf(heavy, floating=False)
     assert arm.standing().q == pytest.approx([0.5])
-    refused(
-        lambda: fb.load_urdf(heavy, floating=False, posture=[0.4]),
-        InputError,
-        "posture",
-        "elbow",
-        0.4,
-        0.5,
-        2,
-    )
+    with raises(InputError, "posture", "elbow", 0.4, 0.5, 2):
+        fb.load_urdf(heavy, floating=False, posture=[0.4])
     refused(lambda: fb.load_urdf(heavy, floating=False, locked=["elbow"]), InputError)
 
 

@@ -158,15 +158,8 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row():
             return tau_desired if self.steps < 14 else np.full(12, np.nan)
 
     robot = judges.load("go2")
-    record = fb.rollout(
-        fb.Simulation(robot),
-        judges.controller_of("go2"),
-        0.1,
-        (),
-        5e-3,
-        Breaks(),
-        settling_time=0.1,
-    )
+    options = {"control_period": 5e-3, "actuators": Breaks(), "settling_time": 0.1}
+    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, **options)
     assert record.outcome == "controller failed" and len(record) == 2 + 20
     assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)

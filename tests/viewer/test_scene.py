@@ -6,6 +6,7 @@ import dataclasses
 import re
 from contextlib import closing
 from typing import Any
+from unittest.mock import Mock
 
 import hypothesis.strategies as st
 import numpy as np
@@ -312,15 +313,11 @@ def test_a_path_without_a_name_is_refused(viewer, standing):
     assert viewer.window.scene.commands() == before
 
 
-def test_an_interrupted_picture_is_drawn_again(viewer, standing, contacts):
+def test_an_interrupted_picture_is_drawn_again(viewer, standing, contacts, monkeypatch):
     viewer.show(standing)
-    put, viewer.window.put = (
-        viewer.window.put,
-        lambda updates: (_ for _ in ()).throw(KeyboardInterrupt),
-    )
-    with pytest.raises(KeyboardInterrupt):
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(viewer.window, "put", Mock(side_effect=KeyboardInterrupt))
         viewer.show(standing, contacts)
-    viewer.window.put = put
     viewer.show(standing)
     assert not any("/cone/" in path for path in paths(viewer))
     assert "/meshcat/robot/root_joint" in paths(viewer)
@@ -340,20 +337,10 @@ def legend(viewer: Viewer) -> list[str]:
 
 
 def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
-    viewer.show(
-        standing,
-        contacts,
-        forces,
-        planned=forces,
-        support=True,
-        push=("base", [0, 30.0, 0]),
-        ghost=standing,
-    )
-    cone = [
-        "friction cone: force inside",
-        "friction cone: surface reached",
-        "friction cone: force outside (rim)",
-    ]
+    everything = {"planned": forces, "support": True, "ghost": standing}
+    viewer.show(standing, contacts, forces, push=("base", [0, 30.0, 0]), **everything)
+    kinds = ("force inside", "surface reached", "force outside (rim)")
+    cone = [f"friction cone: {kind}" for kind in kinds]
     assert legend(viewer) == [
         "measured force", "planned force", "centre of mass", "push", *cone, "support polygon",
         "desired posture",
@@ -377,19 +364,14 @@ def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
 
 def test_forces_that_are_not_drawn_still_colour_their_cones(viewer, standing, contacts, forces):
     def cones() -> dict:
-        return {
-            path: item.colour
-            for path, item in viewer.renderer.picture.items()
-            if path.startswith("cone/")
-        }
+        items = viewer.renderer.picture.items()
+        return {path: item.colour for path, item in items if path.startswith("cone/")}
 
     viewer.show(standing, contacts, forces)
     seen = cones()
     viewer.show(standing, contacts, forces, arrows=False)
     assert cones() == seen and len(set(seen.values())) > 1
-    assert not [
-        path for path in viewer.renderer.picture if path.startswith(("measured", "planned"))
-    ]
+    assert not any(path.startswith(("measured", "planned")) for path in viewer.renderer.picture)
 
 
 def test_a_view_chosen_before_the_first_picture_is_kept(go2, standing):

@@ -210,15 +210,8 @@ def test_multipliers_are_at_the_middle_of_their_facets(viewer, go2, standing, fa
     contacts = Contacts.points(go2, mu=0.6, normals=slopes)
     task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
     tasks = [task, *standing_tasks(standing)[1:]]
-    controller = WholeBodyController(
-        go2,
-        contacts,
-        tasks,
-        facets=facets,
-        facet_rotation=turn,
-        min_normal_force=20.0,
-        backend="reference",
-    )
+    options = {"facets": facets, "facet_rotation": turn, "min_normal_force": 20.0}
+    controller = WholeBodyController(go2, contacts, tasks, backend="reference", **options)
     answer = controller(standing.q, standing.v).solution
     picture = viewer.multiplier_labels(standing, contacts, answer)
     shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}
