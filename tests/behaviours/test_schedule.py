@@ -8,7 +8,7 @@ from dataclasses import replace
 import judges
 import numpy as np
 import pytest
-from messages import refused
+from messages import raises, refused
 from scipy.spatial import ConvexHull
 
 from floatbase.behaviours import (
@@ -128,9 +128,8 @@ def test_a_swing_leads_from_rest_to_rest_over_its_height():
     assert np.allclose(middle, (swing.start + swing.end) / 2.0 + [0.0, 0.0, 0.05])
     for t in np.linspace(0.31, 0.79, 25):
         (x0, v0, _), (x1, v1, _), (_, v, a) = swing(t - STEP), swing(t + STEP), swing(t)
-        assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6) and np.allclose(
-            (v1 - v0) / (2 * STEP), a, atol=1e-4
-        )
+        assert np.allclose((x1 - x0) / (2 * STEP), v, atol=1e-6)
+        assert np.allclose((v1 - v0) / (2 * STEP), a, atol=1e-4)
     refused(lambda: replace(swing, touchdown=0.3), InputError, 0.3)
 
 
@@ -155,21 +154,15 @@ def test_the_pendulum_keeps_its_equation_and_ends_on_the_last_zmp():
             assert np.allclose((after[1] - before[1]) / (2 * STEP), a, atol=1e-4)
     for edge in times[1:]:  # position and velocity are continuous where the ZMP turns
         before, after = plan(edge - 1e-9), plan(edge + 1e-9)
-        assert np.allclose(before[0], after[0], atol=1e-7) and np.allclose(
-            before[1], after[1], atol=1e-7
-        )
+        assert np.allclose(before[0], after[0], atol=1e-7)
+        assert np.allclose(before[1], after[1], atol=1e-7)
     assert np.allclose(plan(times[-1] + 20.0)[0], places[-1], atol=1e-9)  # at rest on the last ZMP
 
 
 def test_a_pendulum_refuses_gaps_and_what_is_no_plan():
     zero = np.zeros(2)
-    refused(
-        lambda: LIPM([(0.0, 1.0, zero, zero), (1.5, 2.0, zero, zero)], zero, 3.0),
-        InputError,
-        "ZMP",
-        1.5,
-        2,
-    )
+    with raises(InputError, "ZMP", 1.5, 2):
+        LIPM([(0.0, 1.0, zero, zero), (1.5, 2.0, zero, zero)], zero, 3.0)
     refused(lambda: LIPM([], zero, 3.0), InputError, "ZMP")
     refused(lambda: LIPM([(0.0, 1e3, zero, zero)], zero, 3.0), InputError, "omega", 1000)
 
@@ -225,9 +218,8 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
         )
         late = start + rng.uniform(0.0, 5.0)
         after = gait.starting_at(late)
-        assert gait.starting_at(start) is gait and not any(
-            after.swing_at(foot, late - 1e-6) for foot in "abcd"
-        )
+        assert gait.starting_at(start) is gait
+        assert not any(after.swing_at(foot, late - 1e-6) for foot in "abcd")
         for t in rng.uniform(late, 12.0, 20):
             for foot in "abcd":
                 times, found = gait.swing_at(foot, t), after.swing_at(foot, t)

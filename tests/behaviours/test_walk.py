@@ -82,11 +82,8 @@ def test_the_momentum_of_a_walk_changes_by_what_the_ground_does():
         record.state(int(np.searchsorted(record.time, t))).com_velocity for t in (time[0], time[-1])
     ]
     impulse = (forces[:-1] + gravity).sum(axis=0) * PERIOD
-    assert np.allclose(
-        impulse,
-        walk.robot.mass * (ends[1] - ends[0]),
-        atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5,
-    )
+    expected = walk.robot.mass * (ends[1] - ends[0])
+    assert np.allclose(impulse, expected, atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5)
 
 
 def test_every_tick_of_a_walk_is_compiled():
@@ -192,11 +189,9 @@ def test_steps_save_a_robot_that_would_fall():
     standing, stepping = Stand(robot, contacts), Stand(robot, contacts, Gait.trot(robot, swing=0.2))
     assert run(standing, 2.5, push).outcome != "completed"
     record = run(stepping, 4.0, push)
-    assert (
-        record.outcome == "completed"
-        and np.linalg.norm(record.final.com_velocity) < 0.1
-        and not stepping.stepping
-    )
+    assert record.outcome == "completed"
+    assert np.linalg.norm(record.final.com_velocity) < 0.1
+    assert not stepping.stepping
     assert any(len(step.stance) < 4 for step in stepping.history)
 
 
@@ -272,9 +267,8 @@ def test_soft_contacts_give_the_torques_of_hard_ones_if_these_suffice():
     )
     assert np.allclose(held(state.q, state.v).tau, soft(state.q, state.v).tau, atol=1e-3)
     other = soft.replace(contacts=contacts.without("FL_foot"))
-    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(
-        soft.tasks
-    )
+    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
+    assert len(other.tasks) == len(soft.tasks)
 
 
 def test_a_walk_softens_its_contacts_if_no_forces_hold_its_feet():
@@ -286,9 +280,8 @@ def test_a_walk_softens_its_contacts_if_no_forces_hold_its_feet():
         fb.WholeBodyController(robot, judges.stance(robot), (), **weak)(moving.q, moving.v)
     command = walk(moving.q, moving.v)
     assert command.softened
-    assert np.all(
-        np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6
-    ) and command.forces.shape == (walk.contacts.k,)
+    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6)
+    assert command.forces.shape == (walk.contacts.k,)
 
 
 def test_a_walk_and_its_recovery_do_not_depend_on_the_heading():
@@ -358,9 +351,8 @@ def test_feet_aim_at_the_ground_and_not_below_it():
 def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot():
     record = run(walk_of("go2", Gait.trot, (0.9, 0.0)), 3.5)
     assert record.outcome == "completed"
-    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(
-        speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1
-    )
+    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8
+    assert np.isclose(speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1)
 
 
 def test_gaits_that_sway_are_refused_unless_there_is_friction():
@@ -405,9 +397,8 @@ def test_the_path_continues_from_where_a_push_moved_the_robot():
     (calm, _), (record, _) = trot(), trot(200.0)
     moved = record.com[-1, 1] - calm.com[-1, 1]
     assert moved > 0.1  # it continues from where it was pushed, and does not run back
-    assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(
-        speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1
-    )
+    assert abs(record.final.com_velocity[1]) < 0.1
+    assert np.isclose(speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1)
 
 
 def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches():
@@ -452,11 +443,9 @@ def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_st
     fb.rollout(sim, walk, 0.5, control_period=PERIOD)
     walk.gait = Gait.crawl(walk.robot, swing=0.5, pause=0.3, start=1.5)
     record = fb.rollout(sim, walk, 2.0, control_period=PERIOD)
-    assert (
-        record.outcome == "completed"
-        and farthest_from_plan(record, walk, 1.4) < 0.02
-        and tilt(record) < 0.3
-    )
+    assert record.outcome == "completed"
+    assert farthest_from_plan(record, walk, 1.4) < 0.02
+    assert tilt(record) < 0.3
     # its foot is unloaded
     assert (
         record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight
@@ -542,11 +531,9 @@ def test_it_begins_anew_where_another_controller_had_the_robot():
     other = Stand(walk.robot, fb.Contacts.feet(walk.robot))
     fb.rollout(sim, other, 3.0, control_period=PERIOD)
     record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # after 3 s without a call
-    assert (
-        record.outcome == "completed"
-        and tilt(record) < 0.5
-        and walk.history[0].time == pytest.approx(4.0)
-    )
+    assert record.outcome == "completed"
+    assert tilt(record) < 0.5
+    assert walk.history[0].time == pytest.approx(4.0)
 
 
 def test_a_copy_of_a_robot_that_steps_stands():
@@ -701,11 +688,8 @@ def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity):
     record = run(walk, 6.0)
     assert record.outcome == "completed"
     period = walk.gait.period
-    assert np.allclose(
-        speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period),
-        walk.speed_fraction * np.array(velocity),
-        atol=0.02,
-    )
+    expected = walk.speed_fraction * np.array(velocity)
+    assert np.allclose(speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period), expected, atol=0.02)
     walk.velocity = 0.1 * np.array(velocity)
     assert walk.speed_fraction == 1.0
 

@@ -300,10 +300,8 @@ def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference
     state = robot.standing()
     motions = null_space(fb.equations_of_motion(state, compiled.contacts).A)
     v = motions @ motions.T[:, 3]  # the base rolls as far as the feet allow
-    assert (
-        compiled.compiled is not None
-        and compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
-    )
+    assert compiled.compiled is not None
+    assert compiled.compiled(np.array(state.q), 1e-3 * v, 0.0) is not None
     assert compiled.compiled(np.array(state.q), 10.0 * v, 0.0) is None
     assert judges.difference(compiled, reference, state.replace(v=10.0 * v)) == 0.0
     with raises(InfeasibleError, "motion FL_FOOT y"):

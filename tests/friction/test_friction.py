@@ -90,11 +90,8 @@ def test_the_area_ratio_follows_the_number_of_facets(seed, n, mu, inside):
 
 
 def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97():
-    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == [
-        0.64,
-        0.90,
-        0.97,
-    ]
+    expected = [0.64, 0.90, 0.97]
+    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == expected
     assert [round(FrictionPolyhedron(UP, 0.7, n, False).area_ratio, 2) for n in (4, 8, 16)] == [
         1.27,
         1.05,

@@ -200,12 +200,8 @@ def test_labels_are_texts_that_know_their_kind_owner_and_number():
     label = ConstraintLabel("FL_foot facet 2", "friction", "FL_foot", 2)
     assert label == "FL_foot facet 2" and label in {"FL_foot facet 2": 1}
     for same in (label, copy.deepcopy(label), pickle.loads(pickle.dumps(label))):
-        assert (same, same.kind, same.owner, same.number) == (
-            "FL_foot facet 2",
-            "friction",
-            "FL_foot",
-            2,
-        )
+        expected = ("FL_foot facet 2", "friction", "FL_foot", 2)
+        assert (same, same.kind, same.owner, same.number) == expected
     qp = QP(np.eye(2), np.zeros(2), *NONE, np.eye(2), np.ones(2), inequality_names=(label, "roof"))
     assert [name.kind for name in qp.inequality_names] == ["friction", "other constraints"]
     assert [name.owner for name in qp.inequality_names] == ["FL_foot", "roof"]
@@ -220,12 +216,10 @@ def test_rows_can_be_left_out_by_kind():
     pushed = fb.CoMTask(state.com, acceleration=[0.0, 12.0, 0.0])
     qp = controller.replace(tasks=[pushed, *controller.tasks[1:]]).qp(state)
     smaller = qp.without("normal force")
-    assert (
-        len(qp.G) - len(smaller.G) == 4 and "FL_foot normal force" not in smaller.inequality_names
-    )
-    assert str(smaller.inequality_names[4]).startswith("FR_foot facet") and np.array_equal(
-        smaller.A, qp.A
-    )
+    assert len(qp.G) - len(smaller.G) == 4
+    assert "FL_foot normal force" not in smaller.inequality_names
+    assert str(smaller.inequality_names[4]).startswith("FR_foot facet")
+    assert np.array_equal(smaller.A, qp.A)
 
     def least(*kinds: str) -> float:
         return float(solve(qp.without(*kinds))["forces"][2::3].min())

@@ -111,9 +111,8 @@ def test_a_robot_that_stands_low_keeps_its_joint_limits_or_names_those_that_prev
     go2, talos = judges.load("go2"), judges.load("talos")
     low = go2.standing(height=0.0)
     assert np.allclose(judges.stance(go2).positions(low)[:, 2], 0.0, atol=1e-9)
-    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:]) and np.all(
-        low.q[7:] <= go2.model.upperPositionLimit[7:]
-    )
+    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:])
+    assert np.all(low.q[7:] <= go2.model.upperPositionLimit[7:])
     with raises(InputError, 0.3, "leg_left_4_joint", 2.62):
         talos.standing(height=0.3)
 

@@ -78,9 +78,8 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
     for tick in range(3):
         calls = lag.calls[4 * tick : 4 * tick + 4]
         assert all(np.array_equal(tau, rollout.tau_desired[tick]) for tau, *_ in calls)
-        assert np.array_equal(calls[0][1], rollout.q[tick][7:]) and np.array_equal(
-            calls[0][2], rollout.v[tick][6:]
-        )
+        assert np.array_equal(calls[0][1], rollout.q[tick][7:])
+        assert np.array_equal(calls[0][2], rollout.v[tick][6:])
         mean = 0.1 * (4 * tick + 2.5) * rollout.tau_desired[tick]
         assert np.allclose(rollout.tau[tick], mean, rtol=1e-12)
 

@@ -136,11 +136,8 @@ def test_a_controller_that_fails_at_once_lets_the_robot_lie_down():
         raise fb.InfeasibleError("no answer")
 
     record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settling_time=1.5)
-    assert (record.outcome, record.controller_off_time, len(record)) == (
-        "controller failed",
-        0.0,
-        1500,
-    )
+    expected = ("controller failed", 0.0, 1500)
+    assert (record.outcome, record.controller_off_time, len(record)) == expected
     assert record.final.q[2] < 0.5 * record.q[0, 2] and min(lowest(record.final).values()) > -DEPTH
 
 
@@ -163,11 +160,8 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row():
     assert record.outcome == "controller failed" and len(record) == 2 + 20
     assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)
-    assert np.allclose(
-        record.tau[2],
-        np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits),
-        atol=1e-9,
-    )
+    expected = np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits)
+    assert np.allclose(record.tau[2], expected, atol=1e-9)
     assert np.abs(record.tau_desired[2]).max() > 1e-3
 
 
@@ -251,9 +245,8 @@ def test_a_copy_of_a_robot_that_lies_moves_alone(copied):
     other.step(np.zeros(12))
     fresh = fb.Simulation(judges.load("go2"))
     fresh.step(np.zeros(12))
-    assert np.array_equal(other.q, fresh.q) and np.array_equal(
-        other.contact_forces(), fresh.contact_forces()
-    )
+    assert np.array_equal(other.q, fresh.q)
+    assert np.array_equal(other.contact_forces(), fresh.contact_forces())
     sim.step(np.zeros(12))
     assert sim.link_collisions and sim.time == pytest.approx(sim.timestep)
 

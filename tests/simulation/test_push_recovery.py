@@ -101,16 +101,12 @@ def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
         "largest push survived", "capture-point bound (theory)", "static bound (theory)",
     ]  # fmt: skip
     plt.close(axis.figure)
-    refused(
-        lambda: push_recovery_plots.plot(recovery, plt.figure().add_subplot()), InputError, "polar"
-    )
+    with raises(InputError, "polar"):
+        push_recovery_plots.plot(recovery, plt.figure().add_subplot())
     plt.close("all")
     near, far = (push_recovery_plots.picture(recovery, scale) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {
-        "push_recovery",
-        "capture_point_bound",
-        "static_bound",
-    }
+    expected = {"push_recovery", "capture_point_bound", "static_bound"}
+    assert {path.split("/")[0] for path in near} == expected
     assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {
         "push_recovery"
     }
@@ -123,10 +119,8 @@ def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
     before = replace(recovery, pushes=recovery.pushes / 2)
     axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
     grey = axis.get_lines()[1]
-    assert (
-        np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
-        and grey.get_label() == "largest push survived, previous run"
-    )
+    assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
+    assert grey.get_label() == "largest push survived, previous run"
     plt.close(axis.figure)
     assert {
         path.split("/")[0]

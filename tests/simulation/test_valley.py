@@ -62,11 +62,8 @@ def test_go2_stands_in_a_valley_with_a_level_base(shift):
         robot, Ground(normal=[left, right], offset=[shift * left[1], shift * right[1]])
     )
     start = sim.state
-    assert np.allclose(
-        start.frame_pose("base").rotation,
-        robot.standing().frame_pose("base").rotation,
-        atol=LENGTHS,
-    )
+    expected = robot.standing().frame_pose("base").rotation
+    assert np.allclose(start.frame_pose("base").rotation, expected, atol=LENGTHS)
     clearances = sim.ground.clearances(sim.contact_positions())
     assert np.allclose(clearances.min(axis=1), 0.0, atol=LENGTHS)
     on_left = np.argmin(clearances, axis=1) == 0

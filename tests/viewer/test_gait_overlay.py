@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from messages import refused
+from messages import raises, refused
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
@@ -173,10 +173,8 @@ def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(viewer, wa
     )
     items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
     shown = {text: (colour, symbol) for colour, text, symbol in items}
-    assert shown["capture point"] == (hex_code(COM), "ring") and shown["centre of mass"] == (
-        hex_code(COM),
-        "disc",
-    )
+    assert shown["capture point"] == (hex_code(COM), "ring")
+    assert shown["centre of mass"] == (hex_code(COM), "disc")
     assert shown["planned ZMP"] == (hex_code(viewer.painter.text_colour), "diamond")
     assert shown["planned foothold"] == (hex_code(GREYS[1]), "ring") and "swing path" in shown
     assert len({*shown.values()}) == len(shown)  # two of one colour differ in their symbol
@@ -187,21 +185,14 @@ def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(viewer, wa
 def test_invalid_overlays_are_refused_by_name(viewer, walked):
     run, walk = walked
     refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
-    refused(
-        lambda: viewer.walk_overlay(walk, fb.load("solo12").standing()), InputError, "go2", "solo12"
-    )
-    refused(
-        lambda: viewer.step_overlay(walk, 0.0, run.final), InputError, "step", "StepPlan", "Walk"
-    )
-    refused(
-        lambda: viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final),
-        UnknownNameError,
-        "go2",
-        "paw",
-    )
-    refused(
-        lambda: viewer.step_overlay(walk.history[1], np.nan, run.final), InputError, "t", np.nan
-    )
+    with raises(InputError, "go2", "solo12"):
+        viewer.walk_overlay(walk, fb.load("solo12").standing())
+    with raises(InputError, "step", "StepPlan", "Walk"):
+        viewer.step_overlay(walk, 0.0, run.final)
+    with raises(UnknownNameError, "go2", "paw"):
+        viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final)
+    with raises(InputError, "t", np.nan):
+        viewer.step_overlay(walk.history[1], np.nan, run.final)
     refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
     refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout")
 
@@ -226,19 +217,13 @@ def test_a_recorded_walk_plays_with_its_marks(viewer, walked):
     for foot in first.swings:
         track = tracks[f"/meshcat/swing/{foot}", ".visible"]
         times, seen = np.array(track["times"]), np.array(track["values"])
-        assert (
-            seen[(times >= first.time) & (times < second.time)].all()
-            and not seen[times < first.time].any()
-        )
+        assert seen[(times >= first.time) & (times < second.time)].all()
+        assert not seen[times < first.time].any()
     assert ("/meshcat/dcm", ".position") in tracks
     before = set(viewer.renderer.picture)
     viewer.play(run)
-    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == {
-        "dcm",
-        "zmp",
-        "foothold",
-        "swing",
-    }
+    expected = {"dcm", "zmp", "foothold", "swing"}
+    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == expected
 
 
 def test_a_followed_path_is_smooth_without_the_sway_of_steps():

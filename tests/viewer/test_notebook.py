@@ -402,11 +402,9 @@ def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
     assert data["text/plain"] == repr(viewer)
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     shown = viewer._repr_mimebundle_()
-    assert (
-        set(shown) == {"text/html"}
-        and "srcdoc=" in shown["text/html"]
-        and viewer.url not in shown["text/html"]
-    )
+    assert set(shown) == {"text/html"}
+    assert "srcdoc=" in shown["text/html"]
+    assert viewer.url not in shown["text/html"]
     monkeypatch.delenv("FLOATBASE_VIEWER")
     viewer.close()
     assert set(viewer._repr_mimebundle_()) == {"text/html"}

@@ -196,12 +196,10 @@ def test_horizontal_force_limits_are_plotted(standing, contacts):
         push_recovery_plots.plot_horizontal_force_limits(
             wrench_set(standing, walls, inner_approximation=False, facets=8), n=8
         )
-    refused(
-        lambda: push_recovery_plots.plot_horizontal_force_limits(
+    with raises(InfeasibleError):
+        push_recovery_plots.plot_horizontal_force_limits(
             wrench_set(standing, contacts.only("FL_foot"))
-        ),
-        InfeasibleError,
-    )
+        )
 
 
 @pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
