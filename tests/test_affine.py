@@ -125,9 +125,8 @@ def test_no_point_costs_less_than_the_minimiser(seed, n):
 def test_among_many_minimisers_the_smallest_is_given(seed, m, n):
     rng = np.random.default_rng(seed)
     A, r = rng.normal(size=(m, n)), rng.normal(size=m)
-    assert np.allclose(
-        fb.Quadratic.from_residual(A, r).minimiser(), np.linalg.lstsq(A, r)[0], atol=1e-6
-    )
+    expected = np.linalg.lstsq(A, r)[0]
+    assert np.allclose(fb.Quadratic.from_residual(A, r).minimiser(), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(("curvature", "counts"), [(1e-10, True), (1e-13, False)])

@@ -29,10 +29,8 @@ def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path
     built = {path.relative_to(ROOT).as_posix() for path in (web / "dist").iterdir()}
     assert built <= packed
     assert not [name for name in packed if "web/src/" in name or "node_modules" in name]
-    assert {name.split("/")[0] for name in packed} == {
-        "floatbase",
-        wheel.name.rsplit("-", 3)[0] + ".dist-info",
-    }
+    expected = {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
+    assert {name.split("/")[0] for name in packed} == expected
 
 
 def test_importing_floatbase_is_light_and_quick():

@@ -35,9 +35,8 @@ def test_distances_from_a_polygon_are_those_from_samples_of_its_border():
     )
     nearest = np.linalg.norm(points[:, None] - border, axis=2).min(axis=1)
     inside = np.all((points >= 0.0) & (points <= 2.0), axis=1)
-    assert np.allclose(
-        distance_to_polygon(points, SQUARE), np.where(inside, nearest, -nearest), atol=1e-3
-    )
+    expected = np.where(inside, nearest, -nearest)
+    assert np.allclose(distance_to_polygon(points, SQUARE), expected, atol=1e-3)
     assert float(distance_to_polygon(np.array([0.0, 1.0]), np.array([[-1.0, 0], [1.0, 0]]))) == -1.0
     assert float(distance_to_polygon(np.array([3.0, 4.0]), np.zeros((1, 2)))) == -5.0
 
@@ -49,7 +48,6 @@ def test_a_hull_has_the_corners_alone_counter_clockwise():
     edges = np.roll(hull, -1, axis=0) - hull
     following = np.roll(edges, -1, axis=0)
     assert np.all(edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0] > 0.0)
-    assert np.array_equal(
-        convex_hull(np.array([[1.0, 1.0], [0.0, 0.0], [0.5, 0.5]])), [[0, 0], [1, 1]]
-    )
+    expected = [[0, 0], [1, 1]]
+    assert np.array_equal(convex_hull(np.array([[1.0, 1.0], [0.0, 0.0], [0.5, 0.5]])), expected)
     assert np.array_equal(convex_hull(np.ones((3, 2))), [[1, 1]])

@@ -60,9 +60,8 @@ def test_the_length_is_the_distance_between_the_two_pivots():
     for q in np.linspace(-4.0, 4.0, 33):
         gamma = np.arccos(HYQ.crank / HYQ.base) + q
         foot, rod = np.array([HYQ.base, 0.0]), HYQ.crank * np.array([np.cos(gamma), np.sin(gamma)])
-        assert cylinder.geometry([q]).length[0] == pytest.approx(
-            np.linalg.norm(rod - foot), rel=1e-12
-        )
+        expected = np.linalg.norm(rod - foot)
+        assert cylinder.geometry([q]).length[0] == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_both_sides():
@@ -106,9 +105,8 @@ def test_the_open_valve_passes_its_rated_flow_at_its_rated_pressure_drop():
 def test_flow_grows_with_the_root_of_the_drop_and_with_its_sign():
     cylinder = one()
     flow = cylinder.orifice_flow(np.array([[40e5], [-10e5]]))[:, 0]
-    assert flow == pytest.approx(
-        HYQ.valve_gain * np.array([np.sqrt(40e5), -np.sqrt(10e5)]), rel=3e-3
-    )
+    expected = HYQ.valve_gain * np.array([np.sqrt(40e5), -np.sqrt(10e5)])
+    assert flow == pytest.approx(expected, rel=3e-3)
     slope = cylinder.orifice_flow(np.array([[1.0], [-1.0]]))[:, 0]
     assert np.all(np.isfinite(slope)) and slope[0] == -slope[1] > 0.0
 
@@ -137,9 +135,8 @@ def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_fl
     s = (
         -b + np.sqrt(b**2 + 4.0 * a * leaky.leakage * (leaky.supply_pressure - leaky.tank_pressure))
     ) / (2.0 * a)
-    assert end == pytest.approx(
-        [leaky.supply_pressure - s**2, leaky.tank_pressure + s**2], rel=1e-3
-    )
+    expected = [leaky.supply_pressure - s**2, leaky.tank_pressure + s**2]
+    assert end == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("q", [-0.8, 0.0, 0.5])

@@ -37,18 +37,16 @@ def test_a_delay_of_whole_steps_shifts_the_torques_and_changes_no_digit(steps):
 
 def test_a_delay_of_a_quarter_step_mixes_the_last_torques_with_the_new_ones():
     old = np.vstack([np.zeros(12), WANTED[:-1]])
-    assert np.allclose(
-        got(Delay(ROBOT, 0.25e-3), WANTED), 0.25 * old + 0.75 * WANTED, atol=ROUNDING
-    )
+    expected = 0.25 * old + 0.75 * WANTED
+    assert np.allclose(got(Delay(ROBOT, 0.25e-3), WANTED), expected, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("delay", [0.7e-3, 3e-3, 1e-2 / 3.0])
 def test_the_length_of_the_steps_changes_nothing_but_the_grid(delay):
     """Four steps of 0.25 ms have the mean of one of 1 ms, with four different torques."""
     fine = got(Delay(ROBOT, delay), np.repeat(WANTED, 4, axis=0), 0.25e-3)
-    assert np.allclose(
-        fine.reshape(40, 4, 12).mean(axis=1), got(Delay(ROBOT, delay), WANTED), atol=ROUNDING
-    )
+    expected = got(Delay(ROBOT, delay), WANTED)
+    assert np.allclose(fine.reshape(40, 4, 12).mean(axis=1), expected, atol=ROUNDING)
 
 
 def test_a_delay_stays_as_long_as_it_was_after_a_hundred_thousand_steps():

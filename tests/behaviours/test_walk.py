@@ -203,10 +203,8 @@ def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards):
     push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
     # it used to fall at 230 N, which it survives without a step
     assert run(stand, 2.0, push).outcome == "completed"
-    assert next(step.stance for step in stand.history if len(step.stance) == 2) == (
-        "FL_foot",
-        "RR_foot",
-    )
+    expected = ("FL_foot", "RR_foot")
+    assert next(step.stance for step in stand.history if len(step.stance) == 2) == expected
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -216,9 +214,8 @@ def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side):
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot))
     push = fb.Push([0.0, 400.0 if side == "left" else -400.0, 0.0], start=0.1)
     assert run(stand, 1.3, push).outcome == "completed"
-    assert next(step.stance for step in stand.history if len(step.stance) == 1) == (
-        f"{side}_sole_link",
-    )
+    expected = (f"{side}_sole_link",)
+    assert next(step.stance for step in stand.history if len(step.stance) == 1) == expected
 
 
 def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_then():

@@ -109,9 +109,8 @@ def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name):
             assert command.multipliers[row] > 0
             if row.startswith("torque limit "):
                 joint, side = row.removeprefix("torque limit ").split()
-                assert torques[joint] == pytest.approx(
-                    limits[joint] * {"upper": 1, "lower": -1}[side], abs=1e-6
-                )
+                expected = limits[joint] * {"upper": 1, "lower": -1}[side]
+                assert torques[joint] == pytest.approx(expected, abs=1e-6)
                 seen.add("torque")
             elif row.endswith(" normal force"):
                 assert forces[row.removesuffix(" normal force")][2] == pytest.approx(1.0, abs=1e-6)
@@ -133,9 +132,8 @@ def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name):
     state = judges.load(name).standing()
     command = judges.controller_of(name)(state.q, state.v)
     forces = command.forces.reshape(-1, 3)
-    assert np.allclose(
-        forces.sum(axis=0), [0.0, 0.0, state.robot.weight], atol=SAG * state.robot.weight
-    )
+    expected = [0.0, 0.0, state.robot.weight]
+    assert np.allclose(forces.sum(axis=0), expected, atol=SAG * state.robot.weight)
     moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
     assert np.allclose(moment, 0.0, atol=SAG * state.robot.weight)
     assert np.allclose(command.qdd[:6], 0.0, atol=0.05)

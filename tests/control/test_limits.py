@@ -173,10 +173,8 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend):
         back = each.replace(contacts=stand)(state.q, state.v, 0.1)
         assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
         assert "FL_foot largest normal force" in back.active
-    assert np.array_equal(
-        lifted(state.q, state.v, 0.1).tau,
-        torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}}),
-    )
+    expected = torques(swing, **bounds | {"min_normal_force": {"RR_foot": 12.0}})
+    assert np.array_equal(lifted(state.q, state.v, 0.1).tau, expected)
     with raises(UnknownNameError, "min_normal_force", "heel"):
         # a new controller knows the robot's feet, but no other absent contact
         torques(swing, **bounds)

@@ -137,9 +137,8 @@ def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_mult
         .move_to(state)
         .jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
     )
-    assert np.allclose(
-        state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7
-    )
+    expected = J_foot.T @ forces[:3] + A.T @ forces[3:]
+    assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, expected, atol=1e-7)
     assert eom.contacts.point_names == ("FL_foot",)
 
 
@@ -308,9 +307,8 @@ def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(disc, sl
     assert np.allclose(linear, 2.0 / 3.0 * G * np.sin(slope) * down, atol=1e-10)
     assert np.allclose(angular, [0.0, 2.0 / 3.0 * G * np.sin(slope) / R_DISC, 0.0], atol=1e-9)
     # friction acts up the slope with the remaining third
-    assert np.allclose(
-        force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9
-    )
+    expected = M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down)
+    assert np.allclose(force, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("lean", "radius"), [(1.2, 0.6), (0.8, 1.0), (0.5, 0.3)])
@@ -375,9 +373,8 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc):
     end = drive(back, lambda axle: -turn * Z)
     assert np.allclose(ahead.q[:3] - start.q[:3], [way, 0.0, 0.0], atol=1e-9)
     assert np.allclose(end.frame_pose("disc").rotation, np.eye(3), atol=1e-9)
-    assert np.allclose(
-        end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9
-    )
+    expected = way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0])
+    assert np.allclose(end.q[:3] - start.q[:3], expected, atol=1e-9)
     sideways = start.replace(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     assert np.linalg.norm(wheel.slip(sideways)) > 0.9
 

@@ -300,9 +300,8 @@ def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(
     robot = judges.load("go2")
     state = robot.standing()
     sole = fb.Contacts.points(robot).positions(state)[0]
-    assert np.allclose(
-        state.point("FL_foot") - sole, [0.0, 0.0, robot.foot("FL_foot").radius], atol=1e-12
-    )
+    expected = [0.0, 0.0, robot.foot("FL_foot").radius]
+    assert np.allclose(state.point("FL_foot") - sole, expected, atol=1e-12)
     here = fb.FrameTask("FL_foot", state.point("FL_foot"))
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     # no error to correct

@@ -56,9 +56,8 @@ def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algo
     dynamics, motion = eom.residual(qdd, tau, forces)
     assert np.allclose(dynamics, 0.0, atol=1e-7)
     assert np.allclose(motion, eom.A @ qdd - eom.b)
-    assert np.allclose(
-        eom.residual(qdd, tau + 1.0, forces)[0], dynamics - eom.S @ np.ones(eom.d), atol=1e-9
-    )
+    expected = dynamics - eom.S @ np.ones(eom.d)
+    assert np.allclose(eom.residual(qdd, tau + 1.0, forces)[0], expected, atol=1e-9)
     if eom.k:
         pushed = eom.residual(qdd, tau, forces + 1.0)[0]
         assert np.allclose(pushed, dynamics - eom.J.T @ np.ones(eom.k), atol=1e-9)

@@ -204,9 +204,8 @@ def test_turned_facets_are_the_facets_turned_about_the_normal(seed, n, mu, insid
     about = Rotation.from_rotvec(turn * normal).as_matrix()
     size = 1.0 + mu
     assert np.allclose(turned.face_matrix, straight.face_matrix @ about.T, rtol=0, atol=1e-9 * size)
-    assert np.allclose(
-        turned.rays, straight.rays @ about.T, rtol=0, atol=1e-9 * size / np.cos(np.pi / n)
-    )
+    expected = straight.rays @ about.T
+    assert np.allclose(turned.rays, expected, rtol=0, atol=1e-9 * size / np.cos(np.pi / n))
     whole = FrictionPolyhedron(normal, mu, n, inside, turn + 2 * np.pi / n)
     assert np.allclose(
         np.roll(turned.face_matrix, -1, axis=0), whole.face_matrix, rtol=0, atol=1e-9 * size

@@ -273,9 +273,8 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2():
         wrenches = wrench_set(state, contacts, facets=facets, facet_rotation=turn)
         angles, forces = wrenches.max_horizontal_forces(8)
         assert np.allclose(angles, np.pi / 4 * np.arange(8))
-        assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(
-            [forwards, diagonally, sideways, sideways, diagonally], rel=1e-6
-        )
+        expected = [forwards, diagonally, sideways, sideways, diagonally]
+        assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(expected, rel=1e-6)
 
 
 # where a robot can stand

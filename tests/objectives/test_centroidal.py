@@ -247,9 +247,8 @@ def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_fr
         normal = 0.5 * sum((s - ai) ** 2 for (_, s), ai in zip(pairs, a, strict=True))
         assert objectives.tangential_bias(contacts)(lam) == pytest.approx(tangential, rel=1e-10)
         assert objectives.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
-        assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(
-            tangential + alpha * normal, rel=1e-10
-        )
+        expected = tangential + alpha * normal
+        assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(expected, rel=1e-10)
 
 
 def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys():

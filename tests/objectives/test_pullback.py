@@ -120,9 +120,8 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up():
     values = {b: objectives.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
     for block, x in zip(BLOCKS, space(beta), strict=True):
         assert values[block] == pytest.approx(parts[block](x), rel=1e-10)
-    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(
-        sum(values.values()), rel=1e-10
-    )
+    expected = sum(values.values())
+    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(expected, rel=1e-10)
     assert objectives.cost_on_space(space)(beta) == 0.0
 
 
@@ -134,9 +133,8 @@ def test_a_cost_on_all_three_at_once_may_couple_them():
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
     seen = Quadratic.from_residual(A, r).pullback(space.map)
     beta = rng.normal(size=space.dimension)
-    assert seen(beta) == pytest.approx(
-        0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10
-    )
+    expected = 0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2))
+    assert seen(beta) == pytest.approx(expected, rel=1e-10)
 
 
 # (19) ---------------------------------------------------------------------------------------------

@@ -394,6 +394,5 @@ def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed, other):
     run = active_set(qp, 3.0 * rng.normal(size=qp.n), working)
     check_optimum(run)
     check_record(run)
-    assert run.solution.objective == pytest.approx(
-        active_set(qp).solution.objective, rel=1e-8, abs=1e-8
-    )
+    expected = active_set(qp).solution.objective
+    assert run.solution.objective == pytest.approx(expected, rel=1e-8, abs=1e-8)

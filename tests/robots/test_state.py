@@ -44,9 +44,8 @@ def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name):
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
             linear, angular = judge.jacobian(frame, state.point(frame))
             assert np.allclose(state.frame_jacobian(frame), np.vstack([linear, angular]), atol=1e-9)
-            assert np.allclose(
-                state.frame_velocity(frame), np.concatenate([linear, angular]) @ state.v, atol=1e-9
-            )
+            expected = np.concatenate([linear, angular]) @ state.v
+            assert np.allclose(state.frame_velocity(frame), expected, atol=1e-9)
 
 
 def test_frame_drift_is_the_change_of_j_v_along_v(name):
@@ -65,9 +64,8 @@ def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_deriva
             judge.robot.is_floating
         ):  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
-        assert np.allclose(
-            state.com_jacobian, judges.jacobian_of(lambda s: s.com, state), atol=1e-7
-        )
+        expected = judges.jacobian_of(lambda s: s.com, state)
+        assert np.allclose(state.com_jacobian, expected, atol=1e-7)
         assert np.allclose(
             state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7
         )

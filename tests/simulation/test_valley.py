@@ -106,9 +106,8 @@ def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet():
     )
     assert record.slip().max() < 2e-3
     assert np.linalg.norm(record.final.com - state.com) < 5e-3
-    assert np.allclose(
-        record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight
-    )
+    expected = record.planned[-1]
+    assert np.allclose(record.measured[-1], expected, rtol=0.0, atol=STEADY * robot.weight)
     # on level ground the same feet, at the same places seen from above, cannot
     level = fb.Contacts.points(robot, mu=1.0)
     spot = with_feet(
@@ -140,9 +139,8 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides():
     assert len(sim.data.contact.geom) == 8
     forces = sim.contact_forces()
     assert np.allclose(record.measured[-1], forces.ravel())
-    assert np.allclose(
-        forces[:, 2], record.planned[-1].reshape(4, 3)[:, 2], atol=0.1 * robot.weight
-    )
+    expected = record.planned[-1].reshape(4, 3)[:, 2]
+    assert np.allclose(forces[:, 2], expected, atol=0.1 * robot.weight)
     assert forces[:, 2].sum() == pytest.approx(robot.weight, rel=0.1)
 
 
@@ -156,9 +154,8 @@ def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(n
         for _ in range(20):
             sim.step(np.zeros(robot.d))
     assert np.any(near.contact_forces())
-    assert np.allclose(
-        far.contact_forces(), near.contact_forces(), rtol=1e-3, atol=1e-3 * robot.weight
-    )
+    expected = near.contact_forces()
+    assert np.allclose(far.contact_forces(), expected, rtol=1e-3, atol=1e-3 * robot.weight)
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
@@ -172,7 +169,6 @@ def test_standing_on_a_slope_may_keep_the_base_level(name):
         assert not foot.is_flat or np.allclose(
             state.frame_pose(foot.frame).rotation[:, 2], normal, atol=LENGTHS
         )
-    assert np.allclose(
-        state.frame_pose("base").rotation, home.frame_pose("base").rotation, atol=LENGTHS
-    )
+    expected = home.frame_pose("base").rotation
+    assert np.allclose(state.frame_pose("base").rotation, expected, atol=LENGTHS)
     assert np.allclose(robot.standing(normal=[0.0, 0.0, 2.0]).q, home.q, atol=LENGTHS)

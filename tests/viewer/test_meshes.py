@@ -137,8 +137,5 @@ def test_parts_of_a_locked_joint_move_with_its_parent():
     )
     home, whole = arm.standing(), robot_meshes(arm)[-1]
     tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
-    assert_allclose(
-        tip,
-        home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3),
-        atol=1e-5,
-    )
+    expected = home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3)
+    assert_allclose(tip, expected, atol=1e-5)

@@ -113,9 +113,8 @@ def test_the_robot_and_its_forces_move_as_recorded(viewer, go2):
     rows = np.round(times / 1e-3).astype(int)
     assert_allclose(positions, rollout.q[rows, :3], atol=1e-5)
     _, scales = moving["measured/FL_foot", ".scale"]
-    assert_allclose(
-        scales[:, 2], viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1), rtol=1e-4
-    )
+    expected = viewer.scale * np.linalg.norm(rollout.measured[rows, :3], axis=1)
+    assert_allclose(scales[:, 2], expected, rtol=1e-4)
     assert times[-1] == pytest.approx(rollout.time[-1])
 
 
@@ -127,9 +126,8 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
     assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
     times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
-    assert_allclose(
-        faint[:, 0], np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"]), atol=1e-6
-    )
+    expected = np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"])
+    assert_allclose(faint[:, 0], expected, atol=1e-6)
     legend = [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
     assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
@@ -249,9 +247,8 @@ def test_a_saved_animation_plays_from_disk_without_network(page, viewer, go2, tm
         page.goto(address.as_uri())
         inside = page.frames[-1]
         inside.wait_for_function("window.viewer && viewer.num_messages_received > 0")
-        assert inside.evaluate("viewer.animator.duration") == pytest.approx(
-            rollout.time[-1], abs=1e-3
-        )
+        expected = rollout.time[-1]
+        assert inside.evaluate("viewer.animator.duration") == pytest.approx(expected, abs=1e-3)
         slider = inside.locator("#player input")
         slider.evaluate("(node) => { node.value = 0.25; node.dispatchEvent(new Event('input')); }")
         where = inside.evaluate(

@@ -69,9 +69,8 @@ def test_arrows_start_at_contacts(viewer, standing, contacts, forces, factor):
         for matrix, force, position in zip(
             arrows.values(), forces, contacts.positions(standing), strict=True
         ):
-            assert_allclose(
-                matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6
-            )
+            expected = viewer.scale * factor * share * force
+            assert_allclose(matrix[:3, 2], expected, rtol=1e-5, atol=1e-6)
             assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
@@ -87,9 +86,8 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
     for matrix, position in zip(cones.values(), contacts.positions(standing), strict=True):
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across / along == pytest.approx(mu, rel=1e-5)
-        assert_allclose(
-            matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6
-        )
+        expected = np.asarray(normal) / np.linalg.norm(normal)
+        assert_allclose(matrix[:3, 2] / along, expected, atol=1e-6)
         assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
@@ -254,10 +252,8 @@ def test_only_given_items_are_drawn(viewer, standing, contacts, forces):
     assert any(path.endswith("/rim") for path in full)  # of the foot whose force is outside
     assert any("/com/" in path for path in full - bare)
     viewer.show(standing, contacts.only("FL_foot"), forces=forces[0], com=False, cones=False)
-    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == {
-        "/meshcat/measured/FL_foot",
-        "/meshcat/patch/FL_foot",
-    }
+    expected = {"/meshcat/measured/FL_foot", "/meshcat/patch/FL_foot"}
+    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == expected
     viewer.show(standing, com=False)
     assert paths(viewer) == bare
     assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""

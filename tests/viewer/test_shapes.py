@@ -186,9 +186,8 @@ def test_horizontal_force_limits_are_plotted(standing, contacts):
     forces = wrenches.max_horizontal_forces(8)[1]
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
     assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "maximum horizontal force"
-    ]
+    expected = ["maximum horizontal force"]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == expected
     plt.close(axis.figure)
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
@@ -223,9 +222,8 @@ def test_multipliers_are_at_the_middle_of_their_facets(viewer, go2, standing, fa
         arm = picture[f"multiplier/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
             rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
-            assert_allclose(
-                arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9
-            )
+            expected = height * (rays[name.number - 1] + rays[name.number]) / 3
+            assert_allclose(arm, expected, atol=1e-9)
         else:
             assert_allclose(arm, height * normal, atol=1e-9)
         assert float(picture[f"multiplier/{name}"].shape.name) == pytest.approx(price, rel=0.05)
@@ -255,9 +253,8 @@ def test_figure_1_adds_up():
     assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
     force, ring = left.renderer.picture["f/wall"].matrix, left.renderer.picture["f/base"].matrix
     balance = -np.cross(force[:3, 3], force[:3, 2])
-    assert_allclose(
-        ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9
-    )
+    expected = balance / np.linalg.norm(balance)
+    assert_allclose(ring[:3, 2] / np.linalg.norm(ring[:3, 2]), expected, atol=1e-9)
     right.close(), left.close()
 
 

@@ -126,7 +126,5 @@ def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(viewer, stand
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     copy = viewer.show(standing).widget()
     assert "<iframe" in copy.value
-    assert with_thumbnail({"text/plain": "x"}, copy) == (
-        {"text/plain": "x", "text/html": copy.value},
-        {},
-    )
+    expected = ({"text/plain": "x", "text/html": copy.value}, {})
+    assert with_thumbnail({"text/plain": "x"}, copy) == expected
