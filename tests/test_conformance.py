@@ -280,7 +280,7 @@ def test_wrong_arguments_raise_an_error_of_the_package(package, tmp_path, monkey
     assert {call: found for call, found in faults.items() if found and call not in ACCEPTED} == {}
 
 
-SAMPLES = 300
+SAMPLES = 150
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -8,11 +8,14 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", "scipy.spatial")
 IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
+@pytest.mark.front_end
 def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path):
     options = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w"]
     pip = [sys.executable, *options, str(tmp_path), str(ROOT)]

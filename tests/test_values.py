@@ -168,6 +168,7 @@ def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied):
         assert np.ptp(steps[0], axis=0).max() > 0.5
 
 
+@pytest.mark.front_end
 def test_values_come_back_from_another_process():
     robot, control = values()["Robot"], controller()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:

@@ -30,6 +30,7 @@ def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollou
     return fb.rollout(fb.Simulation(walk.robot, **options), walk, duration, pushes, PERIOD)
 
 
+@pytest.mark.front_end
 def test_a_hand_draws_a_circle_in_the_world_while_its_robot_trots_and_is_pushed():
     robot = judges.load("anymal_kinova")
     hand = robot.standing().point(HAND)

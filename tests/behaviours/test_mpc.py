@@ -285,6 +285,7 @@ def test_the_force_task_follows_the_gains():
         MPC(robot, contacts, gait, gains=3.0)
 
 
+@pytest.mark.front_end
 def test_a_bound_with_flight_works_with_small_weights_on_pitch():
     offsets = {"FL_foot": 0.0, "FR_foot": 0.0, "RL_foot": 0.5, "RR_foot": 0.5}
     weights = np.array(STATE_WEIGHTS)

@@ -111,6 +111,7 @@ def test_a_trot_withstands_pushes_from_the_side():
     assert trot(200.0)[0].outcome == "completed"
 
 
+@pytest.mark.front_end
 def test_each_foot_is_lifted_in_turn_while_the_robot_stands():
     walk = walk_of("go2", lambda robot: Gait.crawl(robot, swing=0.5, pause=0.5))
     record = run(walk, 5.5)
@@ -121,6 +122,7 @@ def test_each_foot_is_lifted_in_turn_while_the_robot_stands():
     assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
 
 
+@pytest.mark.front_end
 def test_a_ramp_takes_the_jumps_out_of_the_torques():
     jumps = {}
     for ramp in (0.0, 0.1):
@@ -157,6 +159,7 @@ def test_it_turns_on_the_spot_and_goes_sideways():
     assert np.isclose(yaw, 0.5 * (3.0 - 0.25), atol=0.1)
 
 
+@pytest.mark.front_end
 def test_it_keeps_its_speed_on_a_circle():
     """The centre of mass runs on a smaller circle than the feet: it was 5 % slower at 1.5 rad/s."""
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.2, 0.0), yaw_rate=1.5)
@@ -424,6 +427,7 @@ def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
     )
 
 
+@pytest.mark.front_end
 def test_the_load_shifts_before_a_first_step_that_is_far_away():
     # beyond the 5 s that a plan looks ahead
     walk = walk_of("talos", lambda robot: Gait.walk(robot, start=5.5))
@@ -458,6 +462,7 @@ def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing():
     assert record.measured[:, 2::3].max() < walk.robot.weight
 
 
+@pytest.mark.front_end
 def test_the_zmp_does_not_jump_when_a_trot_stops():
     """The planned ZMP jumped at that time, and rounding chose the value before or after it."""
     plans: list[fb.behaviours.StepPlan] = []
@@ -489,6 +494,7 @@ def test_another_gait_takes_over_when_all_feet_stand():
     assert standing[0] == 4 and set(standing) == {3, 4}
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize(("name", "velocity"), [("go2", 0.1), ("solo12", 0.0)])
 def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(name, velocity):
     """The body was shifted for another foot; both robots fell within 0.5 s."""
@@ -516,6 +522,7 @@ def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked()
     assert len(walk.stance) == 2 and walk.gait is trot
 
 
+@pytest.mark.front_end
 def test_it_begins_anew_where_another_controller_had_the_robot():
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.0), (0.3, 0.0))
     standing = walk.robot.standing()
@@ -691,9 +698,11 @@ def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity):
     assert walk.speed_fraction == 1.0
 
 
-def test_a_low_robot_trots_fast_with_short_swings():
-    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=0.2), (0.5, 0.0))
-    assert np.allclose(speed(run(walk, 4.0), 2.2, 3.8), [0.5, 0.0], atol=0.02)
+@pytest.mark.parametrize("swing", [0.2, 0.25])
+def test_a_low_robot_trots_fast(swing):
+    """The posture task moved the centre of mass of solo12 away from its plan, which cost speed."""
+    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=swing), (0.5, 0.0))
+    assert np.allclose(speed(run(walk, 4.0), 1.9, 3.9), [0.5, 0.0], atol=0.02)  # whole periods
 
 
 def hexapod() -> Robot:
@@ -746,6 +755,7 @@ def test_six_feet_walk_as_a_tripod(velocity):
     assert np.allclose(speed(record, 1.39, 2.59), velocity, atol=0.02)
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("velocity", [(0.0, 0.3), (0.5, 0.2)])
 def test_six_feet_walk_slowly_within_the_reach_of_their_legs(velocity):
     """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
@@ -757,9 +767,3 @@ def test_six_feet_walk_slowly_within_the_reach_of_their_legs(velocity):
         walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, velocity, 0.5)
     record = run(walk, 4.2)
     assert record.outcome == "completed" and tilt(record) < 2.0
-
-
-def test_the_posture_task_does_not_slow_a_trot_with_short_legs():
-    """It moved the centre of mass of solo12 away from its plan; the robot walked at 0.38 m/s."""
-    walk = walk_of("solo12", Gait.trot, (0.5, 0.0))
-    assert np.allclose(speed(run(walk, 4.0), 2.0, 3.5), [0.5, 0.0], atol=0.02)

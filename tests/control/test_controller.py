@@ -28,7 +28,7 @@ def cases(name: str, n: int) -> list[State]:
 
 
 @pytest.mark.parametrize(
-    ("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS]
+    ("name", "n"), [(name, 40 if name == "go2" else 20) for name in judges.ROBOTS]
 )
 def test_daqp_finds_the_optimum_that_cvxpy_finds(name, n):
     controller, n_active = judges.controller_of(name), 0

@@ -81,7 +81,7 @@ def test_momentum_and_its_rate_are_mujocos(name):
     momentum along MuJoCo's motion.
     """
     rng = np.random.default_rng(2)
-    for state in judges.states(name, 3):
+    for state in judges.states(name, 1):
         judge, contacts = judges.Mujoco(state.robot).move_to(state), judges.stance(state.robot)
         found = mujocos_momentum(judge, judge.data.qpos.copy(), judge.data.qvel.copy())
         assert judges.relative(objectives.centroidal_momentum(state), found) < 1e-9

@@ -201,7 +201,7 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
     back.
     """
     wrong = []
-    for name in judges.FLOATING:
+    for name in ("go2", "solo8", "talos"):
         robot = judges.load(name)
         standing = robot.standing()
         target = standing.com + ([-0.02, 0.0, 0.0] if name == "solo8" else [0.0, 0.03, 0.0])

@@ -151,7 +151,7 @@ def test_each_residual_measures_its_own_mistake(residuals, fields):
 # infeasible problems ------------------------------------------------------------------------------
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seeds, st.integers(1, 3), st.integers(2, 8))
 def test_conflicting_rows_are_a_smallest_set_as_brute_force_finds_them(seed, n, rows):
     rng = np.random.default_rng(seed)

@@ -282,6 +282,7 @@ def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     )
 
 
+@pytest.mark.front_end
 def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method():
     """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H
     run from 1e-11 to 20.

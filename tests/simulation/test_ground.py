@@ -124,9 +124,9 @@ def test_measured_forces_carry_the_robot_across_the_edge_of_a_step():
         assert np.any(np.abs(oblique) > 0.0)
 
 
-@pytest.mark.parametrize("name", ["talos", "g1"])
-@pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("degrees", [-10.0, 10.0])
+@pytest.mark.parametrize(
+    ("name", "axis", "degrees"), [("talos", 0, 10.0), ("talos", 1, -10.0), ("g1", 0, -10.0)]
+)
 def test_a_biped_starts_upright_on_a_slope_and_stands(name, axis, degrees):
     robot, normal = judges.load(name), slope(degrees, axis)
     sim = fb.Simulation(robot, Ground(normal=normal, offset=0.1))

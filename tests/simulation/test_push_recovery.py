@@ -136,13 +136,6 @@ def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
 
 
 def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
-    robot = standing.robot
-
-    def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
-        raise InfeasibleError("no torque")
-
-    vars(fails)["robot"] = robot
-    short = {"directions": 3, "workers": 1}
     for make, options, error, *named in (
         (standing, {"directions": 2}, InputError, "directions", 2, 3),
         (standing, {"resolution": 0.0}, InputError, "resolution", 0),
@@ -150,9 +143,23 @@ def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
         (3, {}, InputError, "push_recovery", 3),
         (lambda: 3, {}, InputError, 3),
         (judges.limp, {}, InputError, "push_recovery", "limp", "q"),
-        (lambda: fails, short, SimulationError, "no torque"),
-        (lambda: (fb.Simulation(robot), judges.limp), short, SimulationError, 0),
         (lambda: (fb.Simulation(fb.load("ur5")), judges.limp), {}, InputError, "ur5"),
     ):
         with raises(error, *named):
             fb.push_recovery(make, **QUICK | options)
+
+
+@pytest.mark.front_end
+def test_push_recovery_needs_a_robot_that_stands_without_a_push(standing):
+    robot = standing.robot
+
+    def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
+        raise InfeasibleError("no torque")
+
+    vars(fails)["robot"] = robot
+    for make, reason in (
+        (lambda: fails, "no torque"),
+        (lambda: (fb.Simulation(robot), judges.limp), 0),
+    ):
+        with raises(SimulationError, reason):
+            fb.push_recovery(make, directions=3, workers=1, **QUICK)

@@ -35,17 +35,22 @@ def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
     assert not missing(capsys.readouterr().err, "port", 99999)
 
 
-def test_a_user_defined_urdf_is_shown(tmp_path, capsys):
-    file, solo = tmp_path / "mine.urdf", load("solo12")
-    file.write_text(solo.urdf)
+def test_a_urdf_with_a_wrong_foot_or_path_is_a_message(tmp_path, capsys):
+    file = tmp_path / "mine.urdf"
+    file.write_text(load("solo12").urdf)
     assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
     assert "FL_FOTT" in capsys.readouterr().err
     assert main(["view", str(tmp_path / "none.urdf"), "--no-browser"]) == 2
     assert "none.urdf" in capsys.readouterr().err
+
+
+@pytest.mark.front_end
+def test_a_user_defined_urdf_is_shown(tmp_path):
+    file, solo = tmp_path / "mine.urdf", load("solo12")
+    file.write_text(solo.urdf)
     options = ["--feet", *(foot.frame for foot in solo.feet), "--foot-radius", "0.01"]
     command = [sys.executable, "-m", "floatbase", "view", str(file), "--no-browser", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         assert "mine at http://127.0.0.1" in process.stdout.readline()
         process.terminate()
         assert process.wait(timeout=20) == 0

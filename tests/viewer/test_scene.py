@@ -11,7 +11,7 @@ from unittest.mock import Mock
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from messages import raises, refused
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -295,6 +295,7 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
         return viewer.window.scene.commands()
 
 
+@settings(max_examples=30)
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
 def test_a_scene_shows_the_last_picture_however_paths_are_spelt(pictures):
     assert scene_after(pictures) == scene_after(pictures[-1:])
