@@ -17,32 +17,23 @@ import floatbase
 PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
-LAYERS = (
-    (
-        "conventions",
-        "errors",
-        "_validation",
-        "_assets",
-        "_files",
-        "_geometry",
-        "affine",
-        "linear_algebra",
-    ),
-    ("qp",),
-    ("robots",),
-    ("dynamics",),
-    ("objectives",),
-    ("friction",),
-    ("control",),
-    ("actuators",),
-    ("simulation",),
-    ("behaviours",),
-    ("viewer",),
-    ("playground",),
-    ("lessons",),
-    ("__main__",),
-)
-LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
+LAYERS = """
+    conventions errors _validation _assets _files _geometry affine linear_algebra
+    qp
+    robots
+    dynamics
+    objectives
+    friction
+    control
+    actuators
+    simulation
+    behaviours
+    viewer
+    playground
+    lessons
+    __main__
+"""
+LAYER_OF = {name: layer for layer, line in enumerate(LAYERS.split("\n")) for name in line.split()}
 MAX_LINES = 400  # of a module, without docstrings
 MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
@@ -88,13 +79,12 @@ def layer(path: Path) -> int:
     return LAYER_OF[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
 
+@cache
 def file_of(module: str) -> Path | None:
     """The file of a module of the package."""
     folder = ROOT.joinpath(*module.split("."))
-    return next(
-        (path for path in (folder / "__init__.py", folder.with_suffix(".py")) if path in MODULES),
-        None,
-    )
+    files = (folder / "__init__.py", folder.with_suffix(".py"))
+    return next((path for path in files if path in MODULES), None)
 
 
 @cache
@@ -110,16 +100,21 @@ def parsed(path: Path) -> ast.Module:
 
 
 @cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(parsed(path)))
+
+
+@cache
 def imports(path: Path) -> list[Import]:
     """All imports of the package's modules at run time, also inside functions."""
     blocks = [
         node
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
     ]
     for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
     found = []
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import) and node not in for_types:
             found += [Import(node.lineno, alias.name, None) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node not in for_types:
@@ -151,13 +146,13 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
     return [set(ring) for ring in rings if ring]
 
 
-def test_every_module_has_a_layer() -> None:
+def test_every_module_has_a_layer():
     assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in LAYERED} <= set(
         LAYER_OF
     )
 
 
-def test_modules_import_only_their_own_layer_and_lower_ones() -> None:
+def test_modules_import_only_their_own_layer_and_lower_ones():
     wrong = []
     for path in LAYERED:
         for found in imports(path):
@@ -169,11 +164,11 @@ def test_modules_import_only_their_own_layer_and_lower_ones() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_no_module_of_the_package_is_imported_by_a_string() -> None:
+def test_no_module_of_the_package_is_imported_by_a_string():
     """Except by an `__init__`, which is lazy; lessons are found by the names of their folders."""
     wrong = []
     for path in [path for path in MODULES if path.name != "__init__.py"]:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if not isinstance(node, ast.Call) or not node.args:
                 continue
             called, module = ast.unparse(node.func).rpartition(".")[2], node.args[0]
@@ -184,7 +179,7 @@ def test_no_module_of_the_package_is_imported_by_a_string() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_packages_are_imported_by_their_public_names() -> None:
+def test_packages_are_imported_by_their_public_names():
     """Or by a module with a leading underscore; a package whose `__all__` is empty has modules for
     the packages above it. A package's own modules may import one another.
     """
@@ -217,7 +212,7 @@ def top_folder(path: Path) -> Path:
     return PACKAGE / path.relative_to(PACKAGE).parts[0]
 
 
-def test_only_robot_state_and_standing_import_one_another() -> None:
+def test_only_robot_state_and_standing_import_one_another():
     names = {path: path.relative_to(PACKAGE).as_posix() for path in LAYERED}
     graph = {
         names[path]: {
@@ -239,7 +234,7 @@ def docstring_lines(tree: ast.Module) -> int:
     return sum(1 + (string.end_lineno or 0) - string.lineno for string in strings)
 
 
-def test_modules_are_short_documented_and_finished() -> None:
+def test_modules_are_short_documented_and_finished():
     wrong = []
     for path in MODULES:
         source = path.read_text(encoding="utf-8")
@@ -256,7 +251,7 @@ def test_modules_are_short_documented_and_finished() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_lines_of_javascript_are_at_most_100_characters_long() -> None:
+def test_lines_of_javascript_are_at_most_100_characters_long():
     """Ruff checks those of Python."""
     wrong = [
         f"{relative(path)}:{number} has {len(line)} characters"
@@ -268,7 +263,7 @@ def test_lines_of_javascript_are_at_most_100_characters_long() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_every_public_name_resolves_and_has_a_docstring() -> None:
+def test_every_public_name_resolves_and_has_a_docstring():
     wrong = []
     for package in ["floatbase", *PACKAGES]:
         module = import_module(package)
@@ -281,17 +276,17 @@ def test_every_public_name_resolves_and_has_a_docstring() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_floatbase_has_at_most_32_names_and_lists_them() -> None:
+def test_floatbase_has_at_most_32_names_and_lists_them():
     assert len(set(floatbase.__all__)) == len(floatbase.__all__) <= 32
     assert set(floatbase.__all__) <= set(dir(floatbase))
     with raises(AttributeError, "Robit"):
         _ = floatbase.Robit
 
 
-def test_tests_use_public_names() -> None:
+def test_tests_use_public_names():
     wrong = []
     for path in TESTS:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if (
                 isinstance(node, ast.Attribute)
                 and is_private(node.attr)
@@ -387,12 +382,12 @@ def sets_in_order(tree: ast.Module, returning: set[str]) -> list[ast.expr]:
     return found
 
 
-def test_nothing_depends_on_the_order_of_a_set() -> None:
+def test_nothing_depends_on_the_order_of_a_set():
     """The order of a set of names changes with Python's hash seed, and with it the rounding."""
     returning = {
         f"{node.name}()"
         for path in MODULES
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.FunctionDef) and is_set_type(node.returns)
     }
     wrong = {
@@ -403,7 +398,7 @@ def test_nothing_depends_on_the_order_of_a_set() -> None:
     assert not wrong, "\n".join(sorted(wrong))
 
 
-def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed() -> None:
+def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed():
     wrong = [
         "for foot in set(a) - set(b): pass",
         "for foot in {'FL', 'FR'}: pass",
