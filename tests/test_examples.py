@@ -74,6 +74,17 @@ def test_wbc_stands_like_the_library(wbc):
     assert robot.feet[0].radius == wbc.RADIUS
 
 
+def test_wbc_reads_states_of_mujoco_in_the_convention_of_pinocchio(wbc):
+    robot = judges.load("go2")
+    rng = np.random.default_rng(0)
+    q = pin.integrate(robot.model, wbc.Q_GOAL, rng.uniform(-1.0, 1.0, robot.nv))
+    state = fb.State(robot, q, rng.uniform(-1.0, 1.0, robot.nv))
+    sim = fb.Simulation(robot)
+    sim.reset(state)
+    q, v = wbc.read_state(sim.data)
+    assert np.allclose(q, state.q, atol=1e-12) and np.allclose(v, state.v, atol=1e-12)
+
+
 def test_wbc_imports_only_the_libraries_that_it_names():
     tree = ast.parse(WBC.read_text(encoding="utf-8"))
     imported = {
