@@ -56,6 +56,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 USERS = [
     *TESTS,
     *sorted((ROOT / "benchmarks").rglob("*.py")),
+    *sorted((ROOT / "examples").rglob("*.py")),
     *sorted((ROOT / "notebooks").glob("*.ipynb")),
 ]
 PACKAGES = [

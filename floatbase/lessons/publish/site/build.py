@@ -40,6 +40,7 @@ RUN_FOLDER = _ROOT / "build" / "site-run"  # lessons that were run
 _MOVED = {
     "../notebooks/": "lessons/",
     "../benchmarks/": "benchmarks/",
+    "../examples/": "examples/",
     "../CHANGELOG.md": "changelog.md",
 }
 _NO_LIVE = "This build has no live robots, because npm could not install MuJoCo for JavaScript."
@@ -65,6 +66,7 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         source, built = Path(place) / "source", Path(place) / "site"
         pictures = Pictures(built / "_static")
         shutil.copytree(DOCS, source)
+        shutil.copytree(_ROOT / "examples", source / "examples")
         (source / "benchmarks").mkdir()
         _write_lessons(
             source,
