@@ -221,7 +221,7 @@ def test_what_a_value_returns_cannot_be_written_to() -> None:
         "point": state.point("base"),
         "positions": contacts.positions(state), "jacobian": contacts.jacobian(state),
         "A": contacts.constraint(state)[0],
-        "torques": wrenches.moment_vertices(), "support_region": wrenches.support_region(),
+        "support_region": wrenches.support_region(),
         "solution block": command.solution["tau"],
         "slip": record().slip(), "final q": record().final.q,
         "command force": command.force("FL_foot"),

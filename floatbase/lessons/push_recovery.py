@@ -24,7 +24,6 @@ from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.simulation import PushRecovery, Simulation, push_recovery
-from floatbase.viewer import Picture
 from floatbase.viewer.plots import push_recovery_plots
 
 _FILE = Path(__file__).with_name("push_recovery.json")
@@ -83,27 +82,6 @@ def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
     """
     return push_recovery_plots.plot(
         measured_push_recovery(lesson), axis, theory=False, previous=_former_push_recovery(lesson)
-    )
-
-
-def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """Draw the map of `plot_push_recovery` on the ground below the robot.
-
-    Parameters
-    ----------
-    lesson : str
-        Name of the lesson, such as "05".
-    scale : float, optional
-        Length of a push in the picture [m/N]. By default, the widest map is 1.5 times as wide as
-        the stance.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-    """
-    return push_recovery_plots.picture(
-        measured_push_recovery(lesson), scale, theory=False, previous=_former_push_recovery(lesson)
     )
 
 

@@ -288,63 +288,6 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
         )
 
 
-# the slice at the centre of mass
-
-
-@pytest.mark.parametrize("limit", [None, 90.0])
-@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2)])
-def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(
-    name: str, feet: int, limit: float | None
-) -> None:
-    state, contacts = stance(name, feet, 0.4)
-    limit = None if limit is None else limit / 150.0 * state.robot.weight
-    wrenches = wrench_set(state, contacts, max_normal_force=limit)
-    corners = wrenches.moment_vertices()
-    carried = np.array([0.0, 0.0, state.robot.weight])
-    assert len(corners) >= 4
-    assert all(
-        wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners
-    )
-    hull = ConvexHull(corners)
-    assert len(hull.vertices) == len(corners)
-    rng, centre = np.random.default_rng(0), corners.mean(axis=0)
-    for corner in corners[rng.integers(len(corners), size=8)]:
-        for stretch, held in ((0.99, True), (1.01, False)):
-            torque = centre + stretch * (corner - centre)
-            assert wrenches.contains(np.concatenate([carried, torque])) is held
-    for *normal, offset in rng.permutation(hull.equations)[:30]:
-        best = linprog(
-            -(np.array(normal) @ wrenches.rays[3:]),
-            *wrenches_limits(wrenches),
-            wrenches.rays[:3],
-            carried,
-            (0, None),
-        )
-        assert -best.fun == pytest.approx(-offset, abs=1e-6 * state.robot.weight)
-
-
-def wrenches_limits(wrenches: WrenchSet) -> tuple[Array | None, Array | None]:
-    if np.all(np.isinf(wrenches.max_normal_force)):
-        return None, None
-    return np.kron(np.eye(len(wrenches.points)), np.ones(4)), wrenches.max_normal_force
-
-
-def test_slices_of_stances_without_area_are_flat() -> None:
-    state, contacts = stance("go2", 1)
-    f = wrench_set(state, contacts).cones[0].rays[0] * 40.0
-    one = wrench_set(state, contacts).moment_vertices(f)
-    assert np.allclose(one, [np.cross(contacts.positions(state)[0] - state.com, f)])
-    state, contacts = stance("go2", 2)
-    two = wrench_set(state, contacts).moment_vertices()
-    assert np.linalg.matrix_rank(two - two[0], tol=1e-7) == 2
-
-
-def test_a_force_that_pulls_has_no_torques() -> None:
-    state, contacts = stance("go2", 4)
-    assert wrench_set(state, contacts).moment_vertices([0.0, 0.0, -1.0]).shape == (0, 3)
-    assert np.allclose(wrench_set(state, contacts).moment_vertices(np.zeros(3)), np.zeros((1, 3)))
-
-
 # where a robot can stand
 
 
@@ -462,12 +405,10 @@ def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
         0.5,
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
-    refused(chimney.moment_vertices, InputError, "max_normal_force")
     refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
     assert len(limited.support_region()) >= 3
-    assert len(limited.moment_vertices()) >= 4
 
 
 def test_a_grip_from_all_sides_makes_every_wrench() -> None:
@@ -544,7 +485,6 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
         (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
         (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
-        (lambda: wrench_set(state, contacts).moment_vertices([1.0]), "force", 1, 3),
         (
             lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
             "cones",

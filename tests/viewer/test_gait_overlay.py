@@ -1,15 +1,11 @@
-"""Gait overlay, the camera that follows a walk, and the gait diagram."""
+"""Gait overlay, and the camera that follows a walk."""
 
 from __future__ import annotations
 
 import dataclasses
-import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from browsers import SCREENSHOTS
-from matplotlib.colors import to_hex
 from messages import refused
 
 import floatbase as fb
@@ -18,9 +14,8 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.robots import Robot, State
 from floatbase.simulation import Rollout, Simulation
-from floatbase.viewer import Item, Viewer, plots
+from floatbase.viewer import Item, Viewer
 from floatbase.viewer.export import recording
-from floatbase.viewer.plots.run_plots import MIN_LOAD
 from floatbase.viewer.scene.colours import COM, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
 
 ROUNDED = 1e-9  # m: the same place, computed in another order
@@ -224,20 +219,10 @@ def test_invalid_overlays_are_refused_by_name(viewer: Viewer, walked: tuple[Roll
     )
     refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
     refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout")
-    refused(lambda: plots.plot_normal_forces(run, [plt.gca()]), InputError, "axes", 1, 4)
-    refused(lambda: plots.plot_gait(arm()), InputError, "contacts")
-    plt.close("all")
 
 
 def renamed(step: StepPlan) -> StepPlan:
     return dataclasses.replace(step, footholds={"paw": np.zeros(3)})
-
-
-def arm() -> Rollout:
-    from floatbase.lessons import ConstantTorques
-
-    robot = fb.load("ur5")
-    return fb.rollout(Simulation(robot), ConstantTorques(np.zeros(6)), 0.01)
 
 
 def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
@@ -295,40 +280,3 @@ def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, stand
     np.testing.assert_allclose(
         lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3
     )  # the same lines
-
-
-def test_a_gait_diagram_shows_stances_and_measured_contacts(
-    walked: tuple[Rollout, Walk],
-) -> None:
-    run, _ = walked
-    axis = plots.plot_gait(run)
-    names = [label.get_text() for label in axis.get_yticklabels()]
-    assert names == list(run.contacts.names)
-    for i, (name, bars) in enumerate(zip(names, axis.collections, strict=False)):
-        spans = np.array([path.get_extents().intervalx for path in bars.get_paths()])
-        t = (run.time[:-1] + run.time[1:]) / 2.0
-        barred = ((t[:, None] > spans[:, 0]) & (t[:, None] < spans[:, 1])).any(axis=1)
-        stands = [name in run.contacts_at(row).names for row in range(len(t))]
-        np.testing.assert_array_equal(barred, stands)
-        loaded = np.isfinite(np.asarray(axis.lines[i].get_ydata(), dtype=float))
-        np.testing.assert_array_equal(loaded, run.force(name)[:, 2] > MIN_LOAD * run.robot.weight)
-        assert 0.02 < np.mean(~loaded) < 0.8  # it was in the air, and stood
-    assert {to_hex(line.get_color()).upper() for line in axis.lines} == {hex_code(MEASURED)}
-    assert "push" in [text.get_text() for text in axis.get_legend().get_texts()]
-    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
-    axis.figure.savefig(SCREENSHOTS / "plot_gait.png")
-    plt.close("all")
-
-
-def test_normal_forces_are_plotted_for_each_foot(biped: tuple[Rollout, Walk]) -> None:
-    run, _ = biped
-    _, grid = plt.subplots(3, 1, sharex=True)
-    plots.plot_gait(run, grid[0])
-    axes = plots.plot_normal_forces(run, grid[1:])
-    for axis, name in zip(axes, run.contacts.names, strict=True):
-        assert re.match(name, axis.get_ylabel())
-        planned, measured, _ = (np.asarray(line.get_ydata(), dtype=float) for line in axis.lines)
-        np.testing.assert_allclose(planned, run.force(name, "planned")[:, 2])
-        np.testing.assert_allclose(measured, run.force(name)[:, 2])
-    assert axes[1].get_legend() is None and axes[0].get_legend() is not None
-    plt.close("all")

@@ -290,35 +290,6 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
     return axis
 
 
-def plot_lean(record: Rollout) -> Axes:
-    """Plot x_c and the centre of pressure along x between the edges of the soles."""
-    figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    edges = record.foot_positions[..., 0]
-    axis.fill_between(
-        record.time,
-        edges.min(axis=1),
-        edges.max(axis=1),
-        color=hex_code(GREYS[2]),
-        alpha=0.3,
-        linewidth=0,
-        label="soles",
-    )
-    axis.plot(
-        record.time,
-        centre_of_pressure_path(record)[:, 0],
-        color=hex_code(GREYS[1]),
-        linewidth=1.5,
-        label="centre of pressure",
-    )
-    axis.plot(
-        record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c"
-    )
-    axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
-    axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
-    plt.close(figure)
-    return axis
-
-
 def _to_pixels(places: Array) -> Array:
     return svg.from_above(places, (WIDE / 2, HIGH / 2), WIDE / 0.44)
 

@@ -133,37 +133,6 @@ def plot_horizontal_force_limits(
     )
 
 
-def horizontal_force_limits(
-    wrenches: WrenchSet, scale: float | None = None, n: int = 72
-) -> Picture:
-    """Draw `plot_horizontal_force_limits` on level ground below the centre of mass, with rings.
-
-    Parameters
-    ----------
-    wrenches : WrenchSet
-        Wrenches of the stance, as from `floatbase.friction.wrench_set`.
-    scale : float, optional
-        Length of a drawn force [m/N]. By default, the curve is 1.5 times as wide as the stance.
-    n : int, optional
-        Number of directions.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-
-    Raises
-    ------
-    InputError
-        If a force is unbounded.
-    InfeasibleError
-        If the stance cannot carry the weight.
-    """
-    return _picture(
-        *_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale
-    )
-
-
 def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
     """Plot curves over directions [rad] on polar axes."""
     if axis is None:
