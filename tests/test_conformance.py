@@ -251,6 +251,7 @@ LEFT_OUT = {
     "draws what it is given": (
         "hex_code", "robot_meshes", "appearance_digest",
     ),
+    "Walk calls it in each control step, and has checked": ("Walk.select_gait", "MPC.select_gait"),
     "Contacts and rollout call them, and have checked": (
         "ConstantTorques.__call__", "TorqueCommand", *(f"{kind}.{method}"
             for kind in ("PointContact", "FlatFootContact", "RollingWheel", "LinearConstraint")

@@ -179,7 +179,7 @@ class MPC(Walk):
         self._flight = self._first_flight()
         if self._flight is not None:
             times = plan.time + _PATH_STEP * np.arange(_PATH_STEPS + 1)
-            points = [plan.path.moved(self._desired, time).position for time in times]
+            points = [plan.path.moved(self._progress.desired, time).position for time in times]
             segments = list(zip(times[:-1], times[1:], points[:-1], points[1:], strict=True))
             plan = replace(plan, plan=LIPM(segments, state.com[:2], self.omega))
         return super()._modified(plan, state)
@@ -189,7 +189,7 @@ class MPC(Walk):
 
         None if a foot always stands. All flights are assumed to be like the first one.
         """
-        gait = replace(self._clock.gait, stop=None)
+        gait = replace(self._progress.clock.gait, stop=None)
         if len(gait.feet) < len(self._all_contacts) or flight_offset(gait) is None:
             return None
         phases = gait.phases(gait.start, _GAIT_PHASES, gait.period)
@@ -235,7 +235,7 @@ class MPC(Walk):
         reference, pose, now = np.zeros((self._n, 12)), self._leaning_pose, active.path
         for k, row in enumerate(reference):
             time = t + (k + 1) * self._dt
-            path = now.moved(self._desired, time)
+            path = now.moved(self._progress.desired, time)
             row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
             row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
             rise, speed = self._bounce(time)
@@ -251,7 +251,7 @@ class MPC(Walk):
         last one, the reference is level.
         """
         flight, gravity = self._flight, self.robot.gravity
-        if flight is None or self._clock.gait.stop is not None:
+        if flight is None or self._progress.clock.gait.stop is not None:
             return 0.0, 0.0
         begin, T, interval = flight
         stance = interval - T
@@ -271,7 +271,8 @@ class MPC(Walk):
         A foot stands in an interval if it stands in its middle, or in the first one, if it stands
         now.
         """
-        gait, names, swings = self._clock.gait, self._all_contacts.names, active.swings
+        gait, names = self._progress.clock.gait, self._all_contacts.names
+        swings = active.swings
         points, stance = np.zeros((self._n, len(names), 3)), np.zeros((self._n, len(names)), bool)
         for i, foot in enumerate(names):
             offset = self._contact_offsets[foot]

@@ -107,6 +107,7 @@ class WalkOptions:
     @staticmethod
     def checked(
         contacts: Contacts,
+        *,
         clearance: float,
         reach: float | None,
         ramp: float,
@@ -136,19 +137,21 @@ class WalkOptions:
         if not isinstance(tasks, list | tuple):
             raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
         example = "swing(start, end, lift_off, touchdown, clearance)"
+        if gains is None:
+            gains = Gains.for_contacts(contacts)
         return WalkOptions(
-            as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
-            as_positive("reach", reach, "m", maximum=1.0),
-            as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
-            as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
-            adjustment,
-            modify_plan,
-            Swing if swing is None else as_callable("swing", swing, example),
-            as_terrain("ground", ground),
-            tuple(tasks),
-            np.array([forwards, forwards, turning]),
-            Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains),
-            controller,
+            clearance=as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
+            reach=as_positive("reach", reach, "m", maximum=1.0),
+            ramp=as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
+            foothold=as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
+            adjustment=adjustment,
+            modify_plan=modify_plan,
+            swing=Swing if swing is None else as_callable("swing", swing, example),
+            ground=as_terrain("ground", ground),
+            tasks=tuple(tasks),
+            acceleration=np.array([forwards, forwards, turning]),
+            gains=as_instance("gains", gains, Gains),
+            controller=controller,
         )
 
 
