@@ -12,8 +12,6 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array, as_array, as_instance, as_integer, as_positive
-from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, flight_offset
 from floatbase.behaviours.horizon import (
     COM,
     OMEGA,
@@ -23,12 +21,14 @@ from floatbase.behaviours.horizon import (
     HorizonMotion,
     HorizonQP,
 )
-from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import Gains, flat_foot_names
-from floatbase.behaviours.plan import StepPlan
-from floatbase.behaviours.swing import SwingPath
-from floatbase.behaviours.targets import com_target
-from floatbase.behaviours.walk import Entries, Walk
+from floatbase.behaviours.walk.active_plan import ActivePlan
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE, Gait, flight_offset
+from floatbase.behaviours.walk.lipm import LIPM
+from floatbase.behaviours.walk.options import Gains, flat_foot_names
+from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.swing import SwingPath
+from floatbase.behaviours.walk.targets import com_target
+from floatbase.behaviours.walk.walk import Entries, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron

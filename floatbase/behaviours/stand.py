@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array, as_instance, as_number, as_positive
-from floatbase.behaviours.footholds import capture_point, support_margin
-from floatbase.behaviours.gait import Gait, check_always_supported
-from floatbase.behaviours.walk import Walk
+from floatbase.behaviours.walk.footholds import capture_point, support_margin
+from floatbase.behaviours.walk.gait import Gait, check_always_supported
+from floatbase.behaviours.walk.walk import Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from math import cos, inf, sin
 from typing import Any, TypeAlias
@@ -20,24 +20,27 @@ import pinocchio as pin
 
 from floatbase._validation import (
     Array,
-    as_array,
     as_instance,
     as_number,
     refuse_new_attributes,
 )
-from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
-from floatbase.behaviours.gait_clock import GaitClock
-from floatbase.behaviours.lipm import CoMPlan
-from floatbase.behaviours.options import (
+from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.walk.active_plan import ActivePlan
+from floatbase.behaviours.walk.footholds import raibert_foothold
+from floatbase.behaviours.walk.gait import Gait
+from floatbase.behaviours.walk.gait_limits import check_friction, slow_message, speed_fractions
+from floatbase.behaviours.walk.lipm import CoMPlan
+from floatbase.behaviours.walk.options import (
     Gains,
     WalkOptions,
+    as_gait,
     as_vector,
-    check_gait_feet,
+    as_velocity,
+    as_yaw_rate,
     check_options,
 )
-from floatbase.behaviours.path import DesiredMotion, Path
-from floatbase.behaviours.plan import (
+from floatbase.behaviours.walk.path import DesiredMotion, Path
+from floatbase.behaviours.walk.plan import (
     StepPlan,
     first_footing,
     first_path,
@@ -45,14 +48,11 @@ from floatbase.behaviours.plan import (
     next_footing,
     weight_shift,
 )
-from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.raibert import raibert_foothold
-from floatbase.behaviours.speed import slow_message, speed_fractions
-from floatbase.behaviours.stance_controllers import StanceControllers
-from floatbase.behaviours.sway import check_friction
-from floatbase.behaviours.swing import SwingPath
-from floatbase.behaviours.targets import Adjustment, BodyPose
-from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.walk.posture import WalkingPosture
+from floatbase.behaviours.walk.progress import GaitClock, Progress
+from floatbase.behaviours.walk.stance_controllers import StanceControllers
+from floatbase.behaviours.walk.swing import SwingPath
+from floatbase.behaviours.walk.targets import Adjustment, BodyPose
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
@@ -62,26 +62,6 @@ from floatbase.robots import Robot, State
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
-_RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
-_MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
-_MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
-_HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
-
-
-@dataclass(eq=False)
-class _Progress:
-    """What a walk remembers from one control step to the next, until it starts again."""
-
-    time: float = -inf  # of the last control step [s]
-    start_time: float = -inf
-    next_change: float = -inf
-    lean: float = 0.0  # of the body with the slope of a known ground [rad]
-    active: ActivePlan | None = None
-    planning_path: Path | None = None  # while a plan is being made
-    history: deque[StepPlan] = field(default_factory=lambda: deque(maxlen=_HISTORY_LENGTH))
-    # set by the first control step
-    clock: GaitClock = field(init=False)
-    desired: DesiredMotion = field(init=False)
 
 
 class Walk:
@@ -222,10 +202,10 @@ class Walk:
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
-        self._gait = self._checked_gait(gait)
-        self._velocity = _checked_velocity(velocity)
-        self._yaw_rate = _checked_yaw_rate(yaw_rate)
-        self._pose = _checked_pose(height, pitch)
+        self._gait = as_gait(gait, self._all_contacts, self.may_fly)
+        self._velocity = as_velocity(velocity)
+        self._yaw_rate = as_yaw_rate(yaw_rate)
+        self._pose = BodyPose.checked(height, pitch)
         check_options(type(self).__name__, options)
         self._options = WalkOptions.checked(
             self._all_contacts,
@@ -273,7 +253,7 @@ class Walk:
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
-        self._checked_gait(gait)
+        as_gait(gait, self._all_contacts, self.may_fly)
         self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
@@ -285,7 +265,7 @@ class Walk:
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        self._velocity = _checked_velocity(velocity)
+        self._velocity = as_velocity(velocity)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -295,7 +275,7 @@ class Walk:
 
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
-        self._yaw_rate = _checked_yaw_rate(yaw_rate)
+        self._yaw_rate = as_yaw_rate(yaw_rate)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -305,7 +285,7 @@ class Walk:
 
     @height.setter
     def height(self, height: float) -> None:
-        self._pose = _checked_pose(height, self._pose.pitch)
+        self._pose = BodyPose.checked(height, self._pose.pitch)
         self._refresh()
 
     @property
@@ -315,7 +295,7 @@ class Walk:
 
     @pitch.setter
     def pitch(self, pitch: float) -> None:
-        self._pose = _checked_pose(self._pose.height, pitch)
+        self._pose = BodyPose.checked(self._pose.height, pitch)
         self._refresh()
 
     @property
@@ -428,13 +408,14 @@ class Walk:
             Joint torques of the present stance's controller, with the planned accelerations and
             contact forces.
         """
-        robot, t = self._robot, as_number("t", t, "s")
+        robot = self._robot
+        t = as_number("t", t, "s")
         q, v = as_vector("q", q, robot.nq), as_vector("v", v, robot.nv)
-        if self._progress.active is None or not self._continues(t):
+        if self._progress.continues(t):
+            self.select_gait(q, v, t)
+        else:
             self.restart()
             self._forget_plan()
-        else:
-            self.select_gait(q, v, t)
         progress = self._progress
         if (
             progress.active is None
@@ -475,11 +456,6 @@ class Walk:
             The time [s].
         """
 
-    def _continues(self, t: float) -> bool:
-        """Return whether a time [s] follows the last control step, so that the walk continues."""
-        start, last = self._progress.start_time, self._progress.time
-        return t > start and last - TIME_TOLERANCE <= t <= last + _RESTART_GAP
-
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
@@ -491,14 +467,7 @@ class Walk:
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._progress = _Progress()
-
-    def _checked_gait(self, gait: Gait) -> Gait:
-        """Return a gait after checking that it suits the contacts."""
-        check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
-        if len(gait.feet) == len(self._all_contacts) and not self.may_fly:
-            check_always_supported(gait)
-        return gait
+        self._progress = Progress()
 
     def _prepare(self, gait: Gait) -> None:
         """Check the friction that a gait needs, and make the controllers of its stances."""
@@ -633,23 +602,3 @@ class Walk:
             f"{type(self).__name__}({self.robot.name}, {len(self.gait.feet)} feet, "
             f"{forwards:g} and {left:g} m/s)"
         )
-
-
-def _checked_velocity(velocity: npt.ArrayLike) -> Array:
-    """Return a desired velocity, (2,), checked."""
-    velocity = as_array("velocity", velocity, (2,), "m/s")
-    as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
-    return velocity
-
-
-def _checked_yaw_rate(yaw_rate: float) -> float:
-    """Return a desired yaw rate, checked."""
-    return as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
-
-
-def _checked_pose(height: float, pitch: float) -> BodyPose:
-    """Return the pose with a change of height [m] and a pitch [rad], checked."""
-    return BodyPose(
-        as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE),
-        as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH),
-    )

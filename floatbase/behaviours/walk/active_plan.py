@@ -11,12 +11,12 @@ from typing import Any, cast
 import numpy as np
 
 from floatbase._validation import Array, as_array
-from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.path import DesiredMotion, Path
-from floatbase.behaviours.plan import StepPlan
-from floatbase.behaviours.posture import MIN_SIDE_FRACTION, WalkingPosture
-from floatbase.behaviours.swing import Swing, SwingPath
-from floatbase.behaviours.targets import (
+from floatbase.behaviours.walk.lipm import LIPM
+from floatbase.behaviours.walk.path import DesiredMotion, Path
+from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION, WalkingPosture
+from floatbase.behaviours.walk.swing import Swing, SwingPath
+from floatbase.behaviours.walk.targets import (
     Adjustment,
     BodyPose,
     adjusted_ends,
@@ -206,7 +206,7 @@ class ActivePlan:
 
 def _compiled_module() -> ModuleType:
     """Return the module of the compiled function, which loads numba."""
-    from floatbase.behaviours import compiled_targets
+    from floatbase.behaviours.walk import compiled_targets
 
     return compiled_targets
 

@@ -7,9 +7,9 @@ from math import copysign, hypot, sqrt
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.behaviours.options import flat_foot_names
-from floatbase.behaviours.path import rotated_by_yaw
 from floatbase.behaviours.terrain import Plane
+from floatbase.behaviours.walk.options import flat_foot_names
+from floatbase.behaviours.walk.path import rotated_by_yaw
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
