@@ -148,7 +148,9 @@ class MPC(Walk):
 
     def _clear(self) -> None:
         super()._clear()
-        robot, posture, limits = self.robot, self._posture, self._controllers.limits
+        robot = self.robot
+        posture = self._posture
+        limits = self._controllers.limits
         data = robot.model.createData()
         pin.ccrba(robot.model, data, posture.state.q, np.zeros(robot.nv))
         mu = min(
@@ -232,7 +234,9 @@ class MPC(Walk):
 
     def _reference(self, t: float, active: ActivePlan) -> Array:
         """Return the desired state at the end of each interval, shape (n, 12)."""
-        reference, pose, now = np.zeros((self._n, 12)), self._leaning_pose, active.path
+        reference = np.zeros((self._n, 12))
+        pose = self._leaning_pose
+        now = active.path
         for k, row in enumerate(reference):
             time = t + (k + 1) * self._dt
             path = now.moved(self._progress.desired, time)

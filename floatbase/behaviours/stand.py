@@ -74,10 +74,8 @@ class Stand(Walk):
         self._standing_gait = replace(
             as_instance("stepping_gait", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0
         )
-        self.stepping_gait, self.margin = (
-            stepping_gait,
-            as_positive("margin", margin, "m", allow_zero=True, maximum=1.0),
-        )
+        self.stepping_gait = stepping_gait
+        self.margin = as_positive("margin", margin, "m", allow_zero=True, maximum=1.0)
         if {"velocity", "yaw_rate", "gait"} & set(options):
             raise InputError(
                 "Stand has no options velocity, yaw_rate and gait, because it stays in place. Use "

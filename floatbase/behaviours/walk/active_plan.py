@@ -46,8 +46,13 @@ class ActivePlan:
         adjustment: Adjustment | None = None,
         compiled: bool = True,
     ):
-        self.plan, self._posture, self._desired, self._pose = plan, posture, desired, pose
-        self._reach, self._entries, self._adjustment = reach, entries, adjustment
+        self.plan = plan
+        self._posture = posture
+        self._desired = desired
+        self._pose = pose
+        self._reach = reach
+        self._entries = entries
+        self._adjustment = adjustment
         self._path, self._swings = plan.path, plan.swings
         usual = (
             adjustment is None
@@ -159,7 +164,10 @@ class ActivePlan:
 
     def _pack_body(self, numbers: Any) -> Array:
         """Return the array `body` of `compiled_targets`."""
-        posture, plan, path, desired = self._posture, self.plan, self._path, self._desired
+        posture = self._posture
+        plan = self.plan
+        path = self._path
+        desired = self._desired
         body = np.zeros(numbers.BODY_SIZE)
         for first, values in (
             (numbers.TIME, (path.time, *path.position, path.yaw, *path.velocity)),

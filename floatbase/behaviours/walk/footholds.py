@@ -50,10 +50,8 @@ def neutral_point(
     >>> neutral_point([0.2, 0.1], [0.4, 0.0], 0.5)
     array([0.3, 0.1])
     """
-    nominal_foothold, velocity = (
-        as_array("nominal_foothold", nominal_foothold, (2,), "m"),
-        as_array("velocity", velocity, (2,), "m/s"),
-    )
+    nominal_foothold = as_array("nominal_foothold", nominal_foothold, (2,), "m")
+    velocity = as_array("velocity", velocity, (2,), "m/s")
     return read_only(
         nominal_foothold
         + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0

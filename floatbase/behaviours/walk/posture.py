@@ -22,7 +22,9 @@ class WalkingPosture:
     """Feet and centre of mass of a robot in its standing posture."""
 
     def __init__(self, contacts: Contacts, state: State):
-        self.contacts, self.state, self.flat_feet = contacts, state, flat_foot_names(contacts)
+        self.contacts = contacts
+        self.state = state
+        self.flat_feet = flat_foot_names(contacts)
         self._centre_offsets = {name: self._centre_offset(name) for name in contacts.names}
         positions = {name: state.point(name) for name in contacts.names}
         centre = np.mean(

@@ -28,7 +28,9 @@ class StanceControllers:
     def __init__(
         self, posture: WalkingPosture, options: WalkOptions, force_weight: float | None = None
     ):
-        self._posture, self._options, self.plan = posture, options, None
+        self._posture = posture
+        self._options = options
+        self.plan = None
         self._force_weight = force_weight
         self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         robot, contacts = posture.state.robot, posture.contacts

@@ -37,9 +37,8 @@ N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 
 # then 1 or 0: all contacts are points, `Inequalities.has_optional`, there are joint limits
 POINTS_ONLY, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
 Indices: TypeAlias = npt.NDArray[np.int64]
-PolyhedronOptions: TypeAlias = tuple[
-    int, bool, float
-]  # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
+# facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
+PolyhedronOptions: TypeAlias = tuple[int, bool, float]
 
 
 class Dynamics:
@@ -48,7 +47,9 @@ class Dynamics:
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
 
     def __init__(self, robot: Robot):
-        self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
+        self.robot = robot
+        self.data = robot.model.createData()
+        self.lock = Lock()
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(
