@@ -18,12 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import (
-    Array,
-    as_instance,
-    as_number,
-    refuse_new_attributes,
-)
+from floatbase._validation import Array, as_instance, as_number, refuse_new_attributes
 from floatbase.behaviours.terrain import Terrain
 from floatbase.behaviours.walk.active_plan import ActivePlan
 from floatbase.behaviours.walk.footholds import raibert_foothold
