@@ -487,7 +487,8 @@ class WholeBodyController:
         self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
     ) -> Command | None:
         """Return the command of this controller alone, or None if there is no solution."""
-        tick, q_array, v_array = self._compiled, numeric_copy(q), numeric_copy(v)
+        tick = self._compiled
+        q_array, v_array = numeric_copy(q), numeric_copy(v)
         if tick is None or q_array is None or v_array is None:
             return self._reference_attempt(q, v, t, targets)
         answer = tick(q_array, v_array, t, targets)
@@ -499,18 +500,18 @@ class WholeBodyController:
         result.setflags(write=False)
         targets_of_tick = inputs.packed[: tick.layout.size]
         targets_of_tick.setflags(write=False)  # not `packed` itself: numba compiles for each kind
-        solution = partial(self._solution_of, q_array, v_array, t, result, n_active, inputs)
+        problem = self._problem
         return Command(
             tau=result[tick.tau],
             qdd=result[tick.qdd],
             forces=result[tick.forces],
-            contacts=self.contacts,
+            contacts=problem.contacts,
             backend="compiled",
-            solution=solution,
+            solution=partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
             softened=self._softened,
             target_values=targets_of_tick,
             target_entries=tick.layout.names,
-            joint_limits=self._problem.limits.joint_limits,
+            joint_limits=problem.limits.joint_limits,
         )
 
     def _reference_attempt(
