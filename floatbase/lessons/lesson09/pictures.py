@@ -199,10 +199,8 @@ def limit_kinds(rows: npt.ArrayLike) -> list[str]:
     """
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
-    moment, twist = (
-        np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE,
-        np.abs(R[:, 5]) > _ZERO_TOLERANCE,
-    )
+    moment = np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE
+    twist = np.abs(R[:, 5]) > _ZERO_TOLERANCE
     return [
         "twisting" if t else "tipping" if m else "sliding"
         for m, t in zip(moment, twist, strict=True)
@@ -218,15 +216,11 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
     # each constraint is by_twist · twist ≤ room
     room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]
-    up, down, free = (
-        by_twist > _ZERO_TOLERANCE,
-        by_twist < -_ZERO_TOLERANCE,
-        np.abs(by_twist) <= _ZERO_TOLERANCE,
-    )
-    highest, lowest = (
-        (room[:, up] / by_twist[up]).min(axis=1),
-        (room[:, down] / by_twist[down]).max(axis=1),
-    )
+    up = by_twist > _ZERO_TOLERANCE
+    down = by_twist < -_ZERO_TOLERANCE
+    free = np.abs(by_twist) <= _ZERO_TOLERANCE
+    highest = (room[:, up] / by_twist[up]).min(axis=1)
+    lowest = (room[:, down] / by_twist[down]).max(axis=1)
     there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO_TOLERANCE * wrench[2], axis=1)
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])

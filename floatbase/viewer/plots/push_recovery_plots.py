@@ -23,9 +23,8 @@ _FILL = 0.15  # opacity of the area inside the measured curve
 _HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no visible gap
 _RING_SIDES = 72  # number of sides of a ring
 
-_Curve: TypeAlias = tuple[
-    str, Array, RGB, str
-]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
+# kind as in `LEGEND`, values (n,) in N, colour, style of its line
+_Curve: TypeAlias = tuple[str, Array, RGB, str]
 
 
 def plot(
