@@ -40,7 +40,7 @@ MAX_LINE_LENGTH = 100
 ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
 # numba loads with them, so no __init__ imports them
 COMPILED = {
-    "floatbase.behaviours.compiled_targets",
+    "floatbase.behaviours.walk.compiled_targets",
     "floatbase.control.tick.jit",
     "floatbase.control.tick.tick",
 }

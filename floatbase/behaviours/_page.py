@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.behaviours import compiled_targets, plan
-from floatbase.behaviours.gait import TIME_TOLERANCE
-from floatbase.behaviours.posture import MIN_SIDE_FRACTION
-from floatbase.behaviours.speed import speed_fractions
-from floatbase.behaviours.walk import Walk
+from floatbase.behaviours.walk import compiled_targets, plan
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE
+from floatbase.behaviours.walk.gait_limits import speed_fractions
+from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION
+from floatbase.behaviours.walk.walk import Walk
 from floatbase.control import WholeBodyController
 
 # names as in the page's JavaScript

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from floatbase.lessons.panels import SliderPanel, live_run, push_panel, slider_panel
     from floatbase.lessons.push_recovery import (
         controller_factory,
-        draw_push_recovery,
         measured_push_recovery,
         plot_push_recovery,
     )
@@ -39,7 +38,6 @@ _LAZY = {
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
         (
-            "draw_push_recovery",
             "measured_push_recovery",
             "plot_push_recovery",
             "controller_factory",
@@ -61,7 +59,6 @@ __all__ = [
     "check",
     "compare",
     "controller_factory",
-    "draw_push_recovery",
     "hand_in",
     "import_answers",
     "joint_servo",

@@ -34,16 +34,14 @@ from floatbase.simulation.push import Push, as_pushes
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
 FALLEN_HEIGHT_FRACTION = 0.4
-FALLEN_COSINE = float(
-    np.cos(np.deg2rad(60.0))
-)  # of the base's tilt since the last reset: no leg can recover from more
+# of the base's tilt since the last reset: no leg can recover from more
+FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _ROUNDING = 1e-9  # m: a foot on the ground may be this far below it
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
-_FIRST_FATAL_WARNING = int(
-    mujoco.mjtWarning.mjWARN_BADQPOS
-)  # after this warning of MuJoCo or a later one, its numbers are meaningless
+# after this warning of MuJoCo or a later one, its numbers are meaningless
+_FIRST_FATAL_WARNING = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 
 
 class Simulation:
@@ -122,15 +120,11 @@ class Simulation:
     def _refresh_views(self) -> None:
         """Keep views into MuJoCo's memory for values of each step: asking MuJoCo takes longer."""
         data = self.data
-        self._qpos, self._qvel, self._warnings = (
-            data.qpos,
-            data.qvel,
-            data.warning.number[_FIRST_FATAL_WARNING:],
-        )
-        self._base_position, self._base_vertical = (
-            data.xpos[self._base_body],
-            data.xmat[self._base_body, 2::3],
-        )  # origin and z axis
+        self._qpos = data.qpos
+        self._qvel = data.qvel
+        self._warnings = data.warning.number[_FIRST_FATAL_WARNING:]
+        self._base_position = data.xpos[self._base_body]  # of its origin
+        self._base_vertical = data.xmat[self._base_body, 2::3]  # its z axis
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_thread_lock"}
@@ -470,10 +464,8 @@ class Simulation:
 
         MuJoCo applies forces at the body's centre of mass, so a moment is added.
         """
-        frame, body = (
-            self.robot.model.frames[self.robot.frame_id(push.frame)],
-            self.pushed_body(push),
-        )
+        frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
+        body = self.pushed_body(push)
         position = (
             self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
         )

@@ -90,10 +90,8 @@ class Output:
 
     def _static_frame(self) -> str:
         """Return the current scene as an HTML frame that needs no kernel."""
-        name, style = (
-            html.escape(self.robot.name),
-            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
-        )
+        name = html.escape(self.robot.name)
+        style = f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
         return (
             f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
             f'style="{style}"></iframe>'

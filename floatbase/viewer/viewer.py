@@ -132,9 +132,8 @@ class Viewer(Controls, Output):
         self._view = View()  # of the camera, when a first picture or a recording places it
         self._is_playing = False
         self._last: State | None = None
-        self._legend_entries: dict[
-            str, tuple[RGB, str]
-        ] = {}  # colour and meaning of each user-defined kind of item
+        # colour and meaning of each user-defined kind of item
+        self._legend_entries: dict[str, tuple[RGB, str]] = {}
         super().__init__()
         self._set_stage(background)
 
@@ -272,10 +271,8 @@ class Viewer(Controls, Output):
             If the solution belongs to other contacts, or the state to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
-        positions, height = (
-            as_instance("contacts", contacts, Contacts).positions(state),
-            self.painter.cone_height(contacts),
-        )
+        positions = as_instance("contacts", contacts, Contacts).positions(state)
+        height = self.painter.cone_height(contacts)
         drawn = markers.multiplier_labels(
             positions,
             contacts,
@@ -438,10 +435,8 @@ class Viewer(Controls, Output):
         _check_texts(title=title, ghost_name=ghost_name)
         if self.painter.ground is None and rollout.ground is not None and rollout.ground.boxes:
             self.set_ground(rollout.ground)
-        rows, planned_steps = (
-            recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
-            gait_overlay.as_steps(steps),
-        )
+        rows = recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s"))
+        planned_steps = gait_overlay.as_steps(steps)
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
         contacts, columns = recording.point_force_contacts(rollout.contacts)

@@ -16,7 +16,6 @@ from floatbase import lessons
 from floatbase.errors import InputError
 from floatbase.lessons import (
     controller_factory,
-    draw_push_recovery,
     measured_push_recovery,
     plot_push_recovery,
 )
@@ -57,10 +56,6 @@ def test_the_former_lesson_is_grey_or_a_second_rose_of_the_same_robot(lesson: st
     expected = [measured_push_recovery(name).pushes for name in [lesson, *former]]
     assert np.array_equal([line.get_ydata()[:-1] for line in axis.get_lines()], expected)
     plt.close(axis.figure)
-    assert {path.split("/")[0] for path in draw_push_recovery(lesson)} == {
-        "push_recovery",
-        *["previous" for _ in former],
-    }
 
 
 def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> None:
@@ -73,16 +68,6 @@ def test_a_second_rose_has_a_controller_of_its_own_and_nothing_below_it() -> Non
     plt.close("all")
     with pytest.raises(InputError, match="no controller to push"):
         controller_factory("09 flying")
-
-
-@pytest.mark.parametrize("scale", [0.002, 0.003])
-def test_roses_on_the_ground_are_drawn_in_a_scale_that_is_asked_for(scale: float) -> None:
-    items = draw_push_recovery("06", scale)
-    apart = (
-        items["push_recovery/label 200 N"].matrix[:2, 3]
-        - items["push_recovery/label 100 N"].matrix[:2, 3]
-    )
-    assert np.isclose(np.linalg.norm(apart), 100.0 * scale)
 
 
 def test_lessons_without_a_rose_are_told() -> None:

@@ -125,9 +125,13 @@ class CompiledTick:
             if i in time_varying or task_kind(task) is None
         ]
         self.default_inputs = self.user_terms.zero_inputs(self.layout.constant)
-        self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
+        self._q_shape = (robot.nq,)
+        self._v_shape = (nv,)
+        self._n_multipliers = nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._workspace_sizes, self._tables, self._tick = tick.workspace_sizes, tables, tick.tick
+        self._workspace_sizes = tick.workspace_sizes
+        self._tables = tables
+        self._tick = tick.tick
         self._n_stages = tick.N_STAGES
         self._varies = self.layout.varies or self.user_terms.varies
         self._n_user_rows = -1

@@ -52,10 +52,8 @@ def _by_levers(
 ) -> float:
     """Return the width at which push and weight have equal moments about the rear edge [m]."""
     state = _on_the_plate()
-    height, weight = (
-        state.point("tool0")[2] - below,
-        state.robot.weight if weight is None else weight,
-    )
+    height = state.point("tool0")[2] - below
+    weight = state.robot.weight if weight is None else weight
     return float(2 * (press * height / weight - (state.com[0] if ahead is None else ahead)))
 
 

@@ -10,7 +10,7 @@ from floatbase.lessons.lesson07.helpers import (
     run_with_push,
     tuned_controller,
 )
-from floatbase.lessons.lesson07.pictures import multiplier_text, plot_com_distance, plot_one_foot
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot
 
 __all__ = [
     "EXERCISES",
@@ -20,7 +20,6 @@ __all__ = [
     "make_controller",
     "median_time_ms",
     "multiplier_text",
-    "plot_com_distance",
     "plot_one_foot",
     "run_with_push",
     "tuned_controller",

@@ -217,10 +217,8 @@ class PushComparison(widgets.VBox):
             self.runs[title].on_status(partial(self._tell, title))
         self.force = _slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
         self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
-        self.push_button, self.reset_button = (
-            widgets.Button(description="push both"),
-            widgets.Button(description="reset"),
-        )
+        self.push_button = widgets.Button(description="push both")
+        self.reset_button = widgets.Button(description="reset")
         self.push_button.on_click(lambda _: self.push())
         self.reset_button.on_click(lambda _: self.reset())
         self._pictures = {title: widgets.VBox() for title in controllers}

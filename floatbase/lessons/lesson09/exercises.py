@@ -115,10 +115,8 @@ def _judge_lean(given: Array) -> Verdict:
 def _judge_record(record: Rollout, seconds: float) -> Verdict:
     """Judge a complete lean: where it ended, the centre of pressure, and the duration."""
     settled = record.time > 0.1  # the robot is put down at first
-    toes, heels = (
-        record.foot_positions[..., 0].max(axis=1),
-        record.foot_positions[..., 0].min(axis=1),
-    )
+    toes = record.foot_positions[..., 0].max(axis=1)
+    heels = record.foot_positions[..., 0].min(axis=1)
     pushed = centre_of_pressure_path(record)[:, 0]
     if np.isnan(pushed[settled]).any():
         return Verdict(

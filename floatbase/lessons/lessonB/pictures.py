@@ -168,10 +168,8 @@ def _towards(gamma: float) -> Array:
 def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
     """Return the pressures of both chambers for a torque [Pa]."""
     h = bench.hydraulics
-    lines, force = (
-        h.supply_pressure + h.tank_pressure,
-        torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0,
-    )
+    lines = h.supply_pressure + h.tank_pressure
+    force = torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0
     a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
 

@@ -214,10 +214,8 @@ def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Ver
 
 def _reports() -> list[Example]:
     """Return examples with the boxes of seed 1."""
-    boxes, found = (
-        black_boxes(1),
-        {box.name: investigation.investigate(box) for box in black_boxes(1)},
-    )
+    boxes = black_boxes(1)
+    found = {box.name: investigation.investigate(box) for box in black_boxes(1)}
     cases = {str(case.injected_fault.kind): case for case in random_cases(1)}
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 

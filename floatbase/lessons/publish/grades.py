@@ -33,9 +33,8 @@ _REQUIRED_KEYS = {"name": str, "exercises": dict, "predictions": dict}
 _INDENT = "    "  # of code, so that no line of it looks like a heading
 _NOT_TRIED, _TO_BE_READ = "·", "to be read"
 _COLUMNS = ("file", "name", "time", "exercise", "result", "tries", "feedback")
-_FORMULA_STARTS = tuple(
-    "=+-@\t\r\n＝＋－＠"
-)  # a spreadsheet may evaluate text that begins with one of these
+# a spreadsheet may evaluate text that begins with one of these
+_FORMULA_STARTS = tuple("=+-@\t\r\n＝＋－＠")
 
 
 @dataclass(frozen=True)

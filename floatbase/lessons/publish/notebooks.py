@@ -45,9 +45,8 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
     """Run all cells in a new kernel in `folder`, in place; an error in a cell is raised."""
     from nbclient import NotebookClient
 
-    quiet = [
-        "--IPKernelApp.log_level=40"
-    ]  # its warning that this machine's loopback is not encrypted says nothing here
+    # its warning that this machine's loopback is not encrypted says nothing here
+    quiet = ["--IPKernelApp.log_level=40"]
     where = {"metadata": {"path": str(folder)}}
     client = NotebookClient(
         notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True

@@ -23,11 +23,8 @@ from floatbase.viewer.scene.colours import LEGEND
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FRAME_RATES = {
-    ".png": 0,
-    ".mp4": 30,
-    ".gif": 20,
-}  # pictures per second of each file type; 0: only the first one
+# pictures per second of each file type; 0: only the first one
+FRAME_RATES = {".png": 0, ".mp4": 30, ".gif": 20}
 _MAX_DURATION = 120.0  # s
 _MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
 _BROWSERS = (

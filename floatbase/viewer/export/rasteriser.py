@@ -69,10 +69,8 @@ class _Samples(NamedTuple):
 
 def draw_meshes(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
     """Draw opaque meshes, then translucent ones from far to near, then items always on top."""
-    pixels, depth = (
-        canvas.reshape(-1, 3),
-        np.full(canvas.shape[0] * canvas.shape[1], 0.0, dtype=np.float32),
-    )
+    pixels = canvas.reshape(-1, 3)
+    depth = np.full(canvas.shape[0] * canvas.shape[1], 0.0, dtype=np.float32)
     opaque = [item for item in items if _opacity(item) >= 1.0 and not _is_on_top(item)]
     for item in opaque:
         for samples in _samples(item, camera):
@@ -130,16 +128,14 @@ def _samples(item: Item, camera: Camera) -> Iterator[_Samples]:
     if item.shape.data["materials"][0]["type"] == "MeshPhongMaterial":
         normals = mesh.normals @ np.linalg.pinv(pose[:3, :3])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        towards = np.sign(
-            np.sum(normals * (camera.eye - points), axis=1)
-        )  # both sides of a surface are lit
+        # both sides of a surface are lit
+        towards = np.sign(np.sum(normals * (camera.eye - points), axis=1))
         light = _AMBIENT + _DIFFUSE * np.maximum(towards * (normals @ _LIGHT_DIRECTION), 0.0)
         colours = np.minimum(colours * light[:, None], 1.0)
     seen = camera.project(points)
     forward = (seen[:, 2] > NEAR_PLANE)[mesh.faces].all(axis=1)
-    seen[:, 2] = -1.0 / np.maximum(
-        seen[:, 2], NEAR_PLANE
-    )  # unlike the distance, linear over a triangle in the image
+    # unlike the distance, linear over a triangle in the image
+    seen[:, 2] = -1.0 / np.maximum(seen[:, 2], NEAR_PLANE)
     corners = np.concatenate([seen, colours], axis=1)[mesh.faces[forward]].astype(np.float32)
     corners, low, sides = _split(corners, camera.size)
     kinds = sides @ (_MAX_BOX + 1, 1)  # one number for both sides

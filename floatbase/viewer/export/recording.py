@@ -94,10 +94,8 @@ def animate(
 
 def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """Choose the rows of a rollout to draw: the first, the last, and `rate` per second between."""
-    t, rate = (
-        as_array("times", times, (None,), "s"),
-        as_positive("rate", rate, "1/s", maximum=_MAX_RATE),
-    )
+    t = as_array("times", times, (None,), "s")
+    rate = as_positive("rate", rate, "1/s", maximum=_MAX_RATE)
     if not t.size:
         raise InputError(
             "times is empty, so there is nothing to draw; it must have at least one entry."

@@ -37,10 +37,8 @@ from floatbase.viewer.scene.shapes import Item, Picture
 from floatbase.viewer.scene.store import Scene
 
 SUPERSAMPLING = 2  # pixels drawn per pixel of the image, in each direction
-_ASPECT, _SCALE = (
-    1.7,
-    0.8,
-)  # width / height, and size of the image / size of the picture in the page
+_ASPECT = 1.7  # width / height
+_SCALE = 0.8  # size of the image / size of the picture in the page
 _COLOURS = 256
 
 

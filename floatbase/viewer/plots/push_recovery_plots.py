@@ -23,9 +23,8 @@ _FILL = 0.15  # opacity of the area inside the measured curve
 _HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no visible gap
 _RING_SIDES = 72  # number of sides of a ring
 
-_Curve: TypeAlias = tuple[
-    str, Array, RGB, str
-]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
+# kind as in `LEGEND`, values (n,) in N, colour, style of its line
+_Curve: TypeAlias = tuple[str, Array, RGB, str]
 
 
 def plot(
@@ -130,37 +129,6 @@ def plot_horizontal_force_limits(
         *_horizontal_force_curve(wrenches, n),
         "maximum horizontal force at full weight without moment [N]",
         axis,
-    )
-
-
-def horizontal_force_limits(
-    wrenches: WrenchSet, scale: float | None = None, n: int = 72
-) -> Picture:
-    """Draw `plot_horizontal_force_limits` on level ground below the centre of mass, with rings.
-
-    Parameters
-    ----------
-    wrenches : WrenchSet
-        Wrenches of the stance, as from `floatbase.friction.wrench_set`.
-    scale : float, optional
-        Length of a drawn force [m/N]. By default, the curve is 1.5 times as wide as the stance.
-    n : int, optional
-        Number of directions.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-
-    Raises
-    ------
-    InputError
-        If a force is unbounded.
-    InfeasibleError
-        If the stance cannot carry the weight.
-    """
-    return _picture(
-        *_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale
     )
 
 

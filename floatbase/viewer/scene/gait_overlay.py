@@ -25,10 +25,8 @@ COLOUR = GREYS[1]  # of all marks except the centre of mass; it is visible on an
 # fraction of the robot's size, above the ground: avoids flicker with its lines and the support
 # polygon
 _HEIGHT_ABOVE_GROUND = 0.005
-_RING_RADIUS, _DIAMOND_SIZE = (
-    0.07,
-    0.05,
-)  # radius of the capture point's mark, half the height of the ZMP's: fractions of the robot's size
+_RING_RADIUS = 0.07  # of the capture point's mark, as a fraction of the robot's size
+_DIAMOND_SIZE = 0.05  # half the height of the ZMP's mark, as the same fraction
 _OUTLINE_WIDTH = 0.012  # of a foothold's outline, as a fraction of the robot's size
 _MIN_LENGTH = 1e-6  # m: avoids a singular matrix for a path of zero length
 _SEGMENTS = 24  # of a swing path
@@ -84,10 +82,8 @@ def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
 
 def _capture_point_and_zmp(plan: CoMPlan, t: float, state: State, style: Style) -> Picture:
     """Draw the capture point and the planned zero-moment point at time t [s]."""
-    dcm, zmp = (
-        capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega),
-        plan.zmp(t),
-    )
+    dcm = capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega)
+    zmp = plan.zmp(t)
     lift = _HEIGHT_ABOVE_GROUND * style.size
     ring = transform([*dcm, style.ground.height(dcm) + lift], scale=_RING_RADIUS * style.size)
     diamond = transform([*zmp, style.ground.height(zmp) + lift], scale=_DIAMOND_SIZE * style.size)
@@ -107,10 +103,8 @@ def _footholds_and_swings(
     yaw = float(np.arctan2(forward_y, forward_x))
     for name, place in footholds.items():
         foot, path = _foot(state.robot, name), name.replace("/", "_")
-        rotation, offset = (
-            rotation_z(yaw + yaw_changes.get(name, 0.0)),
-            _offset_to_ground(foot, state.robot.standing()),
-        )
+        rotation = rotation_z(yaw + yaw_changes.get(name, 0.0))
+        offset = _offset_to_ground(foot, state.robot.standing())
         picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
         if name in swings:
             picture[f"swing/{path}"] = _swing_path(swings[name], rotation @ offset)

@@ -202,9 +202,8 @@ def _parts_above(plane: Plane, ends: Array) -> Array:
     clear = ends @ np.array(plane.normal) - plane.offset
     seen = clear.max(axis=1) > 0.0
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
-    fraction = low / np.where(
-        low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0
-    )  # fraction of the line, at each end
+    # fraction of the line, at each end
+    fraction = low / np.where(low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0)
     return np.asarray(lines + fraction[:, :, None] * (lines[:, ::-1] - lines))
 
 

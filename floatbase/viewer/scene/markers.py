@@ -29,11 +29,8 @@ from floatbase.viewer.scene.shapes import (
 from floatbase.viewer.scene.threejs import Shape
 from floatbase.viewer.scene.unit_shapes import ARROW
 
-_CONE_CONSTRAINTS = (
-    "friction",
-    "normal force",
-    "largest normal force",
-)  # kinds of the constraints whose multipliers are shown
+# kinds of the constraints whose multipliers are shown
+_CONE_CONSTRAINTS = ("friction", "normal force", "largest normal force")
 # fraction of the largest multiplier: labels of smaller ones would only hide others
 _LEAST_SHOWN = 0.01  # fraction of the largest multiplier; labels of smaller ones would cover others
 OUTLINE = 0.6  # width of the outline of a push, as a fraction of the radius of its shaft
@@ -230,17 +227,15 @@ def multiplier_labels(
             continue
         i = contacts.point_names.index(name.owner)
         normal, own = contacts.normals[i], row[3 * i : 3 * i + 3]
-        across = own - normal * (
-            normal @ own
-        )  # the tangent that the facet faces, times the row's length
+        # the tangent that the facet faces, times the row's length
+        across = own - normal * (normal @ own)
         to_facet = (
             normal - across * (normal @ own) / (across @ across)
             if name.kind == "friction"
             else 1.5 * normal
         )
-        at = (
-            np.asarray(positions)[i] + height / 1.5 * to_facet
-        )  # the centroid of a triangle with its tip at the point
+        # the centroid of a triangle with its tip at the point
+        at = np.asarray(positions)[i] + height / 1.5 * to_facet
         picture[f"/{name.replace('/', '_')}"] = label(
             at, f"{float(f'{found[name]:.2g}'):g}", 0.042 * size
         )

@@ -32,9 +32,8 @@ TYPES = (
 
 ANIMATION: Key = ("/", "set_animation", "")
 _MAX_CONTROL_VALUE = 1e18  # of a slider: MessagePack's integers end at 1.8e19
-_FLOAT32 = np.dtype(
-    [("code", "u1"), ("value", ">f4")]
-)  # MessagePack: the byte 0xca, then a big-endian float
+# MessagePack: the byte 0xca, then a big-endian float
+_FLOAT32 = np.dtype([("code", "u1"), ("value", ">f4")])
 
 
 def encode(command: Mapping[str, Any]) -> Update:

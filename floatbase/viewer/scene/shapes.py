@@ -522,9 +522,8 @@ def scale_bar(
     start = np.asarray(position, dtype=np.float64)
     along = geometry.rotation_with_z_axis([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array(
-        [length / 2, 0.17 * size, 0.03 * size]
-    )  # beside the bar, which looks short when seen from its end
+    # beside the bar, which looks short when seen from its end
+    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])
     picture = {
         "/bar": Item(
             unit_shapes.cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
@@ -536,9 +535,8 @@ def scale_bar(
             unit_shapes.cylinder(colour),
             transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)),
         )
-    words = unit_shapes.label(
-        f"{force:g} N", 0.055 * size, True, colour, False
-    )  # hidden by the robot, as the bar is
+    # hidden by the robot, as the bar is
+    words = unit_shapes.label(f"{force:g} N", 0.055 * size, True, colour, False)
     return picture | {"/label": Item(words, transform(text_at))}
 
 

@@ -24,10 +24,8 @@ from floatbase.viewer.transport.notebook_events import receive_during_cells
 from floatbase.viewer.transport.server import Server
 from floatbase.viewer.web import pages
 
-FRAME_INTERVAL = (
-    1.0 / 30.0
-    # s between frames: each is a message of the kernel, and Jupyter accepts at most 1000 a second
-)
+# s between frames: each is a message of the kernel, and Jupyter accepts at most 1000 a second
+FRAME_INTERVAL = 1.0 / 30.0
 _MAX_IN_FLIGHT = 2  # frames: so a distant page gets one per half of the round-trip time
 _MAX_PAGES = 50  # of one display; a page that closed silently is dropped after this many others
 

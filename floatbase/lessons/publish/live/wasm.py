@@ -1,7 +1,7 @@
 """The compiled tick as WebAssembly: one module that serves every robot, built from the same Python.
 
-numba compiles `control.tick`, and the targets of a walk in `behaviours.compiled_targets`, to LLVM's
-intermediate code. llvmlite turns that code into object files for WebAssembly, and the linker
+numba compiles `control.tick`, and the targets of a walk in `behaviours.walk.compiled_targets`, to
+LLVM's intermediate code. llvmlite turns that code into object files for WebAssembly, and the linker
 wasm-ld makes one module of them. The module is kept beside the pages' JavaScript with a digest of
 its sources, so that only a change of these sources needs the linker.
 """
@@ -18,7 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from floatbase.behaviours import compiled_targets
+from floatbase.behaviours.walk import compiled_targets
 from floatbase.control.tick.jit import source_digest
 from floatbase.errors import InputError
 from floatbase.viewer.web import pages

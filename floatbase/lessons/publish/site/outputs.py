@@ -36,9 +36,8 @@ _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _CHECKED = re.compile(r'check\("(\w+\.\w+)"')
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
-_LEARNER_CALLS = re.compile(
-    r"^(?:review|show_progress|reveal)\(", re.MULTILINE
-)  # their output is about the learner
+# their output is about the learner
+_LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)
 
 
 class PicturePlacer(Protocol):

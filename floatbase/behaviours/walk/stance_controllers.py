@@ -7,12 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from floatbase.behaviours.active_plan import compile_targets
-from floatbase.behaviours.gait import Gait
-from floatbase.behaviours.options import WalkOptions
-from floatbase.behaviours.plan import StepPlan
-from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.targets import UNBOUNDED, normal_force_bound
+from floatbase.behaviours.walk.active_plan import compile_targets
+from floatbase.behaviours.walk.gait import Gait
+from floatbase.behaviours.walk.options import WalkOptions
+from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.posture import WalkingPosture
+from floatbase.behaviours.walk.targets import UNBOUNDED, normal_force_bound
 from floatbase.control import JointLimits, WholeBodyController
 from floatbase.objectives import CoMTask, ForceTask, FrameTask, OrientationTask, PostureTask, Task
 
@@ -28,7 +28,9 @@ class StanceControllers:
     def __init__(
         self, posture: WalkingPosture, options: WalkOptions, force_weight: float | None = None
     ):
-        self._posture, self._options, self.plan = posture, options, None
+        self._posture = posture
+        self._options = options
+        self.plan = None
         self._force_weight = force_weight
         self._controllers: dict[tuple[str, ...], WholeBodyController] = {}
         robot, contacts = posture.state.robot, posture.contacts

@@ -11,12 +11,12 @@ from typing import Any, cast
 import numpy as np
 
 from floatbase._validation import Array, as_array
-from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.path import DesiredMotion, Path
-from floatbase.behaviours.plan import StepPlan
-from floatbase.behaviours.posture import MIN_SIDE_FRACTION, WalkingPosture
-from floatbase.behaviours.swing import Swing, SwingPath
-from floatbase.behaviours.targets import (
+from floatbase.behaviours.walk.lipm import LIPM
+from floatbase.behaviours.walk.path import DesiredMotion, Path
+from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION, WalkingPosture
+from floatbase.behaviours.walk.swing import Swing, SwingPath
+from floatbase.behaviours.walk.targets import (
     Adjustment,
     BodyPose,
     adjusted_ends,
@@ -46,8 +46,13 @@ class ActivePlan:
         adjustment: Adjustment | None = None,
         compiled: bool = True,
     ):
-        self.plan, self._posture, self._desired, self._pose = plan, posture, desired, pose
-        self._reach, self._entries, self._adjustment = reach, entries, adjustment
+        self.plan = plan
+        self._posture = posture
+        self._desired = desired
+        self._pose = pose
+        self._reach = reach
+        self._entries = entries
+        self._adjustment = adjustment
         self._path, self._swings = plan.path, plan.swings
         usual = (
             adjustment is None
@@ -159,7 +164,10 @@ class ActivePlan:
 
     def _pack_body(self, numbers: Any) -> Array:
         """Return the array `body` of `compiled_targets`."""
-        posture, plan, path, desired = self._posture, self.plan, self._path, self._desired
+        posture = self._posture
+        plan = self.plan
+        path = self._path
+        desired = self._desired
         body = np.zeros(numbers.BODY_SIZE)
         for first, values in (
             (numbers.TIME, (path.time, *path.position, path.yaw, *path.velocity)),
@@ -206,7 +214,7 @@ class ActivePlan:
 
 def _compiled_module() -> ModuleType:
     """Return the module of the compiled function, which loads numba."""
-    from floatbase.behaviours import compiled_targets
+    from floatbase.behaviours.walk import compiled_targets
 
     return compiled_targets
 

@@ -15,18 +15,19 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._geometry import rotation_z
-from floatbase._validation import Array
-from floatbase.behaviours.footholds import capture_point, step_adjustment
-from floatbase.behaviours.path import Path
-from floatbase.behaviours.plan import DCM_DEAD_ZONE, PlannedSwing, StepPlan
-from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.swing import Swing
+from floatbase._validation import Array, as_number
+from floatbase.behaviours.walk.footholds import capture_point, step_adjustment
+from floatbase.behaviours.walk.path import Path
+from floatbase.behaviours.walk.plan import DCM_DEAD_ZONE, PlannedSwing, StepPlan
+from floatbase.behaviours.walk.posture import WalkingPosture
+from floatbase.behaviours.walk.swing import Swing
 
 Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, acceleration
 # called as adjustment(plan, path, com, com_velocity, t); returns the ends of the swings, (2,) or
 # (3,), in the world frame [m]
 Adjustment: TypeAlias = Callable[[StepPlan, Path, Array, Array, float], Mapping[str, npt.ArrayLike]]
 UNBOUNDED = 1e6  # N: a bound that no robot of the catalogue reaches
+_MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -34,8 +35,16 @@ _UP = np.array([0.0, 0.0, 1.0])
 class BodyPose:
     """Height and pitch of the body relative to the standing posture."""
 
-    height: float = 0.0
-    pitch: float = 0.0
+    height: float
+    pitch: float
+
+    @staticmethod
+    def checked(height: float, pitch: float) -> BodyPose:
+        """Return a pose that a user requests, with height [m] and pitch [rad] checked."""
+        return BodyPose(
+            as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE),
+            as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH),
+        )
 
     def rotation(self, posture: WalkingPosture) -> Array:
         """Return the rotation of the base at zero yaw."""

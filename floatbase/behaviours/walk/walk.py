@@ -18,26 +18,24 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import (
-    Array,
-    as_array,
-    as_instance,
-    as_number,
-    refuse_new_attributes,
-)
-from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, check_always_supported
-from floatbase.behaviours.gait_clock import GaitClock
-from floatbase.behaviours.lipm import CoMPlan
-from floatbase.behaviours.options import (
+from floatbase._validation import Array, as_instance, as_number, refuse_new_attributes
+from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.walk.active_plan import ActivePlan
+from floatbase.behaviours.walk.footholds import raibert_foothold
+from floatbase.behaviours.walk.gait import Gait
+from floatbase.behaviours.walk.gait_limits import check_friction, slow_message, speed_fractions
+from floatbase.behaviours.walk.lipm import CoMPlan
+from floatbase.behaviours.walk.options import (
     Gains,
     WalkOptions,
+    as_gait,
     as_vector,
-    check_gait_feet,
+    as_velocity,
+    as_yaw_rate,
     check_options,
 )
-from floatbase.behaviours.path import DesiredMotion, Path
-from floatbase.behaviours.plan import (
+from floatbase.behaviours.walk.path import DesiredMotion, Path
+from floatbase.behaviours.walk.plan import (
     StepPlan,
     first_footing,
     first_path,
@@ -45,14 +43,11 @@ from floatbase.behaviours.plan import (
     next_footing,
     weight_shift,
 )
-from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.raibert import raibert_foothold
-from floatbase.behaviours.speed import slow_message, speed_fractions
-from floatbase.behaviours.stance_controllers import StanceControllers
-from floatbase.behaviours.sway import check_friction
-from floatbase.behaviours.swing import SwingPath
-from floatbase.behaviours.targets import Adjustment, BodyPose
-from floatbase.behaviours.terrain import Terrain
+from floatbase.behaviours.walk.posture import WalkingPosture
+from floatbase.behaviours.walk.progress import GaitClock, Progress
+from floatbase.behaviours.walk.stance_controllers import StanceControllers
+from floatbase.behaviours.walk.swing import SwingPath
+from floatbase.behaviours.walk.targets import Adjustment, BodyPose
 from floatbase.control import Command
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
@@ -62,10 +57,6 @@ from floatbase.robots import Robot, State
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
 _LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
-_RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
-_MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
-_MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
-_HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
 class Walk:
@@ -178,9 +169,7 @@ class Walk:
     may_fly = False
     """Whether all feet may be in the air at the same time."""
     # attributes that copies do not share
-    _made_anew = frozenset(
-        {"_posture", "_controllers", "_active", "_clock", "_desired", "_history", "_centroid"}
-    )
+    _made_anew = frozenset({"_posture", "_controllers", "_centroid", "_progress"})
     _force_weight: float | None = None  # 1/N², of a task on the contact forces
 
     def __init__(
@@ -208,19 +197,28 @@ class Walk:
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
-        self._active: ActivePlan | None = None
-        self._speeds = 1.0, 1.0  # fractions in the first period, and later
-        self._pose = BodyPose()
-        self.gait, self.velocity, self.yaw_rate = gait, velocity, yaw_rate
-        self.height, self.pitch = height, pitch
+        self._gait = as_gait(gait, self._all_contacts, self.may_fly)
+        self._velocity = as_velocity(velocity)
+        self._yaw_rate = as_yaw_rate(yaw_rate)
+        self._pose = BodyPose.checked(height, pitch)
         check_options(type(self).__name__, options)
         self._options = WalkOptions.checked(
-            self._all_contacts, clearance, reach, ramp,
-            raibert_foothold if foothold is None else foothold, adjustment,
-            modify_plan, swing, ground, tasks, acceleration, gains, options,
-        )  # fmt: skip
+            self._all_contacts,
+            clearance=clearance,
+            reach=reach,
+            ramp=ramp,
+            foothold=raibert_foothold if foothold is None else foothold,
+            adjustment=adjustment,
+            modify_plan=modify_plan,
+            swing=swing,
+            ground=ground,
+            tasks=tasks,
+            acceleration=acceleration,
+            gains=gains,
+            controller=options,
+        )
         self._clear()
-        self._prepare(gait)
+        self._prepare(self._gait)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -241,7 +239,7 @@ class Walk:
     @property
     def history(self) -> deque[StepPlan]:
         """Plans of the last 500 changes of stance."""
-        return self._history
+        return self._progress.history
 
     @property
     def gait(self) -> Gait:
@@ -250,11 +248,8 @@ class Walk:
 
     @gait.setter
     def gait(self, gait: Gait) -> None:
-        check_gait_feet(as_instance("gait", gait, Gait, "Gait.trot(robot)"), self._all_contacts)
-        if len(gait.feet) == len(self._all_contacts) and not self.may_fly:
-            check_always_supported(gait)
-        if hasattr(self, "_controllers"):  # the constructor has checked its arguments
-            self._prepare(gait)
+        as_gait(gait, self._all_contacts, self.may_fly)
+        self._prepare(gait)
         self._gait = gait
         self._limit_speed(stacklevel=3)
 
@@ -265,9 +260,7 @@ class Walk:
 
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
-        velocity = as_array("velocity", velocity, (2,), "m/s")
-        as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
-        self._velocity = velocity
+        self._velocity = as_velocity(velocity)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -277,7 +270,7 @@ class Walk:
 
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
-        self._yaw_rate = as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
+        self._yaw_rate = as_yaw_rate(yaw_rate)
         self._limit_speed(stacklevel=3)
 
     @property
@@ -287,8 +280,7 @@ class Walk:
 
     @height.setter
     def height(self, height: float) -> None:
-        height = as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE)
-        self._pose = replace(self._pose, height=height)
+        self._pose = BodyPose.checked(height, self._pose.pitch)
         self._refresh()
 
     @property
@@ -298,8 +290,7 @@ class Walk:
 
     @pitch.setter
     def pitch(self, pitch: float) -> None:
-        pitch = as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH)
-        self._pose = replace(self._pose, pitch=pitch)
+        self._pose = BodyPose.checked(self._pose.height, pitch)
         self._refresh()
 
     @property
@@ -310,33 +301,38 @@ class Walk:
     @property
     def time(self) -> float | None:
         """Time of the last control step [s]; None before the first."""
-        return self._active.path.time if self._active else None
+        active = self._progress.active
+        return active.path.time if active else None
 
     @property
     def stance(self) -> tuple[str, ...]:
         """Names of the feet that stand now."""
-        return self._active.plan.stance if self._active else self._all_contacts.names
+        active = self._progress.active
+        return active.plan.stance if active else self._all_contacts.names
 
     @property
     def contacts(self) -> Contacts:
         """Contacts of the present stance."""
-        return self._controllers[self.stance].contacts if self._active else self._all_contacts
+        started = self._progress.active is not None
+        return self._controllers[self.stance].contacts if started else self._all_contacts
 
     @property
     def footholds(self) -> dict[str, Array]:
         """Foothold of each foot in the air or next to lift off, shape (3,), world frame [m]."""
-        ends = {foot: path.end for foot, path in self.swings.items()}
-        return {**self._active.plan.footholds, **ends} if self._active else {}
+        active, ends = self._progress.active, {foot: path.end for foot, path in self.swings.items()}
+        return {**active.plan.footholds, **ends} if active else {}
 
     @property
     def swings(self) -> dict[str, SwingPath]:
         """Paths of the feet in the air."""
-        return self._active.swings if self._active else {}
+        active = self._progress.active
+        return active.swings if active else {}
 
     @property
     def plan(self) -> CoMPlan | None:
         """Plan of the centre of mass's horizontal motion; None before the first control step."""
-        return self._active.plan.plan if self._active else None
+        active = self._progress.active
+        return active.plan.plan if active else None
 
     @property
     def path(self) -> Path:
@@ -347,7 +343,8 @@ class Walk:
         InputError
             Before the first control step.
         """
-        path = self._planning_path or (self._active.path if self._active else None)
+        progress = self._progress
+        path = progress.planning_path or (progress.active.path if progress.active else None)
         if path is None:
             raise InputError(
                 "A Walk has no path before its first control step. Call walk(q, v, t) first, as a "
@@ -368,7 +365,7 @@ class Walk:
         Path
             Position, yaw and velocity at that time.
         """
-        return self.path.moved(self._desired, as_number("t", t, "s"))
+        return self.path.moved(self._progress.desired, as_number("t", t, "s"))
 
     def nominal_foothold(self, foot: str, t: float) -> Array:
         """Return where a foot would stand below the body, if the desired velocity does not change.
@@ -406,16 +403,22 @@ class Walk:
             Joint torques of the present stance's controller, with the planned accelerations and
             contact forces.
         """
-        robot, t, active = self._robot, as_number("t", t, "s"), self._active
+        robot = self._robot
+        t = as_number("t", t, "s")
         q, v = as_vector("q", q, robot.nq), as_vector("v", v, robot.nv)
-        if active is None or not self._continues(t):
+        if self._progress.continues(t):
+            self.select_gait(q, v, t)
+        else:
             self.restart()
             self._forget_plan()
-        elif type(self).select_gait is not Walk.select_gait:
-            self.select_gait(q, v, t)
-        if self._active is None or not self._clock.follows(self._gait) or t >= self._next_change:
+        progress = self._progress
+        if (
+            progress.active is None
+            or not progress.clock.follows(self._gait)
+            or t >= progress.next_change
+        ):
             self._change(State(robot, q, v), t)
-        active = self._active
+        active = progress.active
         assert active is not None
         data, com, com_velocity = self._centroid
         pin.centerOfMass(robot.model, data, q, v, False)
@@ -423,7 +426,7 @@ class Walk:
         targets = controller.targets_at(t)
         active.write(t, com, com_velocity, targets)
         self._adjust_targets(q, v, t, active, controller.targets, targets)
-        self._time = t
+        progress.time = t
         return controller(q, v, t, targets)
 
     def restart(self) -> None:
@@ -431,10 +434,12 @@ class Walk:
 
         `Walk` calls this method by itself if the time jumps. Derived classes may extend it.
         """
-        self._time = -inf
+        self._progress.time = -inf
 
     def select_gait(self, q: Array, v: Array, t: float) -> None:
         """Choose the gait before a control step; derived classes may set `gait` here.
+
+        `Walk` itself does nothing here.
 
         Parameters
         ----------
@@ -445,14 +450,6 @@ class Walk:
         t : float
             The time [s].
         """
-        State(self.robot, q, v)  # raises for wrong arguments
-        as_number("t", t, "s")
-
-    def _continues(self, t: float) -> bool:
-        """Return whether a time [s] follows the last control step, so that the walk continues."""
-        return t > self._start_time and (
-            self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
-        )
 
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
@@ -460,15 +457,12 @@ class Walk:
         self._controllers = StanceControllers(self._posture, self._options, self._force_weight)
         data = self._robot.model.createData()
         self._centroid = data, data.com[0], data.vcom[0]  # views, overwritten in each step
-        self._start_time = self._next_change = -inf
         self._forget_plan()
         self.restart()
 
     def _forget_plan(self) -> None:
         """Discard the plan and the history."""
-        self._active, self._lean = None, 0.0
-        self._planning_path: Path | None = None
-        self._history: deque[StepPlan] = deque(maxlen=_HISTORY_LENGTH)
+        self._progress = Progress()
 
     def _prepare(self, gait: Gait) -> None:
         """Check the friction that a gait needs, and make the controllers of its stances."""
@@ -480,8 +474,7 @@ class Walk:
 
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
-        if not hasattr(self, "_controllers"):  # the constructor is still checking its arguments
-            return
+        # fractions in the first period, and later
         self._speeds = speed_fractions(
             self._gait,
             self._posture,
@@ -496,19 +489,20 @@ class Walk:
 
     def _refresh(self) -> None:
         """Apply a new desired motion or pose to the plan in use."""
-        active = self._active
+        progress, active = self._progress, self._progress.active
         if active is not None:
             swinging, time = bool(active.plan.planned_swings), active.path.time
-            self._desired = self._desired_motion(swinging, time)
-            self._active = active.changed(self._desired, self._leaning_pose)
+            progress.desired = self._desired_motion(swinging, time)
+            progress.active = active.changed(progress.desired, self._leaning_pose)
 
     def _desired_motion(self, swinging: bool, t: float) -> DesiredMotion:
         """Return the motion that the path approaches from t [s] on.
 
         The path does not move before the first lift-off or after the last touchdown.
         """
-        gait, motion = self._clock.gait, np.array([*self._velocity, self._yaw_rate])
-        if not (swinging or self._clock.lifts_later(t)):
+        clock, motion = self._progress.clock, np.array([*self._velocity, self._yaw_rate])
+        gait = clock.gait
+        if not (swinging or clock.lifts_later(t)):
             motion = np.zeros(3)
         first, later = (fraction * motion for fraction in self._speeds)
         first_until = gait.start + gait.period
@@ -516,46 +510,49 @@ class Walk:
 
     def _change(self, state: State, t: float) -> None:
         """Start, or change stance or gait, if it is time to do so."""
-        active, posture, names = self._active, self._posture, self._all_contacts.names
+        progress, posture, names = self._progress, self._posture, self._all_contacts.names
+        active = progress.active
         if active is None:
-            self._start_time, self._clock = t, GaitClock(self._gait, t)
-            stance = self._clock.stance(names, t)
+            progress.start_time = t
+            progress.clock = GaitClock(self._gait, t)
+            stance = progress.clock.stance(names, t)
             path, footing = first_path(posture, state, t), first_footing(posture, state)
             swings: dict[str, SwingPath] = {}
         else:
             swinging = bool(active.plan.planned_swings)
             delay = partial(weight_shift, posture, state, t) if self.waits_for_weight else None
-            new_gait = self._clock.update(self._gait, swinging, t, delay)
+            new_gait = progress.clock.update(self._gait, swinging, t, delay)
             self._refresh()
-            stance, swings = self._clock.stance(names, t), active.swings
+            stance, swings = progress.clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
-                self._next_change = self._clock.next_change(t, active.plan.replan_time)
+                progress.next_change = progress.clock.next_change(t, active.plan.replan_time)
                 return
             footing, shift = next_footing(active.plan, swings, state, stance, t)
-            path = active.path.moved(self._desired, t)
+            path = active.path.moved(progress.desired, t)
             path = replace(path, position=path.position + shift)
             swings = {foot: swing for foot, swing in swings.items() if foot not in stance}
-        self._planning_path, self._desired = path, self._desired_motion(bool(swings), t)
+        progress.planning_path = path
+        progress.desired = self._desired_motion(bool(swings), t)
         try:
             plan = make_plan(
-                posture, self._options, state, path, self._clock.gait, stance, footing,
+                posture, self._options, state, path, progress.clock.gait, stance, footing,
                 lambda foot, touchdown: self._options.foothold(foot, touchdown, self),
                 lambda time: self.path_at(time).yaw,
                 active.plan if active else None,
                 swings,
             )  # fmt: skip
         finally:
-            self._planning_path = None
+            progress.planning_path = None
         plan = self._modified(plan, state)
-        self._history.append(plan)
+        progress.history.append(plan)
         self._update_lean(plan)
-        self._controllers.plan, controller = plan, self._controllers[stance]
-        self._active = ActivePlan(
-            posture, plan, self._desired, self._leaning_pose, self._options.reach,
-            controller.targets,
-            self._options.adjustment, controller.compiled is not None,
+        self._controllers.plan = plan
+        controller = self._controllers[stance]
+        progress.active = ActivePlan(
+            posture, plan, progress.desired, self._leaning_pose, self._options.reach,
+            controller.targets, self._options.adjustment, controller.compiled is not None,
         )  # fmt: skip
-        self._next_change = self._clock.next_change(t, plan.replan_time)
+        progress.next_change = progress.clock.next_change(t, plan.replan_time)
 
     def _modified(self, plan: StepPlan, state: State) -> StepPlan:
         """Return the plan to use instead of a new plan at the measured state."""
@@ -572,7 +569,7 @@ class Walk:
     @property
     def _leaning_pose(self) -> BodyPose:
         """The requested height and pitch, with the lean of the body on a known ground."""
-        return BodyPose(self._pose.height, self._pose.pitch + self._lean)
+        return BodyPose(self._pose.height, self._pose.pitch + self._progress.lean)
 
     def _update_lean(self, plan: StepPlan) -> None:
         """Turn the body towards the slope below the feet, if the ground is known.
@@ -584,7 +581,7 @@ class Walk:
             return
         heading = np.array([cos(plan.path.yaw), sin(plan.path.yaw)])
         uphill = float(np.arctan(plan.ground.slope @ heading))
-        self._lean += _LEAN_FRACTION * (-uphill - self._lean)
+        self._progress.lean += _LEAN_FRACTION * (-uphill - self._progress.lean)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""

@@ -99,10 +99,8 @@ class LIPM(Value):
             if not isinstance(segment, list | tuple) or len(segment) != 4:
                 raise InputError(f"{form}, but one of its entries is {short_repr(segment)}.")
             begin, end, p0, p1 = segment
-            begin, end = (
-                as_number("begin of a segment", begin, "s"),
-                as_number("end of a segment", end, "s"),
-            )
+            begin = as_number("begin of a segment", begin, "s")
+            end = as_number("end of a segment", end, "s")
             if not end > begin or (segments and abs(segments[-1][1] - begin) > _MAX_GAP):
                 raise InputError(
                     f"A segment of the ZMP goes from {begin:g} to {end:g} s. Each segment must end "
@@ -192,7 +190,9 @@ class LIPM(Value):
         computed backwards from the end, by the DCM, and b forwards from the beginning, by the CoM.
         The last segment continues indefinitely: the ZMP does not move, and the CoM approaches it.
         """
-        omega, xi, divergent = self.omega, self.segments[-1][3], []
+        omega = self.omega
+        xi = self.segments[-1][3]
+        divergent = []
         for begin, end, p0, p1 in reversed(self.segments):
             slope = (p1 - p0) / (end - begin)
             ahead = (xi - p1 - slope / omega) * np.exp(-omega * (end - begin))
@@ -215,7 +215,6 @@ class LIPM(Value):
         begin, p0, slope, a, b = next(
             solution for solution in reversed(self._closed_form) if solution[0] <= t
         )
-        growth = np.exp(
-            min(self.omega * (t - begin), _MAX_EXPONENT)
-        )  # beyond the last segment a is 0
+        # beyond the last segment a is 0
+        growth = np.exp(min(self.omega * (t - begin), _MAX_EXPONENT))
         return p0 + slope * (t - begin), slope, a * growth, b / growth

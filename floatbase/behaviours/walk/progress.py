@@ -1,11 +1,19 @@
-"""`GaitClock`: the gait that a walk uses, which follows the requested one."""
+"""`Progress`: what a walk remembers between control steps, and `GaitClock`, the gait in use."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from math import inf
 
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
+from floatbase.behaviours.walk.active_plan import ActivePlan
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE, Gait
+from floatbase.behaviours.walk.path import DesiredMotion, Path
+from floatbase.behaviours.walk.plan import StepPlan
+
+_RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
+_HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
 
 
 class GaitClock:
@@ -54,3 +62,24 @@ class GaitClock:
         The result is at most 5 s later than t.
         """
         return min(self.gait.phases(t, 1)[0][1], replan_time) - TIME_TOLERANCE
+
+
+@dataclass(eq=False)
+class Progress:
+    """What a walk remembers from one control step to the next, until it starts again."""
+
+    time: float = -inf  # of the last control step [s]
+    start_time: float = -inf
+    next_change: float = -inf
+    lean: float = 0.0  # of the body with the slope of a known ground [rad]
+    active: ActivePlan | None = None
+    planning_path: Path | None = None  # while a plan is being made
+    history: deque[StepPlan] = field(default_factory=lambda: deque(maxlen=_HISTORY_LENGTH))
+    # set by the first control step
+    clock: GaitClock = field(init=False)
+    desired: DesiredMotion = field(init=False)
+
+    def continues(self, t: float) -> bool:
+        """Return whether a time [s] follows the last control step, so that the walk continues."""
+        follows = self.time - TIME_TOLERANCE <= t <= self.time + _RESTART_GAP
+        return self.active is not None and t > self.start_time and follows

@@ -388,11 +388,9 @@ class Gait(Value):
         list of (float, float, tuple of str)
             Beginning, end [s] and standing feet of each period.
         """
-        n, t, max_duration = (
-            as_integer("n", n, 1, _MAX_PHASES),
-            as_number("t", t, "s"),
-            as_positive("max_duration", max_duration, "s"),
-        )
+        n = as_integer("n", n, 1, _MAX_PHASES)
+        t = as_number("t", t, "s")
+        max_duration = as_positive("max_duration", max_duration, "s")
         phases: list[tuple[float, float, tuple[str, ...]]] = []
         while len(phases) < n:
             end = self._next_contact_change(t)
@@ -446,10 +444,8 @@ class Gait(Value):
         """Return when a foot next lifts off or lands after a time [s]."""
         times = [inf]
         for foot in self.offsets:
-            current, upcoming = (
-                self.swing_at(foot, t),
-                self.next_swing(foot, t + 2.0 * TIME_TOLERANCE),
-            )
+            current = self.swing_at(foot, t)
+            upcoming = self.next_swing(foot, t + 2.0 * TIME_TOLERANCE)
             times += [current[1]] if current else []
             times += [upcoming[0]] if upcoming else []
         return min(times)

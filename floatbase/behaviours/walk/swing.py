@@ -9,15 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._geometry import minimum_jerk
-from floatbase._validation import (
-    Array,
-    Value,
-    as_array,
-    as_number,
-    as_positive,
-    checked,
-    read_only,
-)
+from floatbase._validation import Array, Value, as_array, as_number, as_positive, checked, read_only
 from floatbase.errors import InputError
 
 _MIN_DURATION = 1e-3  # s: a shorter swing must be in another unit

@@ -1,4 +1,4 @@
-"""Gains of a `Walk`, and checks of its other options."""
+"""Gains of a `Walk`, and checks of its other arguments."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from floatbase._validation import (
     as_array,
     as_callable,
     as_instance,
+    as_number,
     as_positive,
     checked,
     numeric_copy,
     short_repr,
 )
-from floatbase.behaviours.gait import Gait
-from floatbase.behaviours.swing import Swing, SwingPath
 from floatbase.behaviours.terrain import Terrain, as_terrain
+from floatbase.behaviours.walk.gait import Gait, check_always_supported
+from floatbase.behaviours.walk.swing import Swing, SwingPath
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError
@@ -31,6 +32,7 @@ from floatbase.objectives import Task
 from floatbase.robots import State
 
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
+_MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
 
 
@@ -107,6 +109,7 @@ class WalkOptions:
     @staticmethod
     def checked(
         contacts: Contacts,
+        *,
         clearance: float,
         reach: float | None,
         ramp: float,
@@ -136,19 +139,21 @@ class WalkOptions:
         if not isinstance(tasks, list | tuple):
             raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
         example = "swing(start, end, lift_off, touchdown, clearance)"
+        if gains is None:
+            gains = Gains.for_contacts(contacts)
         return WalkOptions(
-            as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
-            as_positive("reach", reach, "m", maximum=1.0),
-            as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
-            as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
-            adjustment,
-            modify_plan,
-            Swing if swing is None else as_callable("swing", swing, example),
-            as_terrain("ground", ground),
-            tuple(tasks),
-            np.array([forwards, forwards, turning]),
-            Gains.for_contacts(contacts) if gains is None else as_instance("gains", gains, Gains),
-            controller,
+            clearance=as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
+            reach=as_positive("reach", reach, "m", maximum=1.0),
+            ramp=as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
+            foothold=as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
+            adjustment=adjustment,
+            modify_plan=modify_plan,
+            swing=Swing if swing is None else as_callable("swing", swing, example),
+            ground=as_terrain("ground", ground),
+            tasks=tuple(tasks),
+            acceleration=np.array([forwards, forwards, turning]),
+            gains=as_instance("gains", gains, Gains),
+            controller=controller,
         )
 
 
@@ -172,15 +177,33 @@ def check_options(behaviour: str, options: Iterable[str]) -> None:
             )
 
 
-def check_gait_feet(gait: Gait, contacts: Contacts) -> None:
-    """Raise `InputError` for a gait with a foot that is not a contact."""
-    for foot in gait.feet:
+def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:
+    """Return a gait after checking that its feet are contacts and that a foot always stands.
+
+    may_fly: whether all feet may be in the air.
+    """
+    for foot in as_instance("gait", gait, Gait, "Gait.trot(robot)").feet:
         if foot not in contacts.names:
             names = ", ".join(contacts.names) or "none"
             raise InputError(
                 f"The gait lifts {foot}, which is not among the contacts: {names}. "
                 f"Contacts.feet(robot) returns all feet of a robot."
             )
+    if len(gait.feet) == len(contacts) and not may_fly:
+        check_always_supported(gait)
+    return gait
+
+
+def as_velocity(velocity: npt.ArrayLike) -> Array:
+    """Return a desired velocity, (2,), checked."""
+    velocity = as_array("velocity", velocity, (2,), "m/s")
+    as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+    return velocity
+
+
+def as_yaw_rate(yaw_rate: float) -> float:
+    """Return a desired yaw rate, checked."""
+    return as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
 
 
 def as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:

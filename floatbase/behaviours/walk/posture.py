@@ -7,9 +7,9 @@ from math import copysign, hypot, sqrt
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.behaviours.options import flat_foot_names
-from floatbase.behaviours.path import rotated_by_yaw
 from floatbase.behaviours.terrain import Plane
+from floatbase.behaviours.walk.options import flat_foot_names
+from floatbase.behaviours.walk.path import rotated_by_yaw
 from floatbase.dynamics import Contacts
 from floatbase.robots import State
 
@@ -22,7 +22,9 @@ class WalkingPosture:
     """Feet and centre of mass of a robot in its standing posture."""
 
     def __init__(self, contacts: Contacts, state: State):
-        self.contacts, self.state, self.flat_feet = contacts, state, flat_foot_names(contacts)
+        self.contacts = contacts
+        self.state = state
+        self.flat_feet = flat_foot_names(contacts)
         self._centre_offsets = {name: self._centre_offset(name) for name in contacts.names}
         positions = {name: state.point(name) for name in contacts.names}
         centre = np.mean(

@@ -16,15 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_array, frozen
-from floatbase.behaviours.footholds import capture_point, support_margin
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait
-from floatbase.behaviours.lipm import LIPM, CoMPlan, ZMPSegment
-from floatbase.behaviours.options import WalkOptions
-from floatbase.behaviours.path import Path, yaw_of
-from floatbase.behaviours.posture import WalkingPosture
-from floatbase.behaviours.speed import MAX_FEET_WITH_SWAY
-from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.terrain import Plane, Terrain
+from floatbase.behaviours.walk.footholds import capture_point, support_margin
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE, Gait
+from floatbase.behaviours.walk.gait_limits import MAX_FEET_WITH_SWAY
+from floatbase.behaviours.walk.lipm import LIPM, CoMPlan, ZMPSegment
+from floatbase.behaviours.walk.options import WalkOptions
+from floatbase.behaviours.walk.path import Path, yaw_of
+from floatbase.behaviours.walk.posture import WalkingPosture
+from floatbase.behaviours.walk.swing import SwingPath
 from floatbase.errors import InputError
 from floatbase.robots import State
 

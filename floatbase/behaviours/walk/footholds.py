@@ -1,15 +1,23 @@
-"""Foothold rules: the neutral point, the capture point, and the step adjustment of `Walk`."""
+"""Foothold rules: neutral point, capture point, step adjustment, and the footholds of `Walk`."""
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from floatbase._geometry import convex_hull, distance_to_polygon
 from floatbase._validation import Array, as_array, as_number, as_positive, read_only
+from floatbase.behaviours._level_place import foot_outline, level_place
+from floatbase.behaviours.walk.gait import Gait
+from floatbase.behaviours.walk.options import WalkOptions
+from floatbase.behaviours.walk.path import Path
 from floatbase.errors import InputError
+from floatbase.robots import Robot
 
 _MAX_EXPONENT = 50.0  # ω times a time: an error that grows by e^{50} is beyond any robot's reach
+_EDGE_REACH = 0.15  # m: footholds are moved by at most this much to avoid an edge
 
 
 def neutral_point(
@@ -42,10 +50,8 @@ def neutral_point(
     >>> neutral_point([0.2, 0.1], [0.4, 0.0], 0.5)
     array([0.3, 0.1])
     """
-    nominal_foothold, velocity = (
-        as_array("nominal_foothold", nominal_foothold, (2,), "m"),
-        as_array("velocity", velocity, (2,), "m/s"),
-    )
+    nominal_foothold = as_array("nominal_foothold", nominal_foothold, (2,), "m")
+    velocity = as_array("velocity", velocity, (2,), "m/s")
     return read_only(
         nominal_foothold
         + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0
@@ -169,3 +175,68 @@ def step_adjustment(
         0.0, as_number("time_to_touchdown", time_to_touchdown, "s")
     )
     return read_only(scale * np.exp(min(exponent, _MAX_EXPONENT)) * error)
+
+
+class Walking(Protocol):
+    """A walk, such as `Walk`, that needs a foothold."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def options(self) -> WalkOptions:
+        """Options that do not change."""
+
+    @property
+    def gait(self) -> Gait:
+        """The contact schedule."""
+
+    @property
+    def omega(self) -> float:
+        """Natural frequency of the pendulum [1/s]."""
+
+    def path_at(self, t: float) -> Path:
+        """Predict the path of the body at t [s]."""
+
+    def nominal_foothold(self, foot: str, t: float) -> Array:
+        """Return where a foot would stand below the body at t [s], shape (2,) [m]."""
+
+
+def raibert_foothold(foot: str, touchdown: float, walk: Walking) -> Array:
+    """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
+
+    Where the body turns, the velocity is that of the foot's nominal position. The foothold also
+    lies farther outside by a / ω², where a is the centripetal acceleration. The reason is that the
+    centre of mass of a pendulum moves on a smaller circle than its zero-moment point.
+
+    Parameters
+    ----------
+    foot : str
+        Name of the foot.
+    touchdown : float
+        Time at which the foot lands [s].
+    walk : Walk
+        The walk.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Foothold in the world frame [m].
+
+    Notes
+    -----
+    The rule is from [Raibert1986]_.
+    """
+    gait, path = walk.gait, walk.path_at(touchdown)
+    velocity = path.point_velocity(np.zeros(2))
+    nominal, yaw_rate = walk.nominal_foothold(foot, touchdown), path.velocity[2]
+    arm = nominal - path.position
+    turning = yaw_rate * np.array([-arm[1], arm[0]])
+    centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
+    point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
+    foothold: Array = point - centripetal / walk.omega**2
+    if walk.options.ground is None:
+        return foothold
+    around = foot_outline(walk.robot.foot(foot), path.yaw)
+    return level_place(walk.options.ground, foothold, around, _EDGE_REACH)
