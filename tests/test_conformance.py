@@ -177,7 +177,7 @@ def right() -> dict[str, Any]:
         "a": 10.0,
         "flat_feet.robot": talos,
         "Gait.walk.robot": talos, "with_floating_base.robot": judges.load("ur5"),
-        "force": np.array([0.1, 0.0, 1.0]),
+        "force": np.array([0.1, 0.0, 1.0]), "Push.horizontal.force": 40.0,
         "cost": fb.Quadratic.zero(space.dimension),
         "f": fb.Affine(np.eye(12), ZERO), "residual": fb.Affine(np.eye(12), ZERO),
         "parts": fb.Affine(np.eye(12), ZERO),

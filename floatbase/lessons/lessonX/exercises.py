@@ -244,7 +244,7 @@ def _reports() -> list[Example]:
 
 
 def _programs() -> list[Example]:
-    found = investigation.investigate
+    found = cache(investigation.investigate)
     return [
         (found, ""), (lambda box: "nothing", "not nothing"),
         (lambda box: "friction 0.55", "evidence"),

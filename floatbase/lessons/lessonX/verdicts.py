@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -162,6 +163,7 @@ def _mass(case: Case, box: BlackBox) -> _Evidence:
     )
 
 
+@lru_cache(maxsize=8)  # it needs the equations of motion of hundreds of rows
 def _drift(case: Case, box: BlackBox) -> _Evidence:
     b = np.array([np.asarray(box.equations(i).b) for i in np.flatnonzero(box.time < DRIFT_TIME)])
     late = max(float(np.abs(box.equations(i).b).max()) for i in range(0, len(box), 5))
