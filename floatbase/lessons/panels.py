@@ -75,13 +75,8 @@ class SliderPanel(widgets.VBox):
         row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
         top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
-        self.view, self.sliders, self.note, self.beside, self.samples = (
-            view,
-            sliders,
-            note,
-            beside,
-            samples,
-        )
+        self.view, self.sliders, self.note = view, sliders, note
+        self.beside, self.samples = beside, samples
         self._draw = draw
         for slider in sliders.values():
             slider.observe(self._redraw, names="value")

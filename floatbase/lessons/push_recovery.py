@@ -139,10 +139,8 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
 
 def measure_push_recovery(lesson: str) -> PushRecovery:
     """Measure the push-recovery map of a lesson and store it."""
-    make, watch = (
-        controller_factory(lesson),
-        getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME),
-    )
+    make = controller_factory(lesson)
+    watch = getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME)
     recovery = push_recovery(
         make, directions=_DIRECTIONS, resolution=_STEP, duration=_DURATION, observation_time=watch
     )

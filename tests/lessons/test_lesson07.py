@@ -8,7 +8,6 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pytest
 
 import floatbase as fb
 from floatbase.lessons.lesson03 import standing_go2_eom
@@ -17,12 +16,10 @@ from floatbase.lessons.lesson07 import (
     make_controller,
     median_time_ms,
     multiplier_text,
-    plot_com_distance,
     plot_one_foot,
     run_with_push,
     tuned_controller,
 )
-from floatbase.viewer.scene.colours import GREYS, hex_code
 
 STATE = standing_go2_eom().state
 GO2 = STATE.robot
@@ -49,19 +46,6 @@ def test_a_note_names_the_constraints_with_the_largest_multipliers_first() -> No
     note = multiplier_text(solution)
     prices = [float(text) for text in re.findall(r"([\d.]+) \(\w+ facet \d\)", note)]
     assert prices == sorted(prices, reverse=True) and len(prices) == len(solution.active) == 4
-
-
-def test_pictures_show_what_they_are_given() -> None:
-    record = run_with_push(make_controller(), 60.0, 0.3)
-    ways: Any = plot_com_distance({"one": record})
-    com, feet = ways.axes
-    assert com.lines[0].get_ydata().max() == pytest.approx(
-        1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1).max()
-    )
-    assert feet.lines[0].get_ydata().max() == pytest.approx(1e3 * record.slip().max())
-    lines = [line for axis in ways.axes for line in axis.lines]
-    assert {line.get_color() for line in lines} <= {hex_code(grey) for grey in GREYS}
-    plt.close("all")
 
 
 def test_the_force_of_one_foot_lies_in_the_corner_of_two_constraints() -> None:

@@ -65,10 +65,8 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06)
         view.show(state, com=False, extra=extra)
-        tau, limits = (
-            abs(state.h - state.frame_jacobian("tool0")[:3].T @ force),
-            state.robot.torque_limits,
-        )
+        tau = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force)
+        limits = state.robot.torque_limits
         busiest = int(np.argmax(tau / limits))
         return (
             f"wall on tool <b>{rounded(-press, 'N', 3)}</b>, bolts on base "

@@ -9,4 +9,4 @@ from floatbase.lessons.lesson07.helpers import (
     run_with_push,
     tuned_controller,
 )
-from floatbase.lessons.lesson07.pictures import multiplier_text, plot_com_distance, plot_one_foot
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot

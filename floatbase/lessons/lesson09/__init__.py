@@ -18,7 +18,6 @@ from floatbase.lessons.lesson09.pictures import (
     SOLES_VIEW,
     limit_kinds,
     play_resultants,
-    plot_lean,
     plot_walk,
     show_sole,
     show_soles,

@@ -66,10 +66,8 @@ def corner_table(
         The problem.
     """
     H = np.diag(as_array("curvature", curvature, (2,)))
-    G, h = (
-        np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]]),
-        np.array([0.0, 2.0, 2.0, 3.0]),
-    )
+    G = np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]])
+    h = np.array([0.0, 2.0, 2.0, 3.0])
     return fb.QP(
         H,
         -H @ as_array("minimum", minimum, (2,)),

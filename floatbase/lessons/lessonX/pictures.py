@@ -129,10 +129,8 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
     """
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
     commanded = box.tau[: len(got)]
-    orders, both = (
-        lagged(commanded, period, ms),
-        np.concatenate([got[:, joint], commanded[:, joint], [0.0]]),
-    )
+    orders = lagged(commanded, period, ms)
+    both = np.concatenate([got[:, joint], commanded[:, joint], [0.0]])
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
     drawn = frame.ticks()
     drawn += frame.curve(times, got[:, joint], stroke=hex_code(GREYS[2]), stroke_width=6)
