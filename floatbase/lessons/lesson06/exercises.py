@@ -62,6 +62,34 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
     return np.asarray(rows / np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)[:, None])
 
 
+def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
+    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
+    n = BANK / np.linalg.norm(BANK)
+    t1, t2 = tangents(n)
+    angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
+    directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
+    return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))
+
+
+def _facet_mistakes() -> list[Mistake]:
+    return [
+        ("zero", np.zeros((5, 3)), "There is no answer yet. Zero rows allow every force."),
+        ("outside", _rows_from_edges(BANK_MU / np.cos(np.pi / 5)), "That polyhedron is outside the "
+         "cone: its facets touch the cone in their middle."),
+        ("not_unit", _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK), "The normal is not a unit "
+         "vector. Normalize it before you use it for the friction term."),
+        ("sign", -_rows_from_edges(), "The sign is wrong. rows @ f ≤ 0 must hold for forces "
+         "inside."),
+        ("normal_sign", _with_tangents(-BANK_MU * np.cos(np.pi / 5)), "The sign of the normal "
+         "component is wrong. With a plus, the constraints forbid pushing."),
+        ("no_mu", _rows_from_edges(1.0), "μ is missing: these are the facets for μ = 1."),
+        ("turned", _rows_from_edges(turn=np.pi / 5), "The facets are rotated by half a facet. "
+         "Facet 0 must face t1."),
+        ("level", _rows_from_edges(normal=[0.0, 0.0, 1.0]), "These are the constraints on level "
+         "ground. Use the given normal."),
+    ]  # fmt: skip
+
+
 def _slip_angle(facets: int | None = FACETS, inside: bool = True, mu: float = MU) -> float:
     """Find the steepest slope [°] whose cone contains a vertical force, by bisection."""
     low, high = 0.0, 89.0
@@ -208,25 +236,6 @@ def _slope_judge(mu: float = MU) -> NumericJudge:
     )
 
 
-def _facet_mistakes() -> list[Mistake]:
-    return [
-        ("zero", np.zeros((5, 3)), "There is no answer yet. Zero rows allow every force."),
-        ("outside", _rows_from_edges(BANK_MU / np.cos(np.pi / 5)), "That polyhedron is outside the "
-         "cone: its facets touch the cone in their middle."),
-        ("not_unit", _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK), "The normal is not a unit "
-         "vector. Normalize it before you use it for the friction term."),
-        ("sign", -_rows_from_edges(), "The sign is wrong. rows @ f ≤ 0 must hold for forces "
-         "inside."),
-        ("normal_sign", _with_tangents(-BANK_MU * np.cos(np.pi / 5)), "The sign of the normal "
-         "component is wrong. With a plus, the constraints forbid pushing."),
-        ("no_mu", _rows_from_edges(1.0), "μ is missing: these are the facets for μ = 1."),
-        ("turned", _rows_from_edges(turn=np.pi / 5), "The facets are rotated by half a facet. "
-         "Facet 0 must face t1."),
-        ("level", _rows_from_edges(normal=[0.0, 0.0, 1.0]), "These are the constraints on level "
-         "ground. Use the given normal."),
-    ]  # fmt: skip
-
-
 EXERCISES = (
     Exercise(
         name="06.1",
@@ -285,12 +294,3 @@ EXERCISES = (
         "moves tangential force from the front feet to the rear feet, which carry more.",
     ),
 )
-
-
-def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
-    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
-    n = BANK / np.linalg.norm(BANK)
-    t1, t2 = tangents(n)
-    angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
-    directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
-    return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))

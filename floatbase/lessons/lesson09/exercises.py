@@ -65,6 +65,31 @@ def _pushed() -> Array:
     )[:2]
 
 
+def _pressure_mistakes() -> list[Mistake]:
+    f, (tx, ty, _) = ankle_sensor_reading()[:3], ankle_sensor_reading()[3:]
+    right = _pushed()
+
+    def read(height: float) -> Array:
+        """Compute the centre of pressure at a height above the sensor."""
+        return np.array([-ty + height * f[0], tx + height * f[1]]) / f[2]
+
+    return [
+        ("zero", np.zeros(2), "There is no answer yet: this is the point below the sensor."),
+        ("no_height", read(0.0), "The height of the ankle is missing. The formula in the lesson is "
+         "for a point on the ground."),
+        ("height_sign", read(ANKLE), "The sign of the height is wrong: the ground is below the "
+         "sensor."),
+        ("swapped", read(-ANKLE)[::-1], "x and y are swapped. A force further ahead has a moment "
+         "about y."),
+        ("no_height_swapped", read(0.0)[::-1], "The height is missing, and x and y are swapped."),
+        ("sign", -read(-ANKLE), "The sign is wrong: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0)."),
+        ("millimetres", 1e3 * right, "That is in mm. The answer must be in m."),
+        ("not_divided", right * f[2], "These are moments. Divide them by the normal force."),
+        ("whole_force", right * f[2] / np.linalg.norm(f), "The normal force is f_z alone, not the "
+         "magnitude of f."),
+    ]  # fmt: skip
+
+
 # 09.2 ---------------------------------------------------------------------------------------------
 
 
@@ -74,6 +99,39 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU, load: float = LOAD) -> floa
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
     limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), load, np.full(4, np.inf))
     return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, load, 0.0, 0.0, 0.0])
+
+
+def _twist_mistakes(load: float) -> list[Mistake]:
+    right, friction = _twist(load=load), SOLE_MU * load
+    return [
+        ("zero", 0.0, "There is no answer yet."),
+        ("pyramids", _twist(4, load=load), "That is for pyramids with four facets inside the "
+         "cones. Here the cones are round."),
+        ("half_length", friction * LENGTH / 2, "That is μ f_z times half the length. The lever arm "
+         "of a corner goes from the middle to the corner."),
+        ("half_width", friction * WIDTH / 2, "That is μ f_z times half the width. The lever arm of "
+         "a corner goes from the middle to the corner."),
+        ("whole_sides", friction * np.hypot(LENGTH, WIDTH), "Use half the sides, not the sides: "
+         "the lever arms begin in the middle."),
+        ("one_corner", right / 4, "That is for one corner, but four corners carry the load."),
+        ("four_times", 4 * right, "Four corners share the load, so each has a quarter of it."),
+        ("no_mu", right / SOLE_MU, "μ is missing: friction is less than the normal force."),
+        ("mu_of_lesson", _twist(mu=MU, load=load), "That is for the μ of the lesson. Here it is "
+         "0.6."),
+        ("square", friction * (LENGTH + WIDTH) / 2, "Half the length plus half the width is the "
+         "lever arm for square pyramids. Use the distance."),
+        ("disc", 2 / 3 * friction * LENGTH / 2, "That is for a disc with the length of the sole "
+         "and uniform pressure: 2/3 μ f_z times its radius."),
+    ]  # fmt: skip
+
+
+def _twist_judge(load: float = LOAD) -> NumericJudge:
+    """Return the judge of exercise 09.2 for the force on the sole [N]."""
+    return NumericJudge(
+        right=lambda: _twist(load=load),
+        praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
+        mistakes=lambda: _twist_mistakes(load),
+    )
 
 
 # 09.3 ---------------------------------------------------------------------------------------------
@@ -141,64 +199,6 @@ def _leans() -> list[Example]:
         ((0.6, 0.01), "tips"), ((1.1, 0.01), "toes"),
         ((1.3, 0.1), "short"), ((3.0, 0.01), "slow"), ((-1.0, 0.1), "range"),
         ((1.0, -0.1), "range"),
-    ]  # fmt: skip
-
-
-def _twist_mistakes(load: float) -> list[Mistake]:
-    right, friction = _twist(load=load), SOLE_MU * load
-    return [
-        ("zero", 0.0, "There is no answer yet."),
-        ("pyramids", _twist(4, load=load), "That is for pyramids with four facets inside the "
-         "cones. Here the cones are round."),
-        ("half_length", friction * LENGTH / 2, "That is μ f_z times half the length. The lever arm "
-         "of a corner goes from the middle to the corner."),
-        ("half_width", friction * WIDTH / 2, "That is μ f_z times half the width. The lever arm of "
-         "a corner goes from the middle to the corner."),
-        ("whole_sides", friction * np.hypot(LENGTH, WIDTH), "Use half the sides, not the sides: "
-         "the lever arms begin in the middle."),
-        ("one_corner", right / 4, "That is for one corner, but four corners carry the load."),
-        ("four_times", 4 * right, "Four corners share the load, so each has a quarter of it."),
-        ("no_mu", right / SOLE_MU, "μ is missing: friction is less than the normal force."),
-        ("mu_of_lesson", _twist(mu=MU, load=load), "That is for the μ of the lesson. Here it is "
-         "0.6."),
-        ("square", friction * (LENGTH + WIDTH) / 2, "Half the length plus half the width is the "
-         "lever arm for square pyramids. Use the distance."),
-        ("disc", 2 / 3 * friction * LENGTH / 2, "That is for a disc with the length of the sole "
-         "and uniform pressure: 2/3 μ f_z times its radius."),
-    ]  # fmt: skip
-
-
-def _twist_judge(load: float = LOAD) -> NumericJudge:
-    """Return the judge of exercise 09.2 for the force on the sole [N]."""
-    return NumericJudge(
-        right=lambda: _twist(load=load),
-        praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
-        mistakes=lambda: _twist_mistakes(load),
-    )
-
-
-def _pressure_mistakes() -> list[Mistake]:
-    f, (tx, ty, _) = ankle_sensor_reading()[:3], ankle_sensor_reading()[3:]
-    right = _pushed()
-
-    def read(height: float) -> Array:
-        """Compute the centre of pressure at a height above the sensor."""
-        return np.array([-ty + height * f[0], tx + height * f[1]]) / f[2]
-
-    return [
-        ("zero", np.zeros(2), "There is no answer yet: this is the point below the sensor."),
-        ("no_height", read(0.0), "The height of the ankle is missing. The formula in the lesson is "
-         "for a point on the ground."),
-        ("height_sign", read(ANKLE), "The sign of the height is wrong: the ground is below the "
-         "sensor."),
-        ("swapped", read(-ANKLE)[::-1], "x and y are swapped. A force further ahead has a moment "
-         "about y."),
-        ("no_height_swapped", read(0.0)[::-1], "The height is missing, and x and y are swapped."),
-        ("sign", -read(-ANKLE), "The sign is wrong: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0)."),
-        ("millimetres", 1e3 * right, "That is in mm. The answer must be in m."),
-        ("not_divided", right * f[2], "These are moments. Divide them by the normal force."),
-        ("whole_force", right * f[2] / np.linalg.norm(f), "The normal force is f_z alone, not the "
-         "magnitude of f."),
     ]  # fmt: skip
 
 

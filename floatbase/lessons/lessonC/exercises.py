@@ -37,6 +37,31 @@ def _price() -> float:
     return (low - high) / (2 * h)
 
 
+def _price_of(curvature: Sequence[float]) -> float:
+    """Return the multiplier of C.1 for another bowl, from its equations."""
+    G, H = np.array([0.5, -1.0]), np.diag(curvature)
+    low = np.array([2.0, -2.0])
+    return float(G @ low / (G @ np.linalg.solve(H, G)))
+
+
+def _price_mistakes() -> list[Mistake]:
+    right, (along, height) = _price(), fb.solve(slanted_table()).x
+    return [
+        ("sign", -right, "The sign is wrong. With H x + g + Gᵀ μ = 0, the multiplier of a table "
+         "that pushes is positive."),
+        ("length", right * np.sqrt(1.25), "That is the magnitude of the gradient. A multiplier "
+         "belongs to the constraint as it is written, and this one has a normal of length √1.25."),
+        ("level", 8.0, "That is the multiplier of a level table. Here along and up both "
+         "contribute."),
+        ("no_curvature", _price_of([1.0, 1.0]), "The curvature of 4 is missing."),
+        ("no_half", 2.0 * right, "The objective has a ½ before each square."),
+        ("along", along, "That is the position of the marble along the table."),
+        ("height", height, "That is the height of the marble."),
+        ("distance", 3.0, "That is the violation of the constraint at the lowest point of the "
+         "bowl."),
+    ]  # fmt: skip
+
+
 # C.4 ----------------------------------------------------------------------------------------------
 
 
@@ -217,24 +242,6 @@ def _guesses() -> list[Example]:
     ]  # fmt: skip
 
 
-def _price_mistakes() -> list[Mistake]:
-    right, (along, height) = _price(), fb.solve(slanted_table()).x
-    return [
-        ("sign", -right, "The sign is wrong. With H x + g + Gᵀ μ = 0, the multiplier of a table "
-         "that pushes is positive."),
-        ("length", right * np.sqrt(1.25), "That is the magnitude of the gradient. A multiplier "
-         "belongs to the constraint as it is written, and this one has a normal of length √1.25."),
-        ("level", 8.0, "That is the multiplier of a level table. Here along and up both "
-         "contribute."),
-        ("no_curvature", _price_of([1.0, 1.0]), "The curvature of 4 is missing."),
-        ("no_half", 2.0 * right, "The objective has a ½ before each square."),
-        ("along", along, "That is the position of the marble along the table."),
-        ("height", height, "That is the height of the marble."),
-        ("distance", 3.0, "That is the violation of the constraint at the lowest point of the "
-         "bowl."),
-    ]  # fmt: skip
-
-
 EXERCISES = (
     Exercise(
         name="C.1",
@@ -284,10 +291,3 @@ EXERCISES = (
         "components of its force are fixed. FL, on which go2 leans, is free.",
     ),
 )
-
-
-def _price_of(curvature: Sequence[float]) -> float:
-    """Return the multiplier of C.1 for another bowl, from its equations."""
-    G, H = np.array([0.5, -1.0]), np.diag(curvature)
-    low = np.array([2.0, -2.0])
-    return float(G @ low / (G @ np.linalg.solve(H, G)))
