@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
-from floatbase.lessons.exercises import (
-    all_exercises,
-    check,
-    own_numbers,
-    reveal,
-    show_progress,
-)
+from floatbase.lessons.exercises import all_exercises, check, own_numbers, reveal, show_progress
 from floatbase.lessons.judges import NumericJudge
 from floatbase.lessons.predictions import compare, predict, review
 from floatbase.lessons.rounding import rounded

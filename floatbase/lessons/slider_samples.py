@@ -211,8 +211,7 @@ def recorded_pushes(
 
 def _record_push(sim: Simulation, controller: Controller, force: float, towards: float) -> Rollout:
     sim.reset()
-    angle = math.radians(towards)
-    push = Push(np.array([force * math.cos(angle), force * math.sin(angle), 0.0]), _PUSH_START, 0.1)
+    push = Push.horizontal(force, towards, _PUSH_START)
     record = rollout(sim, controller, _PUSH_START + _TIME_SEEN, [push], settling_time=0.5)
     sim.reset()
     return record

@@ -152,9 +152,7 @@ class Playground:
         size = as_number("force", self.force if force is None else force, "N")
         angle = as_number("towards", self.towards if towards is None else towards, "degrees")
         self.force, self.towards = size, angle
-        angle = math.radians(self.towards)
-        force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
-        self.last_push = fb.Push(force_now, frame=self.pushed_frame)
+        self.last_push = fb.Push.horizontal(size, angle, frame=self.pushed_frame)
         self.run.push(self.last_push.force, frame=self.pushed_frame)
         self._update_text()
 

@@ -110,6 +110,20 @@ def test_the_work_of_the_motors_is_what_the_energy_gains(name):
     assert abs(2.0 * misses[1] - misses[0]) < 0.02 * abs(work) and abs(work) > 1e-3
 
 
+def test_a_horizontal_push_has_its_magnitude_and_direction() -> None:
+    for towards, direction in (
+        (0.0, [1, 0, 0]),
+        (90.0, [0, 1, 0]),
+        (-135.0, [-(0.5**0.5)] * 2 + [0]),
+    ):
+        push = fb.Push.horizontal(40.0, towards, start=0.2, duration=0.3, frame="FL_foot")
+        np.testing.assert_allclose(push.force, 40.0 * np.array(direction), atol=1e-12)
+        assert (push.start, push.duration, push.frame) == (0.2, 0.3, "FL_foot")
+    np.testing.assert_allclose(
+        fb.Push.horizontal(-40.0, 30.0).force, fb.Push.horizontal(40.0, 210.0).force
+    )
+
+
 @pytest.mark.parametrize("force", [[30.0, 0.0, 0.0], [0.0, -20.0, 10.0]])
 def test_a_push_gives_the_momentum_force_times_time(name, force):
     sim = fb.Simulation(judges.load(name))

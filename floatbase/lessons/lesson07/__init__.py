@@ -1,6 +1,5 @@
 """Lesson 07, Control as a quadratic program."""
 
-from floatbase.lessons.lesson07.exercises import EXERCISES
 from floatbase.lessons.lesson07.helpers import (
     WithConstraints,
     WithoutInequalities,
@@ -11,16 +10,3 @@ from floatbase.lessons.lesson07.helpers import (
     tuned_controller,
 )
 from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot
-
-__all__ = [
-    "EXERCISES",
-    "WithConstraints",
-    "WithoutInequalities",
-    "leaning_controller",
-    "make_controller",
-    "median_time_ms",
-    "multiplier_text",
-    "plot_one_foot",
-    "run_with_push",
-    "tuned_controller",
-]  # fmt: skip

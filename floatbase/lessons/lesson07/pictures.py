@@ -1,4 +1,4 @@
-"""Lesson 07: a QP in the plane, displacements of the centre of mass, and multipliers."""
+"""Lesson 07: a QP in the plane, and multipliers."""
 
 from __future__ import annotations
 

@@ -124,17 +124,11 @@ def show_sole(
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
     possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
-    summary = (
-        "corner forces exist"
-        if possible
-        else f"impossible with corner forces: {_violated_limits(limits, w)}"
-    )
-    nearest = (
-        ""
-        if possible
-        else f"closest forces: off by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
-    )
-    return _slice(limits, w, summary, nearest)
+    if possible:
+        return _slice(limits, w, "corner forces exist", "")
+    summary = f"impossible with corner forces: {_violated_limits(limits, w)}"
+    off = f"{missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
+    return _slice(limits, w, summary, f"closest forces: off by {off}")
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
@@ -156,18 +150,17 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
     Viewer
         The viewer.
     """
-    rows = range(
-        0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0]))))
-    )
+    period = record.time[1] - record.time[0]
+    rows = range(0, len(record), max(1, round(speed / (_FRAME_RATE * period))))
     pictures = []
     for i in rows:
         state = record.state(i)
         picture = view.painter.picture(state)
         for contact, wrench in zip(record.contacts, record.planned[i].reshape(-1, 6), strict=True):
             f, tau = wrench[:3], wrench[3:]
-            ahead = (
-                np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > MIN_FORCE else np.full(3, np.inf)
-            )
+            if f[2] <= MIN_FORCE:
+                continue
+            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2]
             if np.linalg.norm(ahead) < _MAX_DISTANCE:
                 at = state.point(contact.name) + ahead
                 picture[f"planned/{contact.name}"] = shapes.arrow(
@@ -259,24 +252,11 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
         for name in step.stance:
             corners = record.contacts.only(name).positions(state)[:, :2]
             label = "_" if axis.patches else "soles"
-            axis.add_patch(
-                Polygon(
-                    corners,
-                    closed=True,
-                    color=hex_code(GREYS[2]),
-                    alpha=0.3,
-                    linewidth=0,
-                    label=label,
-                )
-            )
-    pushed, com = centre_of_pressure_path(record), record.com
-    axis.plot(
-        pushed[:, 0],
-        pushed[:, 1],
-        color=hex_code(GREYS[1]),
-        linewidth=1.5,
-        label="centre of pressure",
-    )
+            sole = Polygon(corners, color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label=label)
+            axis.add_patch(sole)
+    x, y = centre_of_pressure_path(record).T
+    axis.plot(x, y, color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    com = record.com
     axis.plot(com[:, 0], com[:, 1], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")

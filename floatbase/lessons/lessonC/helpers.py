@@ -176,8 +176,7 @@ def run_with_push(
     Rollout
         The record.
     """
-    angle = np.deg2rad(towards)
-    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    direction = fb.Push.horizontal(1.0, towards).force
     return lesson07.run_with_push(controller, newtons, duration, direction)
 
 

@@ -79,10 +79,9 @@ def exercise_form(exercise: Exercise) -> Any | None:
     if right.ndim > 1 or right.size > MAX_NUMBERS:
         return None
     cases = [{"right": _interval(right, judge.tolerance), "text": judge.praise}]
-    for hint, wrong in judge.mistakes.items():
-        value = np.asarray(wrong(), dtype=np.float64)
+    for _, wrong, text in judge.mistakes():
+        value = np.asarray(wrong, dtype=np.float64)
         if value.shape == right.shape:
-            text = judge.hints[hint]
             cases.append({"right": _interval(value, judge.tolerance), "text": text})
     if not judge.is_count:
         near, sign = max(NEAR_MISS, judge.tolerance), -right
