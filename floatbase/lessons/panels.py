@@ -175,6 +175,7 @@ def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlid
     low, first, high, unit, step = _checked_range(name, bounds)
     text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
     made = labelled_slider(text, low, first, high, step, on_release)
+    made.unit = unit  # of a static page's control, which has no caption
     made.layout.width = "80%"
     return made
 
