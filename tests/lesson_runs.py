@@ -18,19 +18,18 @@ from pathlib import Path
 from typing import Any
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
-PRINTED, RESULTS = "printed.txt", "results.json"
+PRINTED = "printed.txt"
 LONGEST = 200.0  # s that a lesson may take
 FORK = multiprocessing.get_context("fork")
 
 
 @dataclass(frozen=True)
 class Run:
-    """How a lesson ended: exit status, processor time [s], text printed, grades of its answers."""
+    """How a lesson ended: exit status of nbval, processor time [s], and what nbval printed."""
 
     status: int
     seconds: float
     printed: str
-    grades: dict[str, str]
 
 
 class LessonRunner:
@@ -47,17 +46,12 @@ class LessonRunner:
         self.pid = self._process.pid
 
     def run(self, path: Path, home: Path) -> Run:
-        """Run a lesson for a learner whose progress is in `home`, and grade all answers."""
+        """Run a lesson for a learner whose progress is in `home`."""
         assert self._process.stdin and self._process.stdout
         print(json.dumps({"path": str(path), "home": str(home)}), file=self._process.stdin)
         self._process.stdin.flush()
         answer = json.loads(self._process.stdout.readline())
-        results = path.parent / RESULTS
-        return Run(
-            **answer,
-            printed=(path.parent / PRINTED).read_text(),
-            grades=json.loads(results.read_text()) if results.exists() else {},
-        )
+        return Run(**answer, printed=(path.parent / PRINTED).read_text())
 
     def stop(self) -> None:
         """End the program."""
@@ -108,7 +102,7 @@ def _serve(file: str) -> None:
 
 
 def _run(path: str, home: str) -> None:
-    """Run a lesson by nbval, grade its answers, and exit with nbval's status."""
+    """Run a lesson by nbval, and exit with its status."""
     os.setpgrp()
     os.environ["FLOATBASE_HOME"] = home
     os.chdir(Path(path).parent)
@@ -126,18 +120,7 @@ def _run(path: str, home: str) -> None:
         status = pytest.main([*options, path])
     finally:
         kernel.shutdown_kernel(now=True)
-    if status == 0:
-        Path(RESULTS).write_text(json.dumps(_grades()))
     sys.exit(status)
-
-
-def _grades() -> dict[str, str]:
-    """Hand in what the learner answered; the result of each exercise."""
-    from floatbase.lessons import hand_in
-    from floatbase.lessons.publish import grades
-
-    marks = grades.grade_file(hand_in("Ada", Path.cwd())).results
-    return {mark.exercise: mark.result for mark in marks}
 
 
 def _prepare() -> None:

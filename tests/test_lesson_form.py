@@ -1,6 +1,4 @@
-"""The form of the lessons: a question, a prediction, a cell that does not know the answer, why, and
-then the claims.
-"""
+"""The form of the lessons: question, prediction, a cell that computes the answer, reason, claims."""
 
 from __future__ import annotations
 
@@ -91,7 +89,7 @@ def test_predictions_are_named_in_order(path: Path) -> None:
 
 
 @LESSONS
-def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: Path) -> None:
+def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
         asked = (
@@ -127,7 +125,7 @@ def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: P
 
 
 @LESSONS
-def test_every_prediction_is_compared_once_with_what_a_later_cell_computes(path: Path) -> None:
+def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) -> None:
     predicted, compared = (
         dict(map(reversed, named(path, "predict"))),
         dict(map(reversed, named(path, "compare"))),
@@ -145,7 +143,7 @@ def test_every_prediction_is_compared_once_with_what_a_later_cell_computes(path:
 
 
 @LESSONS
-def test_no_cell_between_a_prediction_and_its_why_knows_the_answer(path: Path) -> None:
+def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Path) -> None:
     wrong, predicting = [], ""
     for cell in cells(path):
         if cell.cell_type == "markdown":
@@ -158,7 +156,7 @@ def test_no_cell_between_a_prediction_and_its_why_knows_the_answer(path: Path) -
 
 
 @LESSONS
-def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: Path) -> None:
+def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
     wrong = []
     for cell in cells(path):
         if cell.cell_type != "code":
@@ -182,7 +180,7 @@ def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: P
 
 
 @LESSONS
-def test_code_fits_the_window_and_hides_no_minus_by_a_sum(path: Path) -> None:
+def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> None:
     lines = [
         line
         for cell in cells(path)
@@ -214,7 +212,7 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
 
 
 @LESSONS
-def test_a_lesson_with_lessons_before_it_begins_with_recall(path: Path) -> None:
+def test_all_lessons_but_the_first_begin_with_recall(path: Path) -> None:
     code = [cell.source for cell in cells(path) if cell.cell_type == "code"]
     recalls = [i for i, source in enumerate(code) if source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
@@ -226,7 +224,7 @@ def the_map() -> str:
 
 
 @LESSONS
-def test_an_equation_is_taught_where_it_is_written_out_with_its_number(path: Path) -> None:
+def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path: Path) -> None:
     for teaches, tags in taught(path):
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"
