@@ -1,4 +1,4 @@
-"""The form of the lessons: question, prediction, a cell that computes the answer, reason, claims."""
+"""The form of the lessons: question, prediction, computed answer, reason, claims."""
 
 from __future__ import annotations
 

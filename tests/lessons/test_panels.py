@@ -1,4 +1,4 @@
-"""Panels: a slider shows the number that is computed with. A push has the direction of its handle."""
+"""Panels: sliders show the numbers that are computed with, and pushes follow the handle."""
 
 from __future__ import annotations
 
