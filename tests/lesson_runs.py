@@ -19,7 +19,7 @@ from typing import Any
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 PRINTED = "printed.txt"
-LONGEST = 200.0  # s that a lesson may take
+LONGEST = 200  # s that a lesson may take
 FORK = multiprocessing.get_context("fork")
 
 
@@ -95,7 +95,7 @@ class ForkedKernel:
 
 
 def _serve(file: str) -> None:
-    """Be a kernel until the end."""
+    """Run a kernel until it is shut down."""
     from ipykernel.kernelapp import IPKernelApp
 
     IPKernelApp.launch_instance(["-f", file, "--IPKernelApp.log_level=40"])
@@ -104,6 +104,7 @@ def _serve(file: str) -> None:
 def _run(path: str, home: str) -> None:
     """Run a lesson by nbval, and exit with its status."""
     os.setpgrp()
+    signal.alarm(LONGEST)
     os.environ["FLOATBASE_HOME"] = home
     os.chdir(Path(path).parent)
     for descriptor in (1, 2):
@@ -153,10 +154,9 @@ def main() -> None:
         before = _children_seconds()
         process = FORK.Process(target=_run, kwargs=json.loads(line))
         process.start()
-        process.join(LONGEST)
-        if process.exitcode is None:
+        process.join()
+        if process.exitcode == -signal.SIGALRM:
             os.killpg(process.pid, signal.SIGKILL)
-            process.join()
         answer = {"status": process.exitcode, "seconds": _children_seconds() - before}
         print(json.dumps(answer), flush=True)
 
