@@ -32,6 +32,16 @@ def tagged(cell: Any, tag: str) -> bool:
     return tag in cell.metadata.get("tags", [])
 
 
+def code(path: Path) -> list[Any]:
+    return [cell for cell in cells(path) if cell.cell_type == "code"]
+
+
+def asked(cell: Any) -> list[str]:
+    """Names of the questions that a text asks."""
+    found = QUESTION.findall(cell.source) if cell.cell_type == "markdown" else []
+    return [name.strip() for name in found]
+
+
 def calls(cell: Any, function: str) -> list[ast.Call]:
     """The calls of that function in a cell of code."""
     nodes = ast.walk(ast.parse(cell.source)) if cell.cell_type == "code" else ()
@@ -75,31 +85,19 @@ def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
 @LESSONS
 def test_predictions_are_named_in_order(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    asked = [
-        found
-        for cell in cells(path)
-        if cell.cell_type == "markdown"
-        for found in QUESTION.findall(cell.source)
-    ]
-    assert [name.strip() for name in asked] == [
-        f"{lesson}.{letter}" for letter in ascii_lowercase[: len(asked)]
-    ]
-    assert [name for _, name in named(path, "predict")] == [name.strip() for name in asked]
-    assert asked, "a lesson without a question"
+    names = [name for cell in cells(path) for name in asked(cell)]
+    assert names, "a lesson without a question"
+    assert names == [f"{lesson}.{letter}" for letter in ascii_lowercase[: len(names)]]
+    assert [name for _, name in named(path, "predict")] == names
 
 
 @LESSONS
 def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
-        asked = (
-            [name.strip() for name in QUESTION.findall(before.source)]
-            if before.cell_type == "markdown"
-            else []
-        )
         predicted = calls(cell, "predict")
-        if asked and not predicted:
-            wrong.append(f"{asked}: no predict(…) right below")
+        if asked(before) and not predicted:
+            wrong.append(f"{asked(before)}: no predict(…) right below")
         for call in predicted:
             name = ast.literal_eval(call.args[0])
             rest = [
@@ -108,7 +106,7 @@ def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
                 if not isinstance(line, ast.Import | ast.ImportFrom)
             ]
             fits = {
-                "the question right above": asked == [name],
+                "the question right above": asked(before) == [name],
                 "a cell of its own": len(rest) == 1,
                 "... as its answer": [ast.unparse(answer) for answer in call.args[1:]] == ["..."],
                 'the tag "predict"': tagged(cell, "predict"),
@@ -126,10 +124,8 @@ def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
 
 @LESSONS
 def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) -> None:
-    predicted, compared = (
-        dict(map(reversed, named(path, "predict"))),
-        dict(map(reversed, named(path, "compare"))),
-    )
+    predicted = {name: i for i, name in named(path, "predict")}
+    compared = {name: i for i, name in named(path, "compare")}
     assert len(compared) == len(named(path, "compare"))
     assert sorted(compared) == sorted(predicted)
     assert [name for name, i in compared.items() if i <= predicted[name]] == []
@@ -158,9 +154,7 @@ def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Pa
 @LESSONS
 def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
     wrong = []
-    for cell in cells(path):
-        if cell.cell_type != "code":
-            continue
+    for cell in code(path):
         body = ast.parse(cell.source).body
         fits = {
             "asserts outside of its claims": not asserts(cell)
@@ -181,19 +175,10 @@ def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
 
 @LESSONS
 def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> None:
-    lines = [
-        line
-        for cell in cells(path)
-        if cell.cell_type == "code"
-        for line in cell.source.splitlines()
-    ]
     lesson = path.stem.split("_")[0]
-    lines += [
-        line
-        for name, e in all_exercises().items()
-        if name.startswith(f"{lesson}.")
-        for line in e.solution.splitlines()
-    ]
+    sources = [cell.source for cell in code(path)]
+    sources += [e.solution for name, e in all_exercises().items() if name.startswith(f"{lesson}.")]
+    lines = "\n".join(sources).splitlines()
     assert [line for line in lines if len(line) > LONGEST] == []
     assert [line for line in lines if re.search(r"\+ 0\.0\b(?!\d)", line)] == []
 
@@ -201,20 +186,16 @@ def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> No
 @LESSONS
 def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    reviewed = [i for i, cell in enumerate(cells(path)) for call in calls(cell, "review")]
-    texts = [
-        [ast.unparse(part) for part in call.args]
-        for cell in cells(path)
-        for call in calls(cell, "review")
+    ((at, call),) = [
+        (i, call) for i, cell in enumerate(cells(path)) for call in calls(cell, "review")
     ]
-    assert texts == [[] if lesson == "00" else [repr(lesson)]]
-    assert reviewed[0] > max(i for i, _ in named(path, "compare"))
+    assert [ast.unparse(part) for part in call.args] == ([] if lesson == "00" else [repr(lesson)])
+    assert at > max(i for i, _ in named(path, "compare"))
 
 
 @LESSONS
 def test_all_lessons_but_the_first_begin_with_recall(path: Path) -> None:
-    code = [cell.source for cell in cells(path) if cell.cell_type == "code"]
-    recalls = [i for i, source in enumerate(code) if source.startswith("recall()")]
+    recalls = [i for i, cell in enumerate(code(path)) if cell.source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
 
 

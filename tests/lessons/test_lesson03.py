@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ import floatbase as fb
 from floatbase.dynamics import dimensions
 from floatbase.lessons.lesson03 import (
     beta_direction,
-    motion_bars,
     rising_solo8_eom,
     upright_solo12,
 )
@@ -56,18 +53,3 @@ def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> Non
     ] * 4
     straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
     assert straight.rank_J == (11 if bend == 0 else 12)
-
-
-def test_bars_have_lengths_in_proportion_to_their_numbers_up_to_a_limit() -> None:
-    def heights(drawn: str) -> list[float]:
-        return [float(height) for height in re.findall(r'height="([\d.]+)" fill="#', drawn)]
-
-    drawn = motion_bars(
-        np.zeros(18),
-        np.array([10.0, -5.0, 20.0] * 4),
-        np.array([0.0, 50.0, 300.0] * 4),
-        full=(20.0, 20.0, 100.0),
-    )
-    full = heights(drawn)[20]
-    assert heights(drawn) == [0.0] * 18 + [full / 2, full / 4, full] * 4 + [0.0, full / 2, full] * 4
-    assert drawn.count('height="3"') == 4  # 20 of 20 fits, 300 of 100 does not

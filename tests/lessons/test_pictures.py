@@ -170,20 +170,6 @@ def test_a_site_leaves_a_panel_unchanged_and_names_its_sliders(view: fb.Viewer) 
     assert data["words"] and "one slider" not in data["words"]
 
 
-def test_many_sliders_move_one_at_a_time(view: fb.Viewer) -> None:
-    def draw(a: float, b: float, c: float) -> str:
-        return view.show(view.robot.standing(), title=f"{a} {b} {c}").robot.name
-
-    panel = slider_panel(view, draw, a=(0, 1, 9), b=(0, 1, 9), c=(0, 1, 9))
-    data = data_of(panel)
-    assert not data["together"] and "one slider moves at a time" in data["words"]
-    first = [control["first"] for control in data["controls"]]
-    assert all(
-        sum(int(i) != k for i, k in zip(stop.split(","), first, strict=True)) <= 1
-        for stop in data["stops"]
-    )
-
-
 def test_a_panel_without_a_view_stores_its_notes() -> None:
     data = data_of(
         slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2))

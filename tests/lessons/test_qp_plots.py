@@ -62,20 +62,6 @@ def test_infeasible_constraints_have_no_polygon() -> None:
     )
 
 
-def test_lines_show_equality_and_thick_lines_the_working_set() -> None:
-    qp = qp_of(np.eye(2), [0, 0], [[1.0, 2.0], [0.0, -1.0]], [1.0, 0.5], ("slant", "table"))
-    axis = qp_plots.plot(qp, BOX, working_set=["table"], point=(0.5, -0.5))
-    lines: Any = axis.lines
-    slant, table, dot = lines
-    for line, G, h in zip((slant, table), qp.G, qp.h, strict=True):
-        assert np.allclose(line.get_xydata() @ G, h)
-    assert table.get_linewidth() > 2 * slant.get_linewidth()
-    assert dot.get_xydata().tolist() == [[0.5, -0.5]]
-    assert [text.get_text() for text in axis.texts] == ["slant", "table"]
-    assert axis.get_xlim() + axis.get_ylim() == BOX
-    plt.close("all")
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_normals_times_multipliers_add_up_to_the_negative_gradient(
     seed: int,

@@ -49,8 +49,8 @@ def test_unit_digits_and_floor_can_be_chosen() -> None:
     [
         ([0.1, 1e-12, -2], "(0.1, 0, -2)"), (np.array([43.4, 0.123, -0.0]), "(43, 0.12, 0)"),
         ([], "()"), ([3], "(3)"),
-        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"), ([np.nan, 1.0], "(not a number, "
-                                                                                   "1)"),
+        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"),
+        ([np.nan, 1.0], "(not a number, 1)"),
     ],
 )  # fmt: skip
 def test_small_entries_of_an_array_are_zero(numbers: Any, text: str) -> None:

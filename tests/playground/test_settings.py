@@ -230,22 +230,6 @@ def test_motors_of_the_base_act_only_if_the_controller_assumes_them() -> None:
     assert used[()] < 1e-6 * GO2.weight < 0.5 * GO2.weight < used[("zeros",)]
 
 
-def test_gravity_has_no_arrow_when_it_is_switched_off() -> None:
-    session = Session(GO2)
-    record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
-    assert list(term_arrows("gravity", record, 1e-3, 0.4)) == [
-        "term gravity/m g",
-        "term gravity/m g label",
-    ]
-    (word,) = term_arrows("gravity", record, 1e-3, 0.4, ("gravity",)).values()
-    assert word.shape.name == "m g: switched off"
-    (word,) = term_arrows("velocity", record, 1e-3, 0.4).values()
-    assert word.shape.name == "C q̇ ≈ 0"
-    assert term_arrows("zeros", record, 1e-2, 0.4, ("zeros",)), (
-        "there are torques with motors of the base, too"
-    )
-
-
 def test_arrows_have_the_actual_mass() -> None:
     session = Session(GO2, Settings(mass=(1.0, 1.5)))
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
