@@ -54,8 +54,10 @@ def cases(seed: int) -> tuple[tuple[Case, BlackBox], ...]:
     return tuple(zip(drawn, black_boxes(seed) + faultless_boxes(seed), strict=True))
 
 
-def of_fault(fault: str, seed: int = 1) -> tuple[Case, BlackBox]:
-    return next((case, box) for case, box in cases(seed) if case.injected_fault.kind == fault)
+@cache
+def missing_forces(seed: int) -> tuple[np.ndarray, ...]:
+    """What (7) needs besides the measured forces, for each case."""
+    return tuple(required_forces(box) for _, box in cases(seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -67,13 +69,10 @@ def test_six_boxes_hold_one_fall_of_each_fault(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_program_finds_every_fault_from_the_record_and_none_without_one(
-    seed: int,
-) -> None:
+def test_a_program_finds_every_fault_from_the_record_and_none_without_one(seed: int) -> None:
     found = {box.name: program()(box) for _, box in cases(seed)}
-    assert [
-        box.name for case, box in cases(seed) if not judge_line(case, box, found[box.name]).right
-    ] == []
+    for case, box in cases(seed):
+        assert judge_line(case, box, found[box.name]).right, box
     assert found["N"] == found["K"] == "nothing"
 
 
@@ -88,29 +87,17 @@ def test_a_robot_without_its_fault_twists_to_the_end(seed: int) -> None:
 def test_equal_seeds_give_equal_cases_and_other_seeds_give_others() -> None:
     drawn = [random_cases(seed) for seed in range(20)]
     assert len({tuple(case.injected_fault.kind for case in some) for some in drawn}) > 10
-    for fault in FAULTS:
-        ones = [
-            case.injected_fault
-            for some in drawn
-            for case in some
-            if case.injected_fault.kind == fault
-        ]
-        assert len(
-            {(one.size, one.joints if fault == "swapped motors" else None) for one in ones}
-        ) > (0 if fault == "drift" else 9)
-    assert {
-        np.sign(c.injected_fault.size - 1)
-        for some in drawn
-        for c in some
-        if c.injected_fault.kind == "mass"
-    } == {-1, 1}
+    faults = [case.injected_fault for some in drawn for case in some]
+    for kind in set(FAULTS) - {"drift"}:
+        ones = [fault for fault in faults if fault.kind == kind]
+        sizes = {one.joints if kind == "swapped motors" else one.size for one in ones}
+        assert len(sizes) > 9
+    assert {np.sign(fault.size - 1) for fault in faults if fault.kind == "mass"} == {-1, 1}
     assert random_cases(4) == random_cases(4) != random_cases(5)
-    case, box = of_fault("slow motors")
+    case, box = next(pair for pair in cases(1) if pair[0].injected_fault.kind == "slow motors")
     again = case.record()
-    assert all(
-        np.array_equal(getattr(box, name), getattr(again, name))
-        for name in ("q", "v", "tau", "planned", "measured")
-    )
+    for name in ("q", "v", "tau", "planned", "measured"):
+        assert np.array_equal(getattr(box, name), getattr(again, name))
 
 
 def test_a_box_holds_nothing_but_the_record() -> None:
@@ -118,13 +105,10 @@ def test_a_box_holds_nothing_but_the_record() -> None:
     assert {field.name for field in fields(BlackBox)} == names
     for case, box in cases(1):
         assert set(vars(box)) <= names
-        assert np.allclose(box.contacts.mus, 1.2)  # what was told, whatever it was
-        assert box.robot == fb.load("go2") and "ModelMismatch" not in repr(vars(box))
+        assert np.allclose(box.contacts.mus, 1.2)  # what the controller assumed
+        assert box.robot == fb.load("go2")
         text = pickle.dumps(box)
-        assert not any(
-            fault.encode() in text
-            for fault in ("swapped", "slow motors", "FirstOrderLag", "Mistake")
-        )
+        assert not any(word in text for word in (b"swapped", b"Lag", b"Mismatch", b"Fault"))
         assert str(case.injected_fault.size)[:6] not in repr(box)
         with pytest.raises(ValueError, match="read-only"):
             box.tau[0, 0] = 0.0
@@ -139,27 +123,24 @@ def test_the_assumed_normal_is_wrong_only_if_it_is_the_fault() -> None:
 
 
 def test_equation_7_holds_for_all_measurements() -> None:
-    for case, box in cases(1):
-        base = np.linalg.norm(required_forces(box)[:, :3], axis=1)
+    for (case, _), forces in zip(cases(1), missing_forces(1), strict=True):
+        base = np.linalg.norm(forces[:, :3], axis=1)
         if case.pushes:
             assert base.max() > 200
-        else:
-            assert np.median(base) < 2.0 and base[: min(len(base), 50)].max() < 10.0, (
-                case
-            )  # blows of the fall come later
+        else:  # blows of the fall come after 50 rows
+            assert np.median(base) < 2.0 and base[:50].max() < 10.0, case
 
 
 def test_motors_follow_their_commands_except_with_a_fault_of_motors() -> None:
-    for case, box in cases(1):
-        off = np.median(np.abs(required_forces(box)[:, 6:] - box.tau[:-1]), axis=0)
-        assert (off.max() > 0.5) == (
-            case.injected_fault.kind in ("slow motors", "swapped motors")
-        ), case
+    for (case, box), forces in zip(cases(1), missing_forces(1), strict=True):
+        off = np.median(np.abs(forces[:, 6:] - box.tau[:-1]), axis=0)
+        is_of_motors = case.injected_fault.kind in ("slow motors", "swapped motors")
+        assert (off.max() > 0.5) == is_of_motors, case
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_evidence_against_a_wrong_diagnosis_is_true(seed: int) -> None:
-    for case, box in cases(seed)[:6]:
+    for (case, box), forces in zip(cases(seed)[:6], missing_forces(seed), strict=False):
         fault, normal = case.injected_fault.kind, ground_normal(box)
         if fault != "friction":
             assert np.percentile([1.2, *sliding_friction_ratios(box, normal)], 90) > 1.15
@@ -169,7 +150,7 @@ def test_the_evidence_against_a_wrong_diagnosis_is_true(seed: int) -> None:
         lost = np.median([np.abs(plan[1]).max() / b for plan, b in zip(plans, drifts, strict=True)])
         assert (max(np.abs(plan[0]).max() for plan in plans) > 1.0) == (fault == "mass")
         assert lost > 0.99 if fault == "drift" else lost < 0.01
-        got, told = required_forces(box)[:, 6:], box.tau[:-1]
+        got, told = forces[:, 6:], box.tau[:-1]
         late = [
             np.median(np.abs(lagged(told, 0.002, ms) - got), axis=0).max()
             for ms in range(0, 120, 2)
