@@ -110,6 +110,16 @@ def test_learners_of_one_installed_course_have_separate_copies(
     assert not (course / MY_FOLDER).exists()
 
 
+def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path: Path) -> None:
+    course, program = tmp_path / "notebooks", tmp_path / "examples" / "wbc.py"
+    for folder in (course, program.parent):
+        folder.mkdir()
+    write(course / LESSON, "first = 1")
+    program.write_text("q = 1\n")
+    assert prepare_workspace(course) == [f"{LESSON}: new", "wbc.py: new"]
+    assert (course / MY_FOLDER / "wbc.py").read_text() == program.read_text()
+
+
 def test_a_package_without_lessons_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
