@@ -152,15 +152,9 @@ class StaticExport:
             "text/plain": ", ".join(map(repr, self._views)) or "a panel",
         }
         if self._thumbnails:
-            shown["image/png"] = base64.b64encode(self._image()).decode()
+            image = thumbnail.side_by_side(self._thumbnails)
+            shown["image/png"] = base64.b64encode(image).decode()
         return shown
-
-    def _image(self) -> bytes:
-        return (
-            self._thumbnails[0]
-            if len(self._thumbnails) == 1
-            else thumbnail.side_by_side(self._thumbnails)
-        )
 
     def _note_number(self, note: str) -> int:
         return self._notes.setdefault(note, len(self._notes))

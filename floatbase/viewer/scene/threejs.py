@@ -23,7 +23,7 @@ _EXT = {
     "Uint32Array": 0x16,
     "Float32Array": 0x17,
 }
-_TYPES = {
+TYPES = {
     "Uint8Array": "u1",
     "Int16Array": "<i2",
     "Uint16Array": "<u2",
@@ -47,7 +47,7 @@ class Shape:
 
 def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False) -> dict[str, Any]:
     """Return an attribute of a geometry."""
-    raw = np.ascontiguousarray(values, dtype=_TYPES[kind]).tobytes()
+    raw = np.ascontiguousarray(values, dtype=TYPES[kind]).tobytes()
     return {
         "itemSize": size,
         "type": kind,
