@@ -160,7 +160,5 @@ class FollowingCamera:
     def _displacement(self, painter: Painter) -> Array:
         """Return how far the robot was from its standing pose, along the ground [m]."""
         return displacement(
-            painter.drawn_ground,
-            painter.standing.com,
-            (self._state or painter.standing).com,
+            painter.drawn_ground, painter.standing.com, (self._state or painter.standing).com
         )

@@ -9,11 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._validation import (
-    Array,
-    as_instance,
-    cached_property,
-)
+from floatbase._validation import Array, as_instance, cached_property
 from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError, unknown_name

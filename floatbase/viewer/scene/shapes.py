@@ -14,26 +14,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import (
-    Array,
-    as_array,
-    as_instance,
-    as_positive,
-    as_string,
-    read_only,
-)
+from floatbase._validation import Array, as_array, as_instance, as_positive, as_string, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs, unit_shapes
-from floatbase.viewer.scene.colours import (
-    COM,
-    CONE,
-    CONE_ALPHA,
-    PATCH,
-    RGB,
-    RGBA,
-    with_alpha,
-)
+from floatbase.viewer.scene.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, with_alpha
 from floatbase.viewer.scene.threejs import Shape
 
 # width of an arrow's shaft divided by its length, for an arrow of length `ARROW_LENGTH`
