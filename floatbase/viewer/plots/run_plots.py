@@ -31,9 +31,8 @@ from floatbase.viewer.scene.colours import (
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-MIN_LOAD = (
-    0.01  # fraction of the weight: the direction of a smaller force says nothing about friction
-)
+# fraction of the weight: the direction of a smaller force says nothing about friction
+MIN_LOAD = 0.01
 _INSIDE: dict[str, Any] = {"loc": "upper right"}  # position of the legend
 _ABOVE: dict[str, Any] = {
     "loc": "lower right",
@@ -58,10 +57,9 @@ def plot_run(rollout: Rollout) -> Figure:
     """
     as_rollout(rollout)
     figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
-    for plotted, axis in zip(
-        (plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True
-    ):
-        plotted(rollout, axis)
+    plots = (plot_com, plot_forces, plot_friction, plot_torques)
+    for plot, axis in zip(plots, axes, strict=True):
+        plot(rollout, axis)
     axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
     for axis in axes[:-1]:
         axis.set_xlabel("")
@@ -110,20 +108,9 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
-    for i, (planned, measured) in enumerate(
-        zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
-    ):
-        axis.plot(
-            rollout.time,
-            planned,
-            color=PLANNED,
-            linewidth=3.5,
-            alpha=0.6,
-            label="" if i else "planned",
-        )
-        axis.plot(
-            rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured"
-        )
+    planned, measured = _normal(rollout, rollout.planned), _normal(rollout, rollout.measured)
+    for i in range(len(planned)):
+        _plot_both(axis, rollout.time, planned[i], measured[i], 1.2, has_labels=i == 0)
     return _finished(axis, rollout, "normal forces [N]")
 
 
@@ -152,26 +139,14 @@ def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """
     names = _contact_names(rollout)
     axis = _axes_or_new(axis)
-    rows = enumerate(
-        zip(_stance_rows(rollout), _normal_of_contacts(rollout, rollout.measured), strict=True)
-    )
-    for i, (stands, measured) in rows:
-        carried = np.where(measured > MIN_LOAD * rollout.robot.weight, float(i), np.nan)
-        bars = axis.broken_barh(
-            _intervals(rollout.time, stands),
-            (i - 0.36, 0.72),
-            color=GREYS[2],
-            alpha=0.6,
-            linewidth=0.0,
-        )
+    stances, forces = _stance_rows(rollout), _normal_of_contacts(rollout, rollout.measured)
+    for i, (stands, measured) in enumerate(zip(stances, forces, strict=True)):
+        times, place = _intervals(rollout.time, stands), (i - 0.36, 0.72)
+        bars = axis.broken_barh(times, place, color=GREYS[2], alpha=0.6, linewidth=0.0)
         bars.set_label("" if i else "in the controller's stance")
-        axis.plot(
-            rollout.time,
-            carried,
-            color=MEASURED,
-            linewidth=2.5,
-            label="" if i else "measured contact",
-        )
+        carried = np.where(measured > MIN_LOAD * rollout.robot.weight, float(i), np.nan)
+        label = "" if i else "measured contact"
+        axis.plot(rollout.time, carried, color=MEASURED, linewidth=2.5, label=label)
     axis.set_yticks(range(len(names)), names)
     axis.set_ylim(len(names) - 0.5, -0.5)
     return _finished(axis, rollout, "", _ABOVE)
@@ -201,17 +176,8 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
     """
     names = _contact_names(rollout)
     if axes is None:
-        size = (8, 1.0 + 1.1 * len(names))
-        grid = plt.subplots(
-            len(names),
-            1,
-            figsize=size,
-            sharex=True,
-            sharey=True,
-            layout="constrained",
-            squeeze=False,
-        )[1]
-        axes = list(grid[:, 0])
+        figure = plt.figure(figsize=(8, 1.0 + 1.1 * len(names)), layout="constrained")
+        axes = figure.subplots(len(names), sharex=True, sharey=True, squeeze=False)
     if isinstance(axes, np.ndarray):  # as of plt.subplots
         axes = list(axes.flat)
     made = [
@@ -227,10 +193,7 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
         _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
     )
     for i, (axis, name) in enumerate(zip(made, names, strict=True)):
-        axis.plot(
-            rollout.time, planned[i], color=PLANNED, linewidth=3.5, alpha=0.6, label="planned"
-        )
-        axis.plot(rollout.time, measured[i], color=MEASURED, linewidth=1.0, label="measured")
+        _plot_both(axis, rollout.time, planned[i], measured[i], 1.0)
         axis.axhline(0.0, color=LIMIT, linewidth=0.6)
         _finished(axis, rollout, "", {} if i else _ABOVE)
         axis.set_ylabel(f"{name}\n[N]", rotation=0, ha="right", va="center")
@@ -267,14 +230,8 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
         (rollout.measured, MEASURED, "measured", 1.2),
     ):
         for i, share in enumerate(friction_used(rollout, forces)):
-            axis.plot(
-                rollout.time,
-                share,
-                color=colour,
-                linewidth=width,
-                alpha=0.7,
-                label="" if i else name,
-            )
+            label = "" if i else name
+            axis.plot(rollout.time, share, color=colour, linewidth=width, alpha=0.7, label=label)
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
     return _finished(axis, rollout, "friction / (μ · normal force)")
 
@@ -300,9 +257,8 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
     axis.plot(rollout.time, share, color=GREYS[0], linewidth=0.8, alpha=0.7)
     for limit in (-1.0, 1.0):
-        axis.axhline(
-            limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
-        )
+        label = "limit" if limit > 0 else ""
+        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label=label)
     return _finished(axis, rollout, "torque / limit")
 
 
@@ -360,16 +316,8 @@ def _contact_names(rollout: Rollout) -> tuple[str, ...]:
 
 def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
     """Return the normal force of each contact and time, shape (contacts, n) [N]."""
-    points, starts = (
-        _normal(rollout, forces),
-        np.cumsum(
-            [0]
-            + [
-                len(contact.point_names) if isinstance(contact, FrictionContact) else 0
-                for contact in rollout.contacts
-            ]
-        ),
-    )
+    counts = [len(c.point_names) if isinstance(c, FrictionContact) else 0 for c in rollout.contacts]
+    points, starts = _normal(rollout, forces), np.cumsum([0, *counts])
     return np.array([points[a:b].sum(axis=0) for a, b in pairwise(starts)])
 
 
@@ -393,11 +341,18 @@ def _intervals(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, 
 
 def _axes_or_new(axis: Axes | None) -> Axes:
     """Return the given axes, or those of a new figure."""
-    return (
-        plt.subplots(figsize=(8, 3), layout="constrained")[1]
-        if axis is None
-        else as_instance("axis", axis, Axes, "plt.gca()")
-    )
+    if axis is None:
+        return plt.subplots(figsize=(8, 3), layout="constrained")[1]
+    return as_instance("axis", axis, Axes, "plt.gca()")
+
+
+def _plot_both(
+    axis: Axes, time: Array, planned: Array, measured: Array, width: float, has_labels: bool = True
+) -> None:
+    """Plot measured values over a wider line for the planned ones."""
+    labels = ("planned", "measured") if has_labels else ("", "")
+    axis.plot(time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label=labels[0])
+    axis.plot(time, measured, color=MEASURED, linewidth=width, label=labels[1])
 
 
 def _finished(
@@ -405,13 +360,8 @@ def _finished(
 ) -> Axes:
     """Add labels, a band for each push, and a legend unless `legend` is empty."""
     for i, push in enumerate(rollout.pushes):
-        axis.axvspan(
-            push.start,
-            push.start + push.duration,
-            color=PUSH,
-            alpha=0.12,
-            label="" if i else "push",
-        )
+        end, label_of_push = push.start + push.duration, "" if i else "push"
+        axis.axvspan(push.start, end, color=PUSH, alpha=0.12, label=label_of_push)
     axis.set(xlabel="time [s]", ylabel=label)
     axis.grid(alpha=0.25)
     if legend and axis.get_legend_handles_labels()[0]:
