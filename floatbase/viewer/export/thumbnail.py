@@ -173,7 +173,8 @@ def _with_meshes(items: Sequence[Item], camera: _Camera, image: Image.Image) -> 
     The far half and the near half of a translucent mesh are one layer each, or both together if
     its front hides its back.
     """
-    opaque, layers = [np.empty((0, 10))], []
+    opaque: list[Array] = [np.empty((0, 10))]
+    layers: list[tuple[float, Array, float]] = []
     for item in items:
         triangles, material = _triangles(item, camera), _material(item)
         opacity = material["opacity"] if item.colour is None else item.colour[3]

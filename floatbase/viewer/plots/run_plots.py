@@ -177,7 +177,8 @@ def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> 
     names = _contact_names(rollout)
     if axes is None:
         figure = plt.figure(figsize=(8, 1.0 + 1.1 * len(names)), layout="constrained")
-        axes = figure.subplots(len(names), sharex=True, sharey=True, squeeze=False)
+        grid = figure.subplots(len(names), sharex=True, sharey=True, squeeze=False)
+        axes = list(grid.flat)
     if isinstance(axes, np.ndarray):  # as of plt.subplots
         axes = list(axes.flat)
     made = [

@@ -146,7 +146,8 @@ def _from_urdf(robot: Robot) -> list[JointMesh]:
 def _from_tree(robot: Robot) -> list[JointMesh]:
     """Return a ball at each joint and a rod to each of its children."""
     model = robot.model
-    lengths = [np.linalg.norm(place.translation) for place in list(model.jointPlacements)[1:]]
+    places = list(model.jointPlacements)[1:]
+    lengths = [float(np.linalg.norm(place.translation)) for place in places]
     radius = 0.12 * float(np.median([length for length in lengths if length > 1e-3] or [0.2]))
     meshes = []
     for joint in range(model.njoints):
