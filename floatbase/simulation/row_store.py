@@ -57,11 +57,10 @@ def as_frame(rows: Mapping[int, Row]) -> DataFrame:
 
 
 class RowStore:
-    """Rows of a sweep, as point number -> row, which are also written to a file if there is one.
+    """Rows of a sweep, as point number -> row, which are also written to a file if there is one."""
 
-    The file is in JSON Lines format: the first line describes the sweep, and each further line is a
-    completed point. The file is locked while the store is open. An incomplete last line is removed.
-    """
+    # the first line of the file describes the sweep, and each further line is a completed point;
+    # the file is locked while the store is open, and an incomplete last line is removed
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
         self.rows: dict[int, Row] = {}
@@ -152,10 +151,7 @@ def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[N
 
 
 def as_json_value(what: str, value: Any) -> Any:
-    """Convert a value to what JSON returns for it; NumPy's types become Python's.
-
-    Raises `InputError` with `what`, a name, for values that JSON cannot hold.
-    """
+    """Convert a value to what JSON returns for it; raise `InputError` that names it as `what`."""
     try:
         return json.loads(json.dumps(value, default=_from_numpy))
     except (TypeError, ValueError) as error:

@@ -245,10 +245,7 @@ def _pickled(function: Any, setup: Any) -> _Job:
 
 @contextmanager
 def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
-    """Yield an executor on this computer or the cluster, and how many points to submit at a time.
-
-    On an exception, unfinished points are dropped.
-    """
+    """Yield an executor, here or on the cluster, and how many points to submit at a time."""
     if cluster is None:
         executor = require("loky", "sweep").get_reusable_executor(
             workers,
@@ -259,7 +256,7 @@ def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
         )
         try:
             yield executor, _POINTS_PER_WORKER * workers
-        except BaseException:
+        except BaseException:  # unfinished points are dropped
             executor.shutdown(kill_workers=True)
             raise
         return
@@ -342,11 +339,8 @@ _this_thread = threading.local()  # of a worker: function and token of its prese
 
 
 def _run_point(job: _Job, point: Row) -> Row | Exception:
-    """Return the results of a point as JSON values, or the exception that ends the sweep.
-
-    This function runs in a worker. It does not raise, because Dask would log the exception for each
-    point.
-    """
+    """Return the results of a point as JSON values, or the exception that ends the sweep."""
+    # this runs in a worker, and returns the exception because Dask would log it for each point
     try:
         function = _loaded(*job)
         try:

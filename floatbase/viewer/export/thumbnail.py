@@ -168,11 +168,7 @@ def _draw_lines(items: Sequence[Item], camera: _Camera, image: Image.Image) -> N
 
 
 def _with_meshes(items: Sequence[Item], camera: _Camera, image: Image.Image) -> Image.Image:
-    """Return the image with meshes, drawn from far to near.
-
-    The far half and the near half of a translucent mesh are one layer each, or both together if
-    its front hides its back.
-    """
+    """Return the image with meshes, drawn from far to near."""
     opaque: list[Array] = [np.empty((0, 10))]
     layers: list[tuple[float, Array, float]] = []
     for item in items:
@@ -181,6 +177,7 @@ def _with_meshes(items: Sequence[Item], camera: _Camera, image: Image.Image) -> 
         if opacity >= 1.0:
             opaque.append(triangles)
         else:
+            # the far and the near half are one layer each, unless the front hides the back
             parts = np.array_split(triangles, 1 if material["depthWrite"] else 2)
             layers += [(part[:, _DISTANCE].mean(), part, opacity) for part in parts if len(part)]
     rest = _from_far_to_near(np.concatenate(opaque))
