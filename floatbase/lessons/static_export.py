@@ -151,8 +151,7 @@ class StaticExport:
             "text/plain": ", ".join(map(repr, self._views)) or "a panel",
         }
         if self._thumbnails:
-            only, *others = self._thumbnails
-            image = thumbnail.side_by_side(self._thumbnails) if others else only
+            image = thumbnail.side_by_side(self._thumbnails)
             shown["image/png"] = base64.b64encode(image).decode()
         return shown
 

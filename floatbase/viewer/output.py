@@ -67,11 +67,8 @@ class Output:
             import ipywidgets
 
             return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(
-            self.robot.name,
-            self.height,
-            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
-        )
+        image = thumbnail.render_png(self.renderer.picture, self.window.scene, self.height)
+        return self.window.widget(self.robot.name, self.height, image)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the live picture, and an image of it for readers that cannot show widgets."""

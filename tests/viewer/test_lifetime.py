@@ -15,10 +15,10 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import msgpack
 import numpy as np
 import psutil
 import pytest
-import umsgpack
 from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
 from waiting import PATIENCE, until
@@ -96,8 +96,10 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 
 
 @pytest.mark.front_end
-def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(window, sleeper):
-    (_, command) = protocol.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
+def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(
+    window: Window, sleeper: socket.socket
+) -> None:
+    (_, command) = protocol.set_object("/meshcat/a", msgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):

@@ -7,9 +7,9 @@ import re
 
 import judges
 import matplotlib
+import msgpack
 import numpy as np
 import pytest
-import umsgpack
 from browsers import SCREENSHOTS
 from messages import refused
 from numpy.testing import assert_allclose, assert_array_equal
@@ -66,10 +66,9 @@ def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray
     return found
 
 
-def numbers(packed: umsgpack.Ext | list[float]) -> np.ndarray:
-    return (
-        np.frombuffer(packed.data, "<f4") if isinstance(packed, umsgpack.Ext) else np.array(packed)
-    )
+def numbers(packed: msgpack.ExtType | list[float]) -> np.ndarray:
+    is_packed = isinstance(packed, msgpack.ExtType)
+    return np.frombuffer(packed.data, "<f4") if is_packed else np.array(packed)
 
 
 def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(viewer, go2):

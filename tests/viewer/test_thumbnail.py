@@ -5,9 +5,9 @@ from __future__ import annotations
 import base64
 import io
 
+import msgpack
 import numpy as np
 import pytest
-import umsgpack
 from PIL import Image
 
 from floatbase.robots import State, load
@@ -109,7 +109,7 @@ def test_another_ground_moves_the_camera_with_the_next_picture_only(go2, standin
     assert viewer.window.scene.newest == before
     q[2] += 2.5 * 0.3
     raised = viewer.show(State(go2, q)).window.scene.since(before)[1]
-    assert sum(umsgpack.unpackb(command)["type"] == "set_ground" for command in raised) == 1
+    assert sum(msgpack.unpackb(command)["type"] == "set_ground" for command in raised) == 1
     viewer.close()
 
 

@@ -19,12 +19,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import numpy as np
 import psutil
 import pytest
 import tornado.httpclient
 import tornado.websocket
-import umsgpack
 from messages import raises, refused
 from waiting import PATIENCE, until
 
@@ -47,7 +47,7 @@ def commands_in(frame: bytes) -> list[dict]:
     commands, at = [], 0
     while at < len(frame):
         (length,) = struct.unpack_from("<I", frame, at)
-        commands.append(umsgpack.unpackb(frame[at + 4 : at + 4 + length]))
+        commands.append(msgpack.unpackb(frame[at + 4 : at + 4 + length]))
         at += 4 + length
     return commands
 
@@ -236,11 +236,11 @@ def test_a_page_that_does_not_read_costs_nothing_and_gets_the_newest_values(wind
 def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window):
     async def sleepy() -> list[str]:
         client = await connect(window)
-        window.put([protocol.set_object("/meshcat/a", umsgpack.packb({"n": 1}))])
+        window.put([protocol.set_object("/meshcat/a", msgpack.packb({"n": 1}))])
         await asyncio.wait_for(client.read_message(), PATIENCE)
         for n in range(5):
             window.put([protocol.delete("/meshcat/a")])
-            window.put([protocol.set_object("/meshcat/a", umsgpack.packb({"n": n}))])
+            window.put([protocol.set_object("/meshcat/a", msgpack.packb({"n": n}))])
         await asyncio.sleep(0.1)
         await client.write_message(json.dumps({"type": "done"}))
         return [

@@ -46,10 +46,9 @@ def plot_run(rollout: Rollout) -> Figure:
     """
     as_rollout(rollout)
     figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
-    for plotted, axis in zip(
-        (plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True
-    ):
-        plotted(rollout, axis)
+    plots = (plot_com, plot_forces, plot_friction, plot_torques)
+    for plot, axis in zip(plots, axes, strict=True):
+        plot(rollout, axis)
     axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
     for axis in axes[:-1]:
         axis.set_xlabel("")
@@ -98,20 +97,9 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
-    for i, (planned, measured) in enumerate(
-        zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
-    ):
-        axis.plot(
-            rollout.time,
-            planned,
-            color=PLANNED,
-            linewidth=3.5,
-            alpha=0.6,
-            label="" if i else "planned",
-        )
-        axis.plot(
-            rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured"
-        )
+    planned, measured = _normal(rollout, rollout.planned), _normal(rollout, rollout.measured)
+    for i in range(len(planned)):
+        _plot_both(axis, rollout.time, planned[i], measured[i], 1.2, has_labels=i == 0)
     return _finished(axis, rollout, "normal forces [N]")
 
 
@@ -144,14 +132,8 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
         (rollout.measured, MEASURED, "measured", 1.2),
     ):
         for i, share in enumerate(friction_used(rollout, forces)):
-            axis.plot(
-                rollout.time,
-                share,
-                color=colour,
-                linewidth=width,
-                alpha=0.7,
-                label="" if i else name,
-            )
+            label = "" if i else name
+            axis.plot(rollout.time, share, color=colour, linewidth=width, alpha=0.7, label=label)
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
     return _finished(axis, rollout, "friction / (μ · normal force)")
 
@@ -177,9 +159,8 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
     axis.plot(rollout.time, share, color=GREYS[0], linewidth=0.8, alpha=0.7)
     for limit in (-1.0, 1.0):
-        axis.axhline(
-            limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
-        )
+        label = "limit" if limit > 0 else ""
+        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label=label)
     return _finished(axis, rollout, "torque / limit")
 
 
@@ -229,23 +210,25 @@ def _normal(rollout: Rollout, forces: Array) -> Array:
 
 def _axes_or_new(axis: Axes | None) -> Axes:
     """Return the given axes, or those of a new figure."""
-    return (
-        plt.subplots(figsize=(8, 3), layout="constrained")[1]
-        if axis is None
-        else as_instance("axis", axis, Axes, "plt.gca()")
-    )
+    if axis is None:
+        return plt.subplots(figsize=(8, 3), layout="constrained")[1]
+    return as_instance("axis", axis, Axes, "plt.gca()")
+
+
+def _plot_both(
+    axis: Axes, time: Array, planned: Array, measured: Array, width: float, has_labels: bool = True
+) -> None:
+    """Plot measured values over a wider line for the planned ones."""
+    labels = ("planned", "measured") if has_labels else ("", "")
+    axis.plot(time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label=labels[0])
+    axis.plot(time, measured, color=MEASURED, linewidth=width, label=labels[1])
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
     """Add labels, a legend, and a band for each push."""
     for i, push in enumerate(rollout.pushes):
-        axis.axvspan(
-            push.start,
-            push.start + push.duration,
-            color=PUSH,
-            alpha=0.12,
-            label="" if i else "push",
-        )
+        end, label_of_push = push.start + push.duration, "" if i else "push"
+        axis.axvspan(push.start, end, color=PUSH, alpha=0.12, label=label_of_push)
     axis.set(xlabel="time [s]", ylabel=label)
     axis.grid(alpha=0.25)
     if axis.get_legend_handles_labels()[0]:

@@ -28,7 +28,7 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-# also the ZMP and multipliers; on a dark background they are light, like text
+# of a push, the ZMP and multipliers; on a dark background they are light, like text
 PUSH = _rgb("#222222")
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")

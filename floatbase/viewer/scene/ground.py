@@ -21,8 +21,8 @@ MIN_VERTICAL = 0.2
 GRID_JUMP = 2.5
 # m; the height of the ground is rounded to this, so that it does not shake with the feet
 HEIGHT_STEP = 0.01
-# m: faces of boxes are drawn in pieces of this size, because the rasteriser of images drops a
-# triangle that begins behind the camera
+# m: faces of boxes are drawn in pieces of this size, because an image without a browser drops a
+# triangle with a corner behind the camera
 FACE_SIZE = 0.5
 EDGE_WIDTH = 8e-3  # m, width of the drawn edges of boxes
 EDGE_LIFT = 2e-3  # m by which edges of boxes are drawn above their faces, which would hide them

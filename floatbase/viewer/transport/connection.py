@@ -104,12 +104,10 @@ class Connection:
         try:
             if self.host.on_control is not None:
                 self.host.on_control(name, value)
-        except (
-            Exception
-        ):  # an error in the user's callback is reported, and must not end the connection
-            logging.getLogger("floatbase.viewer").exception(
-                "The callback of the control %r failed.", name
-            )
+        except Exception:
+            # an error in the user's callback is reported, and must not end the connection
+            logger = logging.getLogger("floatbase.viewer")
+            logger.exception("The callback of the control %r failed.", name)
 
     def next_frame(self) -> float:
         """Send the changes that the page has not received, if a frame may be sent now."""
@@ -131,7 +129,6 @@ class Connection:
         if not self._frames:
             return 0.0
         answers_since = self.channel.answers_since
-        rest = self._last + self.channel.min_interval - now
         if self._in_flight and answers_since is None:
             is_full = sum(size for *_, size in self._in_flight) > MAX_UNANSWERED
             return math.inf if is_full else max(self._last + UNANSWERED_INTERVAL - now, 0.0)
@@ -139,4 +136,6 @@ class Connection:
             self.close()
             self.channel.close_page("the page does not respond")
             return math.inf
-        return math.inf if len(self._in_flight) >= self.channel.max_in_flight else max(rest, 0.0)
+        if len(self._in_flight) >= self.channel.max_in_flight:
+            return math.inf
+        return max(self._last + self.channel.min_interval - now, 0.0)

@@ -58,9 +58,7 @@ class _OutputPages:
     def __init__(self, widget: NotebookWidget, server: Server):
         self._widget, self._server = weakref.ref(widget), weakref.ref(server)
         self._pages: dict[str, _WidgetChannel] = {}
-        server.on_stop[:] = [
-            stop_callback for stop_callback in server.on_stop if stop_callback() is not None
-        ]
+        server.on_stop[:] = [callback for callback in server.on_stop if callback() is not None]
         server.on_stop.append(weakref.WeakMethod(self._stop))
 
     def receive(self, _: Any, content: Any, buffers: Any) -> None:
@@ -68,20 +66,13 @@ class _OutputPages:
         server = self._server()
         if server is None or not server.is_running:
             return self._send_closed()
-        if (
-            isinstance(content, dict)
-            and isinstance(content.get("say"), str)
-            and isinstance(content.get("page"), str)
-        ):
+        page, say = (
+            (content.get("page"), content.get("say")) if isinstance(content, dict) else ("", 0)
+        )
+        if isinstance(page, str) and isinstance(say, str):
             answers_wait = threading.current_thread() is threading.main_thread()
-            server.call(
-                self._handle,
-                server,
-                content["page"][:40],
-                content["say"],
-                answers_wait,
-                contextvars.copy_context(),
-            )
+            context = contextvars.copy_context()
+            server.call(self._handle, server, page[:40], say, answers_wait, context)
 
     def _handle(
         self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context
@@ -155,8 +146,7 @@ class _WidgetChannel(Channel):
         answers_wait: bool,
         context: contextvars.Context,
     ):
-        self.name, self.answers_wait = name, answers_wait
-        self.context = context
+        self.name, self.answers_wait, self.context = name, answers_wait, context
         self._display, self._cells = display, server.cells
 
     @property

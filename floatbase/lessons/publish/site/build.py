@@ -6,7 +6,6 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from floatbase.lessons.publish.contents import equation_ranges, title_of
 from floatbase.lessons.publish.live import folder as live_folder
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
-from floatbase.lessons.publish.site import lecture, mathml, recall, reference
+from floatbase.lessons.publish.site import lecture, recall, reference
 from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.live_robots import (
     LIVE_FOLDER,
@@ -77,9 +76,7 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         lecture.write_slides(built / "_static" / lecture.SLIDES, in_site=True)
         if has_live:
             live_folder.write(built / "_static" / LIVE_FOLDER)
-        questions = recall.write_script(shown, built / "_static")
-        pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
-        mathml.write_font(chain(pages, questions), built / "_static" / mathml.FONT)
+        recall.write_script(shown, built / "_static")
         replace_site(built, folder)
     return folder / "index.html"
 

@@ -65,10 +65,7 @@ def recall_box(static: str) -> str:
     return f'<script src="{static}{SCRIPT}"></script>\n{element_html("recall", {}, _NOTE)}'
 
 
-def write_script(lessons: Iterable[Path], folder: Path) -> list[str]:
-    """Write the script with the questions, and return their texts, which may have formulas."""
-    data = recall_data(lessons)
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+def write_script(lessons: Iterable[Path], folder: Path) -> None:
+    """Write the script with the questions."""
+    text = json.dumps(recall_data(lessons), ensure_ascii=False, separators=(",", ":"))
     write_whole(folder / SCRIPT, f"globalThis.floatbaseRecall = {text};\n".encode())
-    kinds = ("topic", "context", "text")
-    return [one[kind] for one in data["questions"].values() for kind in kinds]
