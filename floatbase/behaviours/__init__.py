@@ -13,7 +13,7 @@ from floatbase.behaviours.lipm import LIPM, CoMPlan
 from floatbase.behaviours.mpc import MPC
 from floatbase.behaviours.options import Gains
 from floatbase.behaviours.orientation import pitch_and_yaw
-from floatbase.behaviours.plan import StepPlan
+from floatbase.behaviours.plan import WEIGHT_SHIFT_TIME, StepPlan
 from floatbase.behaviours.raibert import raibert_foothold
 from floatbase.behaviours.stand import Stand
 from floatbase.behaviours.swing import Swing, SwingPath
@@ -24,6 +24,7 @@ __all__ = [
     "LIPM",
     "MPC",
     "STATE_WEIGHTS",
+    "WEIGHT_SHIFT_TIME",
     "CoMPlan",
     "Gains",
     "Gait",

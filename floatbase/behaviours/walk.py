@@ -53,7 +53,7 @@ from floatbase.behaviours.sway import check_friction
 from floatbase.behaviours.swing import SwingPath
 from floatbase.behaviours.targets import Adjustment, BodyPose
 from floatbase.behaviours.terrain import Terrain
-from floatbase.control import Command
+from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import Task
@@ -323,6 +323,11 @@ class Walk:
         return self._controllers[self.stance].contacts if self._active else self._all_contacts
 
     @property
+    def controllers(self) -> Mapping[tuple[str, ...], WholeBodyController]:
+        """The controllers made so far, by the names of the feet that stand."""
+        return self._controllers.made
+
+    @property
     def footholds(self) -> dict[str, Array]:
         """Foothold of each foot in the air or next to lift off, shape (3,), world frame [m]."""
         ends = {foot: path.end for foot, path in self.swings.items()}
@@ -454,6 +459,18 @@ class Walk:
             self._time - TIME_TOLERANCE <= t <= self._time + _RESTART_GAP
         )
 
+    def page_data(self) -> dict[str, Any]:
+        """Return the gait and what plans depend on, as data for the robot in a web page.
+
+        Returns
+        -------
+        dict
+            "gait" and "plan", with values for JSON and the names that the page's JavaScript has.
+        """
+        from floatbase.behaviours.page_data import gait_data, plan_data  # loads numba
+
+        return {"gait": gait_data(self), "plan": plan_data(self)}
+
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
@@ -482,12 +499,9 @@ class Walk:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
         if not hasattr(self, "_controllers"):  # the constructor is still checking its arguments
             return
+        motion = np.array([*self._velocity, self._yaw_rate])
         self._speeds = speed_fractions(
-            self._gait,
-            self._posture,
-            self._options.reach,
-            np.array([*self._velocity, self._yaw_rate]),
-            self._options.acceleration[0],
+            self._gait, self._posture, self._options.reach, motion, self._options.acceleration[0]
         )
         if self.speed_fraction < 1.0:
             message = slow_message(self, self._gait, self.speed_fraction)

@@ -10,9 +10,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import floatbase as fb
 from floatbase.errors import InputError
-from floatbase.lessons.publish.live import robots, scenes, wasm
+from floatbase.live import robots, scenes, wasm
+from floatbase.robots import load
 from floatbase.viewer.web import pages
 
 WEB = pages.DIST.parent
@@ -56,7 +56,7 @@ def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
-        robot = fb.load(name)
+        robot = load(name)
         scene, image, drawing = scenes.scene_files(robot)
         data = robots.robot_json(robot, {"drawing": drawing})
         (folder / f"{name}.json").write_text(data, encoding="utf-8")
