@@ -21,13 +21,14 @@ from floatbase.control import JointLimits, WholeBodyController
 from floatbase.control.tick import CompiledTick, tick
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
+from floatbase.live.settings import SETTINGS
 from floatbase.objectives import CoMTask, FrameTask, standing_tasks
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
 
 ROBOTS = ("go2", "solo12", "talos")
-MU = 0.7  # friction coefficient, assumed and actual, before anything is changed
+MU = SETTINGS["friction"].first  # friction coefficient, assumed and actual, at first
 FACETS = (4, 8, 16)
 TIMESTEP = 1e-3  # s
 LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot

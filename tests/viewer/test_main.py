@@ -113,12 +113,12 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    control("CoM x [m]", "setValue(0.04)")
+    control("CoM x [cm]", "setValue(4)")
     until(
         lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work
     )
     control("facets", "setValue(6)")
-    control("friction model", "setValue(0.3)")
+    control("friction μ model", "setValue(0.3)")
     until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
     until(
         lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work
@@ -128,7 +128,7 @@ def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) 
     until(lambda: playground.run.status == "paused", work)
     playground.run.close()  # waits for the last slice
     stopped = playground.session.sim.time
-    control("stand on FL_foot", "setValue(false)")
+    control("lift FL_foot", "setValue(true)")
     control("run", "fire()")
     until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
     assert "measured/FR_foot" in drawn()
@@ -149,8 +149,8 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
-    control("forwards [m/s]", "setValue(0.5)")
-    control("turn left [rad/s]", "setValue(0.5)")
+    control("velocity x [m/s]", "setValue(0.5)")
+    control("yaw rate [rad/s]", "setValue(0.5)")
     control("gait", "setValue(2)")
     until(lambda: place()[0] > 0.3, work)
     picture(page, "bare_page_walking")
@@ -163,7 +163,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
         work,
     )
     stopped = place()
-    control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
+    control("CoM z [cm]", "setValue(-2)")  # it stands from now on where it is
     until(lambda: place()[2] < stopped[2] - 0.01, work)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
     control("gait", "setValue(1)")

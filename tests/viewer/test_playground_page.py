@@ -79,7 +79,7 @@ def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> Non
         "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
     )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
-    page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
+    page.wait_for_function("viewer.gui_controllers['friction μ model'].getValue() == 0.7")
 
 
 def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> None:
@@ -174,12 +174,12 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: P
     def work() -> None:
         page.wait_for_timeout(20)
 
-    page.evaluate("viewer.gui_controllers['mass [×] reality'].setValue(1.5)")
+    page.evaluate("viewer.gui_controllers['mass [%] reality'].setValue(150)")
     until(lambda: abs(sunk() - 0.049) < 0.01, work)
     page.wait_for_function(
         "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
     )
-    page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
+    page.evaluate("viewer.gui_controllers['mass [%] model'].setValue(150)")
     until(lambda: abs(sunk()) < 0.01, work)
     page.wait_for_function(
         "document.querySelector('#panel p.plot').textContent.includes('difference between')"
@@ -311,7 +311,7 @@ def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
 
 def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
     opened(page, field)
-    for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
+    for keys, name, value in (("Control+z", "facets", 7), (None, "friction μ reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
         page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
         until(
@@ -333,14 +333,14 @@ def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> 
     opened(page, field)
     assert page.evaluate("location.hash") == ""
     page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
-    page.evaluate("viewer.gui_controllers['stand on FL_foot'].setValue(false)")
+    page.evaluate("viewer.gui_controllers['lift FL_foot'].setValue(true)")
     page.evaluate("viewer.gui_controllers['speed'].setValue(0.5)")
-    page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
+    page.wait_for_function("location.hash == '#lift+FL_foot=on&facets=7'")
     page.evaluate("viewer.gui_controllers['undo'].fire()")
     page.wait_for_function("location.hash == '#facets=7'")
 
     page.goto("about:blank")
-    page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
+    page.goto(f"{field.url}#friction+μ+reality=0.3&gait=trot&facets=many&nothing=1")
     until(
         lambda: (
             field.session.settings.gait == "trot" and field.session.settings.friction == (0.7, 0.3)

@@ -29,20 +29,21 @@ LESSON_ROBOTS = {
         "go2",
         {"panel": "1"},
         "Push the centre of mass. *push-recovery map* computes the largest push that go2 survives "
-        "in each direction. Open *where it stands*, move the centre of mass, and compute the map "
+        "in each direction. Open *stance*, move the centre of mass, and compute the map "
         "again.",
     ),
     "06": LessonRobot(
         "go2",
         {"panel": "1", "mu": "0.3"},
         "The friction coefficient is 0.3, so a moderate push brings forces to the facets of their "
-        "cones. Open *ground and load*, and let the controller assume more friction than there is.",
+        "cones. Open *model and reality*, and let the controller assume more friction than there "
+        "is.",
     ),
     "07": LessonRobot(
         "go2",
         {"panel": "1"},
-        "Open *constraints*, and read the multipliers of the active constraints while you push. "
-        "Open *gravity and motors*, and lower the torque limits until one becomes active.",
+        "Open *quadratic program*, and read the multipliers of the active constraints while you "
+        "push. Then lower the torque limits until one becomes active.",
     ),
     "09": LessonRobot(
         "talos",
