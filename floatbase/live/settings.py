@@ -28,6 +28,11 @@ class Setting(NamedTuple):
     scale: float = 1.0  # SI units per unit
 
     @property
+    def range(self) -> tuple[float, float, float]:
+        """Smallest and largest value, and step."""
+        return self.low, self.high, self.step
+
+    @property
     def label(self) -> str:
         """Text of the control, such as "CoM x [cm]"."""
         unit = f"[{self.unit}]" if self.unit else ""

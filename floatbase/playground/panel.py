@@ -94,14 +94,8 @@ class Panel:
         view.add_slider(
             _PUSH.label, self._push, play.force, _PUSH.low, most, _PUSH.step, on_release=True
         )
-        view.add_slider(
-            _TOWARDS.label,
-            partial(setattr, play, "towards"),
-            play.towards,
-            _TOWARDS.low,
-            _TOWARDS.high,
-            _TOWARDS.step,
-        )
+        towards = partial(setattr, play, "towards")
+        view.add_slider(_TOWARDS.label, towards, play.towards, *_TOWARDS.range)
         if not play.robot.is_floating:
             return
         settings = play.session.settings
@@ -130,16 +124,9 @@ class Panel:
         """Add one slider."""
         setting, value = slider.setting, slider.shown(self._playground.session.settings)
         at_most = "ideal" if slider.field == "bandwidth" else ""
+        place = setting.section, slider.column
         self._playground.view.add_slider(
-            slider.name,
-            changed,
-            value,
-            setting.low,
-            setting.high,
-            setting.step,
-            setting.section,
-            slider.column,
-            at_most,
+            slider.name, changed, value, *setting.range, *place, at_most
         )
 
     def _add_challenges(self) -> None:
