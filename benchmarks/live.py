@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
-from floatbase.lessons.publish.live import folder as live_folder
-from floatbase.lessons.publish.live import robots
+from floatbase.live import folder as live_folder
+from floatbase.live import robots
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import live_reference

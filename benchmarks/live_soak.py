@@ -26,7 +26,7 @@ import numpy as np
 import psutil
 from live import Handler
 
-from floatbase.lessons.publish.live import folder as live_folder
+from floatbase.live import folder as live_folder
 
 SAMPLE = 2.0  # s between two samples of the memory
 WARM_UP = 0.6  # fraction of the time after which memory should not grow: the robot is go2 then

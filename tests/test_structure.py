@@ -29,6 +29,7 @@ LAYERS = """
     simulation
     behaviours
     viewer
+    live
     playground
     lessons
     __main__
@@ -308,6 +309,57 @@ def test_tests_use_public_names():
             if is_private(found.name or ""):
                 wrong.append(f"{relative(path)}:{found.line} imports {found.name}")
     assert not wrong, "\n".join(wrong)
+
+
+def private_names_of_others(path: Path, own_names: set[str]) -> list[str]:
+    """Private attributes and imports of a module whose names its own package does not define."""
+    found = []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            used = ast.unparse(node)
+            is_own = node.attr in own_names or ast.unparse(node.value) in ("self", "cls")
+            if not is_own and used != "os._exit":
+                found.append(f"{node.lineno} uses {used}")
+        elif isinstance(node, ast.ImportFrom):
+            names = [alias.name for alias in node.names if is_private(alias.name)]
+            found += [
+                f"{node.lineno} imports {name}"
+                for name in names
+                if name not in own_names and not file_of(f"{node.module}.{name}")
+            ]
+    return found
+
+
+def defined_names(path: Path) -> set[str]:
+    """All names that a module defines: functions, classes, variables and attributes."""
+    names = set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr if isinstance(node, ast.Attribute) else node.id)
+    return names
+
+
+def test_no_package_uses_private_names_of_another_package() -> None:
+    names: dict[Path, set[str]] = {}
+    for path in LAYERED:
+        names.setdefault(top_folder(path), set()).update(defined_names(path))
+    wrong = [
+        f"{relative(path)}:{found}"
+        for path in LAYERED
+        for found in private_names_of_others(path, names[top_folder(path)])
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_private_names_of_another_package_are_found(tmp_path: Path) -> None:
+    path = tmp_path / "module.py"
+    path.write_text(
+        "from a import _b\nsim._c\nself._d\nwalk._own._own\nsim.made()._e\nx.__name__\n"
+    )
+    found = private_names_of_others(path, {"_own"})
+    assert found == ["1 imports _b", "2 uses sim._c", "5 uses sim.made()._e"]
 
 
 def is_private(name: str) -> bool:

@@ -16,7 +16,7 @@ from floatbase.behaviours.walk.footholds import (
 from floatbase.behaviours.walk.gait import Gait
 from floatbase.behaviours.walk.lipm import LIPM, CoMPlan
 from floatbase.behaviours.walk.options import Gains
-from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.plan import WEIGHT_SHIFT_TIME, StepPlan
 from floatbase.behaviours.walk.swing import Swing, SwingPath
 from floatbase.behaviours.walk.walk import Walk
 
@@ -24,6 +24,7 @@ __all__ = [
     "LIPM",
     "MPC",
     "STATE_WEIGHTS",
+    "WEIGHT_SHIFT_TIME",
     "CoMPlan",
     "Gains",
     "Gait",

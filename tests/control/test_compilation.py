@@ -42,6 +42,25 @@ def tick_of(robot: Robot) -> CompiledTick:
     return made
 
 
+def test_the_tick_numbers_its_rows_in_the_order_of_the_reference_qp() -> None:
+    """Both have the same rows if all normal forces, torques and joints are bounded."""
+    go2 = judges.load("go2")
+    made = fb.WholeBodyController(
+        go2, fb.Contacts.feet(go2), fb.standing_tasks(go2.standing()), max_normal_force=100.0
+    )
+    q, v = go2.standing().q, np.zeros(go2.nv)
+    assert made.compiled is not None
+    inputs = made.compiled.inputs_at(q, v, 0.0)
+    assert inputs is not None
+    labels = made.compiled.qp(q, v, 0.0, inputs).inequality_names
+    rows = [(label.kind, label.owner, label.number or 0) for label in labels]
+    owners, n_hard = made.compiled.row_owners, len(rows) - 2 * go2.d
+    assert owners[:n_hard] == rows[:n_hard]
+    # the reference QP says which of the limits of a joint is the strictest, such as its velocity
+    sides = [(kind.split()[0], owner) for kind, owner, _ in rows[n_hard:]]
+    assert owners[n_hard:] == [(f"{side} joint limit", owner, 0) for side, owner in sides]
+
+
 # when it runs -------------------------------------------------------------------------------------
 
 

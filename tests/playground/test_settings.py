@@ -16,6 +16,7 @@ from messages import raises
 import floatbase as fb
 from floatbase.behaviours import Gait
 from floatbase.errors import FloatbaseError, InputError
+from floatbase.live.settings import SETTINGS
 from floatbase.playground import (
     PERIOD,
     BaseMotors,
@@ -297,6 +298,42 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
         )
     finally:
         playground.close()
+
+
+def shown_control(playground: Playground, key: str, column: str = "") -> dict[str, Any]:
+    """The command of a control; key: of the table of settings."""
+    name = f"{SETTINGS[key].label} {column}".strip()
+    command = playground.view.window.scene.command(("/", "set_control", name))
+    assert command is not None, f"there is no control {name!r}"
+    return command
+
+
+def test_controls_have_the_words_and_ranges_of_the_table_of_settings() -> None:
+    """Their first values are those of `Settings`, in the units of the table."""
+    pairs = ("friction", "slope", "mass", "bandwidth")
+    others = (
+        "com_x", "com_y", "com_z", "nodding", "velocity_x", "velocity_y", "yaw_rate", "facets",
+        "torque_limits", "normal_force", "motion_weight", "posture_weight", "effort_weight",
+    )  # fmt: skip
+    with closing(Playground(GO2)) as playground:
+        for key in (*pairs, *others):
+            for column in ("model", "reality") if key in pairs else ("",):
+                made, setting = shown_control(playground, key, column), SETTINGS[key]
+                assert made["value"] == setting.first, key
+                assert (made["min"], made["max"]) == (setting.low, setting.high), key
+                assert (made["step"], made["section"]) == (setting.step, setting.section), key
+
+
+def test_sliders_show_settings_in_the_units_of_the_table() -> None:
+    settings = Settings(
+        mass=(1.0, 1.5), com_shift=(0.04, 0.0, -0.5), torque_fraction=0.55, weights=(1.0, 10.0, 1.0)
+    )
+    with closing(Playground(GO2, settings)) as playground:
+        assert shown_control(playground, "mass", "reality")["value"] == 150
+        assert shown_control(playground, "com_x")["value"] == 4
+        assert shown_control(playground, "com_z")["value"] == -8  # the end of the slider
+        assert shown_control(playground, "torque_limits")["value"] == 55
+        assert shown_control(playground, "posture_weight")["value"] == 1
 
 
 def test_a_speed_that_the_legs_cannot_reach_is_shown() -> None:

@@ -110,12 +110,12 @@ def test_the_controls_reach_the_robot(page, playground, go2):
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    control(page, "CoM x [m]", "setValue(0.04)")
+    control(page, "CoM x [cm]", "setValue(4)")
     eventually(
         page, lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01
     )
     control(page, "facets", "setValue(6)")
-    control(page, "friction model", "setValue(0.3)")
+    control(page, "friction μ model", "setValue(0.3)")
     eventually(page, lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9)
     eventually(
         page, lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6)
@@ -125,7 +125,7 @@ def test_the_controls_reach_the_robot(page, playground, go2):
     eventually(page, lambda: playground.run.status == "paused")
     playground.run.close()  # waits for the last slice
     stopped = playground.session.sim.time
-    control(page, "stand on FL_foot", "setValue(false)")
+    control(page, "lift FL_foot", "setValue(true)")
     control(page, "run", "fire()")
     eventually(
         page, lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn()
@@ -140,8 +140,8 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground)
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
-    control(page, "forwards [m/s]", "setValue(0.5)")
-    control(page, "turn left [rad/s]", "setValue(0.5)")
+    control(page, "velocity x [m/s]", "setValue(0.5)")
+    control(page, "yaw rate [rad/s]", "setValue(0.5)")
     control(page, "gait", "setValue(2)")
     eventually(page, lambda: place()[0] > 0.3)
     picture(page, "bare_page_walking")
@@ -154,7 +154,7 @@ def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground)
         ),
     )
     stopped = place()
-    control(page, "CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
+    control(page, "CoM z [cm]", "setValue(-2)")  # it stands from now on where it is
     eventually(page, lambda: place()[2] < stopped[2] - 0.01)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
     control(page, "gait", "setValue(1)")

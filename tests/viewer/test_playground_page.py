@@ -70,7 +70,7 @@ def test_every_control_can_be_moved_to_both_ends(page, field):
         "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
     )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
-    page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
+    page.wait_for_function("viewer.gui_controllers['friction μ model'].getValue() == 0.7")
 
 
 def test_the_push_slider_pushes_when_it_is_released(page, field):
@@ -160,12 +160,12 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field):
     def sunk() -> float:
         return float(field.robot.standing().com[2] - field.session.sim.state.com[2])
 
-    control(page, "mass [×] reality", "setValue(1.5)")
+    control(page, "mass [%] reality", "setValue(150)")
     eventually(page, lambda: abs(sunk() - 0.049) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
     )
-    control(page, "mass [×] model", "setValue(1.5)")
+    control(page, "mass [%] model", "setValue(150)")
     eventually(page, lambda: abs(sunk()) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel p.plot').textContent.includes('difference between')"
@@ -285,7 +285,7 @@ def test_undo_restores_the_settings_before_the_last_change(go2):
 
 def test_ctrl_z_undoes_a_change_of_the_page(page, field):
     opened(page, field)
-    for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
+    for keys, name, value in (("Control+z", "facets", 7), (None, "friction μ reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
         control(page, name, f"setValue({value})")
         eventually(page, lambda: field.session.settings != Settings())
@@ -301,9 +301,9 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
     opened(page, field)
     assert page.evaluate("location.hash") == ""
     control(page, "facets", "setValue(7)")
-    control(page, "stand on FL_foot", "setValue(false)")
+    control(page, "lift FL_foot", "setValue(true)")
     control(page, "speed", "setValue(0.5)")
-    page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
+    page.wait_for_function("location.hash == '#lift+FL_foot=on&facets=7'")
     control(page, "undo", "fire()")
     page.wait_for_function("location.hash == '#facets=7'")
 

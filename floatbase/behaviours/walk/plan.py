@@ -3,6 +3,8 @@
 All functions are pure: a plan follows from the previous plan, the measured state, the gait and the
 path.
 """
+# The live page plans in JavaScript: floatbase/viewer/web/src/engine/walk.js repeats this module for
+# a trot and a walk on level ground, so a change here needs the same change there.
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ _PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
 # the planned footholds climb
 _TOUCHDOWN_SETTLING_TIME = 0.05
 # s before the first lift-off and after the last touchdown in which the ZMP shifts
-_ZMP_SHIFT_TIME = 0.8
+WEIGHT_SHIFT_TIME = 0.8
 # m of DCM error that a stance with area tolerates without moving a step: the error would grow by up
 # to e^{ω 1.2 s}
 DCM_DEAD_ZONE = 0.02
@@ -218,7 +220,7 @@ def make_plan(
         path,
         ground,
         interval,
-        until - _ZMP_SHIFT_TIME if endless else inf,
+        until - WEIGHT_SHIFT_TIME if endless else inf,
         ramps,
     )
 
@@ -231,7 +233,7 @@ def weight_shift(posture: WalkingPosture, state: State, t: float, gait: Gait) ->
     """
     swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
     first = min((times[0] for times in swings.values() if times), default=inf)
-    delay = t + _ZMP_SHIFT_TIME - first
+    delay = t + WEIGHT_SHIFT_TIME - first
     if delay <= TIME_TOLERANCE:
         return 0.0
     swinging = [
@@ -359,17 +361,17 @@ def _zmp_segments(
         goal = centres[i] if last or not all_stand else centres[i + 1]
         if not all_stand:
             segments.append((begin, end, goal, goal))
-        elif end - begin <= _ZMP_SHIFT_TIME:
+        elif end - begin <= WEIGHT_SHIFT_TIME:
             segments.append((begin, end, zmp, goal))
         elif last:  # move to the middle, then stay
             segments += [
-                (begin, begin + _ZMP_SHIFT_TIME, zmp, goal),
-                (begin + _ZMP_SHIFT_TIME, end, goal, goal),
+                (begin, begin + WEIGHT_SHIFT_TIME, zmp, goal),
+                (begin + WEIGHT_SHIFT_TIME, end, goal, goal),
             ]
         else:  # stay, then shift before the foot lifts off
             segments += [
-                (begin, end - _ZMP_SHIFT_TIME, zmp, zmp),
-                (end - _ZMP_SHIFT_TIME, end, zmp, goal),
+                (begin, end - WEIGHT_SHIFT_TIME, zmp, zmp),
+                (end - WEIGHT_SHIFT_TIME, end, zmp, goal),
             ]
         zmp = goal
     return segments

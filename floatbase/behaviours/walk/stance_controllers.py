@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from floatbase.behaviours.walk.active_plan import compile_targets
@@ -45,6 +46,16 @@ class StanceControllers:
         ).limits
 
     plan: StepPlan | None
+
+    @property
+    def made(self) -> Mapping[tuple[str, ...], WholeBodyController]:
+        """The controllers made so far, by stance."""
+        return MappingProxyType(self._controllers)
+
+    @property
+    def full_loads(self) -> dict[str, float]:
+        """Normal force at which the ramp of each contact begins [N]."""
+        return {name: load for name, (_, load) in self._full_loads.items()}
 
     def prepare(self, gait: Gait) -> None:
         """Make the controllers of all stances of a gait, since that takes milliseconds."""

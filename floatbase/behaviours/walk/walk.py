@@ -48,7 +48,7 @@ from floatbase.behaviours.walk.progress import GaitClock, Progress
 from floatbase.behaviours.walk.stance_controllers import StanceControllers
 from floatbase.behaviours.walk.swing import SwingPath
 from floatbase.behaviours.walk.targets import Adjustment, BodyPose
-from floatbase.control import Command
+from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, SimulationWarning
 from floatbase.objectives import Task
@@ -317,6 +317,11 @@ class Walk:
         return self._controllers[self.stance].contacts if started else self._all_contacts
 
     @property
+    def controllers(self) -> Mapping[tuple[str, ...], WholeBodyController]:
+        """The controllers made so far, by the names of the feet that stand."""
+        return self._controllers.made
+
+    @property
     def footholds(self) -> dict[str, Array]:
         """Foothold of each foot in the air or next to lift off, shape (3,), world frame [m]."""
         active, ends = self._progress.active, {foot: path.end for foot, path in self.swings.items()}
@@ -451,6 +456,18 @@ class Walk:
             The time [s].
         """
 
+    def page_data(self) -> dict[str, Any]:
+        """Return the gait and what plans depend on, as data for the robot in a web page.
+
+        Returns
+        -------
+        dict
+            "gait" and "plan", with values for JSON and the names that the page's JavaScript has.
+        """
+        from floatbase.behaviours.walk.page_data import gait_data, plan_data  # loads numba
+
+        return {"gait": gait_data(self), "plan": plan_data(self)}
+
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
@@ -474,13 +491,10 @@ class Walk:
 
     def _limit_speed(self, stacklevel: int) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
+        motion = np.array([*self._velocity, self._yaw_rate])
         # fractions in the first period, and later
         self._speeds = speed_fractions(
-            self._gait,
-            self._posture,
-            self._options.reach,
-            np.array([*self._velocity, self._yaw_rate]),
-            self._options.acceleration[0],
+            self._gait, self._posture, self._options.reach, motion, self._options.acceleration[0]
         )
         if self.speed_fraction < 1.0:
             message = slow_message(self, self._gait, self.speed_fraction)

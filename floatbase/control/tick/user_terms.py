@@ -89,7 +89,7 @@ class UserTerms:
         packed: list[npt.ArrayLike] = [targets, *finite]
         if not self.any:
             return TickInputs(np.concatenate(packed), normal_forces=bounds)
-        state = State._unchecked(problem.robot, q, v)  # the compiled tick checks q and v
+        state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
         eom = EquationsOfMotion(state, problem.contacts, t)
         contacts = []
         residuals = {}

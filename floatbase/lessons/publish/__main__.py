@@ -106,8 +106,8 @@ def _add_live(commands: Any) -> None:
 
 
 def _live(given: Namespace) -> None:
-    from floatbase.lessons.publish.live import folder as live_folder
-    from floatbase.lessons.publish.live import wasm
+    from floatbase.live import folder as live_folder
+    from floatbase.live import wasm
 
     size = wasm.MODULE.stat().st_size if wasm.is_current() else wasm.build()
     print(f"{wasm.MODULE} is up to date: {size / 1000:.0f} kB.")

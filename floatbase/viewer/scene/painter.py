@@ -196,7 +196,7 @@ class Painter:
         ]
 
     @cached_property
-    def _paths(self) -> list[tuple[int, str]]:
+    def paths(self) -> list[tuple[int, str]]:
         """Joint index and joint name, as part of a path, of each mesh."""
         return [
             (mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes
@@ -207,7 +207,7 @@ class Painter:
         poses = state.joint_transforms
         return {
             f"{root}/{name}": Item(shape, poses[joint])
-            for (joint, name), shape in zip(self._paths, shapes_of_joints, strict=True)
+            for (joint, name), shape in zip(self.paths, shapes_of_joints, strict=True)
         }
 
     def _contacts(
@@ -226,7 +226,7 @@ class Painter:
         for i, (name, position, normal, mu) in enumerate(rows):
             at = path_part(name)
             if stands[i]:
-                picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
+                picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self.patch_radius)
             if chosen.cones and stands[i]:
                 force = None if forces.cone_forces is None else forces.cone_forces[i]
                 if force is not None and self._is_negligible(force):
@@ -293,7 +293,7 @@ class Painter:
         return JointLimits.of(self.robot)
 
     @cached_property
-    def _patch_radius(self) -> float:
+    def patch_radius(self) -> float:
         """Radius of the contact patches [m]."""
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 

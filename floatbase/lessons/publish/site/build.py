@@ -16,7 +16,6 @@ from floatbase._files import write_whole
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
 from floatbase.lessons.publish.contents import equation_ranges, title_of
-from floatbase.lessons.publish.live import folder as live_folder
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import lecture, recall, reference
@@ -30,6 +29,7 @@ from floatbase.lessons.publish.site.live_robots import (
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, anchor_of
 from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
+from floatbase.live import folder as live_folder
 
 SITE = Path("build/site")
 _ROOT = NOTEBOOKS.parent

@@ -36,7 +36,7 @@ function imports(module, memory) {
 }
 
 // The control step of a robot. module: the compiled WebAssembly module. robot: its data, see
-// floatbase/lessons/publish/live/robots.py. `views` are its inputs and outputs, to be filled and
+// floatbase/live/robots.py. `views` are its inputs and outputs, to be filled and
 // read in place; matrices are stored as in Pinocchio.
 export function createTick(module, robot) {
   let memory = null;

@@ -2,8 +2,8 @@
 
 numba compiles `control.tick`, and the targets of a walk in `behaviours.walk.compiled_targets`, to
 LLVM's intermediate code. llvmlite turns that code into object files for WebAssembly, and the linker
-wasm-ld makes one module of them. The module is kept beside the pages' JavaScript with a digest of
-its sources, so that only a change of these sources needs the linker.
+wasm-ld makes one module of them. The module is kept beside this file with a digest of its
+sources, so that only a change of these sources needs the linker.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ from typing import Any
 from floatbase.behaviours.walk import compiled_targets
 from floatbase.control.tick.jit import source_digest
 from floatbase.errors import InputError
-from floatbase.viewer.web import pages
 
-MODULE = pages.DIST.parent / "live" / "tick.wasm"
+MODULE = Path(__file__).with_name("tick.wasm")
 DIGEST = MODULE.with_suffix(".sha256")
 ENTRIES = ("tick", "write_targets")  # names of the exported functions
 # exported as well: the page's plans of a walk need them, and must not differ between browsers
@@ -116,13 +115,15 @@ def _tick_arguments() -> tuple[Any, ...]:
     """Return arguments of the tick; their types are the same for every robot."""
     import numpy as np
 
-    import floatbase as fb
+    from floatbase.control import WholeBodyController
     from floatbase.control.tick import CompiledTick, tick
+    from floatbase.dynamics import Contacts
+    from floatbase.objectives import standing_tasks
+    from floatbase.robots import load
 
-    robot = fb.load("go2")
-    tasks = fb.standing_tasks(robot.standing())
-    contacts = fb.Contacts.feet(robot)
-    controller = fb.WholeBodyController(robot, contacts, tasks, backend="reference")
+    robot = load("go2")
+    tasks = standing_tasks(robot.standing())
+    controller = WholeBodyController(robot, Contacts.feet(robot), tasks, backend="reference")
     compiled = CompiledTick(controller.problem)
     inputs = compiled.default_inputs
     return (

@@ -11,7 +11,7 @@ from typing import Any
 import live_reference
 import pytest
 
-from floatbase.lessons.publish.live import wasm
+from floatbase.live import wasm
 from floatbase.viewer.web import pages
 
 WEB = pages.DIST.parent

@@ -13,31 +13,22 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import mujoco
 import numpy as np
 
-import floatbase as fb
 from floatbase._validation import Array
-from floatbase.behaviours import Gait, Walk
-from floatbase.behaviours._page import SHIFT_TIME, controllers, plan_data, possible_fractions
+from floatbase.behaviours import WEIGHT_SHIFT_TIME, Gait, Walk
 from floatbase.control import JointLimits, WholeBodyController
-from floatbase.control._page import force_rows, pack_problem
-from floatbase.control.tick import tick
-from floatbase.dynamics import Contacts
+from floatbase.control.tick import CompiledTick, tick
+from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
-from floatbase.objectives import CoMTask, FrameTask
-from floatbase.playground import ModelMismatch
+from floatbase.live.settings import SETTINGS
+from floatbase.objectives import CoMTask, FrameTask, standing_tasks
+from floatbase.qp import QP
 from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
-from floatbase.simulation._page import (
-    FALLEN_COSINE,
-    FALLEN_HEIGHT_FRACTION,
-    build_spec,
-    joint_damping,
-)
 
 ROBOTS = ("go2", "solo12", "talos")
-MU = 0.7  # friction coefficient, assumed and actual, before anything is changed
+MU = SETTINGS["friction"].first  # friction coefficient, assumed and actual, at first
 FACETS = (4, 8, 16)
 TIMESTEP = 1e-3  # s
 LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
@@ -46,9 +37,6 @@ LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
 _SHIFT_FRACTION = 0.8
 # largest velocity forwards [m/s] and yaw rate [rad/s] in the page, by gait: all robots can follow
 MOST = {"trot": (0.6, 0.8), "walk": (0.2, 0.15)}
-# fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
-# hulls of the links have them, on which a fallen robot lies
-_ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
 _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
@@ -59,15 +47,10 @@ def robot_data(robot: Robot) -> dict[str, Any]:
             f"{robot.name} has a fixed base, or joints without limits. The page needs a floating "
             f"base and joints with limits."
         )
-    standing, sim = robot.standing(), Simulation(robot, MU, TIMESTEP)
-    sim.reset(standing)
-    xml = build_spec(robot, sim.ground, TIMESTEP).to_xml()
-    model, conversion = sim.model, sim._conversion
-    joints = [model.joint(name) for name in robot.joint_names]
+    sim = Simulation(robot, MU, TIMESTEP)
+    sim.reset(robot.standing())
     return {
         "name": robot.name,
-        "xml": xml,
-        "overrides": _lost_digits(model, xml),
         "nq": robot.nq,
         "nv": robot.nv,
         "d": robot.d,
@@ -76,24 +59,9 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "gravity": robot.gravity,
         "mu": MU,
         "facets": FACETS,
-        "fallenHeight": FALLEN_HEIGHT_FRACTION,
-        "fallenCosine": FALLEN_COSINE,
-        "home": {"qpos": sim.data.qpos.tolist(), "com": standing.com.tolist()},
-        # in the package's order: entries of qpos and qvel, bodies that joints move, joints
-        "qposOfQ": conversion._qpos_of_q.tolist(),
-        "qvelOfV": conversion._qvel_of_v.tolist(),
-        "bodies": [0, 1, *(int(joint.bodyid[0]) for joint in joints)],
-        "joints": [int(joint.id) for joint in joints],
-        "motors": sim._actuator_ids.tolist(),
         "jointNames": list(robot.joint_names),
         "torqueLimits": robot.torque_limits.tolist(),
-        "damping": joint_damping(sim, TIMESTEP).tolist(),
-        "hulls": sim._hull_geoms.tolist(),
-        "hullBodies": sim._hull_bodies.tolist(),
-        "points": [
-            {"name": name, "geom": int(geom), "radius": float(model.geom_size[geom, 0])}
-            for name, geom in zip(sim.point_names, sim.foot_contacts.geoms, strict=True)
-        ],
+        **sim.page_data(),
         "problems": {
             **{
                 name: _standing_problem(robot, lifted, facets)
@@ -118,11 +86,11 @@ def controller(
     lifted: str | None = None,
     facets: int = FACETS[0],
     torque_fraction: float = 1.0,
-    mismatch: ModelMismatch | None = None,
+    modify_qp: Callable[[QP, EquationsOfMotion], QP] | None = None,
 ) -> WholeBodyController:
     """Make the controller that the page runs, in Python."""
     standing = robot.standing()
-    tasks: list[Any] = list(fb.standing_tasks(standing))
+    tasks: list[Any] = list(standing_tasks(standing))
     if lifted is not None:
         tasks[0] = replace(tasks[0], position=_three_feet_com(standing, lifted))
         tasks.append(FrameTask(lifted, standing.point(lifted) + [0.0, 0.0, LIFT_HEIGHT]))
@@ -133,7 +101,7 @@ def controller(
         facets=facets,
         torque_limits=torque_fraction * robot.torque_limits,
         joint_limits=JointLimits.of(robot),  # the page does not change how hard joints may brake
-        modify_qp=mismatch,
+        modify_qp=modify_qp,
     )
 
 
@@ -159,17 +127,6 @@ def _three_feet_com(standing: State, lifted: str) -> Array:
     return standing.com + _SHIFT_FRACTION * shift * [1.0, 1.0, 0.0]
 
 
-def _lost_digits(model: mujoco.MjModel, xml: str) -> dict[str, list[float]]:
-    """Return the fields of a model that its XML file does not hold to the last digit."""
-    read, lost = mujoco.MjModel.from_xml_string(xml), {}
-    for name in dir(model):
-        exact: Any = getattr(model, name) if name.startswith(_ROUNDED_FIELDS) else None
-        is_real = isinstance(exact, np.ndarray) and exact.dtype.kind == "f"
-        if is_real and not np.array_equal(exact, getattr(read, name)):
-            lost[name] = exact.ravel().tolist()
-    return lost
-
-
 def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str, Any]:
     """Return the problem of standing on all feet, or on all but a lifted one."""
     made = controller(robot, lifted=lifted, facets=facets)
@@ -182,9 +139,8 @@ def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str
 
 def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]) -> dict[str, Any]:
     """Return the problem arrays of a controller, and the places of what controls change."""
-    compiled = made.compiled
-    assert compiled is not None  # all of its objects are built in
-    sizes, ints, floats = pack_problem(made.problem, compiled.layout)
+    compiled = _compiled(made)
+    sizes, ints, floats = compiled.pack(made.problem)
     inputs = compiled.default_inputs
     n_floats, n_ints = tick.workspace_sizes(sizes, 0)
 
@@ -192,8 +148,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         limits = replace(
             made.limits, torque_limits=torque_fraction * np.array(made.limits.torque_limits)
         )
-        problem = replace(made.problem, contacts=stance(mu), limits=limits)
-        return pack_problem(problem, compiled.layout)[2]
+        return compiled.pack(replace(made.problem, contacts=stance(mu), limits=limits))[2]
 
     return {
         "sizes": sizes.tolist(),
@@ -204,7 +159,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         "resultSize": compiled.empty_result(inputs).size,
         "k": made.contacts.k,
         "points": list(made.contacts.point_names),
-        "rows": _row_names(made),
+        "rows": compiled.row_owners,
         "parameters": {
             "mu": _friction_places(packed_with, MU),
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
@@ -214,18 +169,10 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
     }
 
 
-def _row_names(made: WholeBodyController) -> list[tuple[str, str, int]]:
-    """Return kind, owner and number of the tick's rows, as `Inequalities` has them."""
-    labels = force_rows(made.contacts, made.limits)[1]
-    rows = [
-        (label.kind, label.owner, int(str(label).split()[-1]) if label.kind == "friction" else 0)
-        for label in labels
-    ]
-    rows += [("largest normal force", name, 0) for name in made.contacts.point_names]
-    joints = made.robot.joint_names
-    rows += [(f"{side} torque limit", name, 0) for side in ("upper", "lower") for name in joints]
-    rows += [(f"{side} joint limit", name, 0) for side in ("upper", "lower") for name in joints]
-    return rows
+def _compiled(made: WholeBodyController) -> CompiledTick:
+    """Return the compiled step of a controller whose objects are all built in."""
+    assert made.compiled is not None
+    return made.compiled
 
 
 def _linear_places(packed: Callable[[float], Array], value: float) -> dict[str, Any]:
@@ -270,8 +217,7 @@ def _check(found: Array, expected: Array) -> None:
 
 def _target_places(made: WholeBodyController) -> dict[str, Any]:
     """Return where the targets of the centre of mass and of a lifted foot are among the inputs."""
-    compiled = made.compiled
-    assert compiled is not None
+    compiled = _compiled(made)
 
     def places(kind: type[CoMTask] | type[FrameTask]) -> list[int]:
         (at,) = [each.entries for each in compiled.layout.tasks if isinstance(each.task, kind)]
@@ -289,15 +235,18 @@ def gaits(robot: Robot) -> dict[str, Gait]:
     if len(robot.feet) != 4:
         return {}
     return {
-        "trot": Gait.trot(robot, start=SHIFT_TIME),
-        "walk": Gait.walk(robot, start=SHIFT_TIME),
+        "trot": Gait.trot(robot, start=WEIGHT_SHIFT_TIME),
+        "walk": Gait.walk(robot, start=WEIGHT_SHIFT_TIME),
     }
 
 
 def _walks(robot: Robot, facets: int) -> dict[str, Walk]:
-    """Return a walk with each gait."""
+    """Return a walk with each gait, at its largest speed."""
     contacts = Contacts.feet(robot, MU)
-    return {name: Walk(robot, contacts, gait, facets=facets) for name, gait in gaits(robot).items()}
+    return {
+        name: Walk(robot, contacts, gait, (MOST[name][0], 0.0), MOST[name][1], facets=facets)
+        for name, gait in gaits(robot).items()
+    }
 
 
 def _walking_problems(robot: Robot) -> dict[str, Any]:
@@ -305,10 +254,9 @@ def _walking_problems(robot: Robot) -> dict[str, Any]:
     problems = {}
     for facets in FACETS:
         for walk in _walks(robot, facets).values():
-            for stance, made in controllers(walk).items():
+            for stance, made in walk.controllers.items():
                 problem = _problem_data(made, partial(_standing_feet, robot, stance))
-                assert made.compiled is not None
-                layout, names = made.compiled.layout, made.contacts.names
+                layout, names = _compiled(made).layout, made.contacts.names
                 entries = {name: entries.start for name, entries in layout.names.items()}
                 problem["entries"] = {
                     "com": entries["centre of mass"],
@@ -335,24 +283,7 @@ def _walking_data(robot: Robot) -> dict[str, Any] | None:
     walks = _walks(robot, FACETS[0])
     if not walks:
         return None
-    return {
-        **plan_data(walks["trot"]),
-        "gaits": {
-            name: {
-                "offsets": dict(each.gait.offsets),
-                "period": each.gait.period,
-                "swing": each.gait.swing,
-                "most": MOST[name],
-                "firstFraction": _first_fraction(each, MOST[name]),
-            }
-            for name, each in walks.items()
-        },
-    }
-
-
-def _first_fraction(walk: Walk, most: tuple[float, float]) -> float:
-    """Return the fraction of the largest motion that the feet can follow in the first period."""
-    forwards, turning = most
-    first, later = possible_fractions(walk, np.array([forwards, 0.0, turning]))
-    assert later == 1.0
-    return first
+    assert all(walk.speed_fraction == 1.0 for walk in walks.values())
+    data = {name: walk.page_data() for name, walk in walks.items()}
+    gaits_data = {name: each["gait"] | {"most": MOST[name]} for name, each in data.items()}
+    return data["trot"]["plan"] | {"gaits": gaits_data}

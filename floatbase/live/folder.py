@@ -10,9 +10,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import floatbase as fb
 from floatbase.errors import InputError
-from floatbase.lessons.publish.live import robots, scenes, wasm
+from floatbase.live import robots, scenes, settings, wasm
+from floatbase.robots import load
 from floatbase.viewer.web import pages
 
 WEB = pages.DIST.parent
@@ -56,7 +56,7 @@ def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
-        robot = fb.load(name)
+        robot = load(name)
         scene, image, drawing = scenes.scene_files(robot)
         data = robots.robot_json(robot, {"drawing": drawing})
         (folder / f"{name}.json").write_text(data, encoding="utf-8")
@@ -64,7 +64,7 @@ def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
         (folder / f"{name}.png").write_bytes(image)
     for name in ("robot.js", "engine.js", "floatbase-live.js"):
         shutil.copy(pages.DIST / name, folder / name)
-    (folder / "robot.html").write_text(pages.robot_page(names), encoding="utf-8")
+    (folder / "robot.html").write_text(pages.robot_page(names, settings.ROWS), encoding="utf-8")
     (folder / "meshcat.js").write_bytes(pages.viewer_code())
     (folder / "mujoco.js").write_bytes((mujoco / "mujoco.js").read_bytes())
     (folder / "mujoco.wasm").write_bytes(stripped((mujoco / "mujoco.wasm").read_bytes()))

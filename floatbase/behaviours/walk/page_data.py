@@ -1,19 +1,15 @@
-"""What a web page needs to know of a walk: its controllers, and what its plans depend on."""
+"""What the plans of a walk depend on, as data for the robot in a web page."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from floatbase._validation import Array
 from floatbase.behaviours.walk import compiled_targets, plan
 from floatbase.behaviours.walk.gait import TIME_TOLERANCE
-from floatbase.behaviours.walk.gait_limits import speed_fractions
 from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION
-from floatbase.behaviours.walk.walk import Walk
-from floatbase.control import WholeBodyController
+
+if TYPE_CHECKING:
+    from floatbase.behaviours.walk.walk import Walk
 
 # names as in the page's JavaScript
 _CONSTANTS = {
@@ -21,17 +17,22 @@ _CONSTANTS = {
     "nPhases": plan._PLANNED_PHASES,
     "horizon": plan._PLAN_HORIZON,
     "settlingTime": plan._TOUCHDOWN_SETTLING_TIME,
-    "shiftTime": plan._ZMP_SHIFT_TIME,
+    "shiftTime": plan.WEIGHT_SHIFT_TIME,
     "deadZone": plan.DCM_DEAD_ZONE,
     "pathShift": plan._PATH_SHIFT_THRESHOLD,
     "sideFraction": MIN_SIDE_FRACTION,
 }
-SHIFT_TIME = plan._ZMP_SHIFT_TIME  # s that the weight needs before the first lift-off
 
 
-def controllers(walk: Walk) -> Mapping[tuple[str, ...], WholeBodyController]:
-    """Return the controllers of all stances of a walk."""
-    return walk._controllers._controllers
+def gait_data(walk: Walk) -> dict[str, Any]:
+    """Return the gait, and the fraction of the desired motion in its first period, for JSON."""
+    gait = walk.gait
+    return {
+        "offsets": dict(gait.offsets),
+        "period": gait.period,
+        "swing": gait.swing,
+        "firstFraction": walk._speeds[0],
+    }
 
 
 def plan_data(walk: Walk) -> dict[str, Any]:
@@ -49,16 +50,5 @@ def plan_data(walk: Walk) -> dict[str, Any]:
         "clearance": options.clearance,
         "acceleration": options.acceleration.tolist(),
         "ramp": options.ramp,
-        "fullLoad": {foot: load for foot, (_, load) in walk._controllers._full_loads.items()},
+        "fullLoad": walk._controllers.full_loads,
     }
-
-
-def possible_fractions(walk: Walk, motion: Array) -> tuple[float, float]:
-    """Return the fractions of a desired motion that the feet can follow: first period, later.
-
-    motion: (3,), velocity [m/s] and yaw rate [rad/s].
-    """
-    options = walk.options
-    return speed_fractions(
-        walk.gait, walk._posture, options.reach, np.asarray(motion), options.acceleration[0]
-    )

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-import floatbase as fb
 from floatbase.dynamics import UP, Contacts
 from floatbase.friction import FrictionPolyhedron
-from floatbase.lessons.publish.live.robots import FACETS
+from floatbase.live.robots import FACETS
 from floatbase.robots import Robot
+from floatbase.viewer import Viewer
 from floatbase.viewer.export import thumbnail
 from floatbase.viewer.scene import colours, geometry, protocol, shapes, threejs, unit_shapes
 from floatbase.viewer.scene.painter import MIN_FORCE, Painter
@@ -25,7 +25,7 @@ IMAGE_HEIGHT = 480  # pixels
 
 def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
     """Return the scene of a standing robot, an image of it, and what a page needs to move it."""
-    view = fb.Viewer(robot)
+    view = Viewer(robot)
     try:
         standing, contacts = robot.standing(), Contacts.feet(robot, 0.7)
         weight_share = np.tile([0.0, 0.0, robot.weight / contacts.n_points], contacts.n_points)
@@ -70,12 +70,12 @@ def _cones(painter: Painter, contacts: Contacts) -> Picture:
 def _drawing(painter: Painter, contacts: Contacts) -> dict[str, Any]:
     """Return the paths of what moves, and the sizes of arrows and cones."""
     return {
-        "links": [[joint, f"robot/{name}"] for joint, name in painter._paths],
+        "links": [[joint, f"robot/{name}"] for joint, name in painter.paths],
         "points": [path_part(name) for name in contacts.point_names],
         "scale": painter.scale,  # m/N
         "size": painter.size,  # m
         "coneHeight": painter.cone_height(contacts),  # m
-        "patchRadius": painter._patch_radius,  # m
+        "patchRadius": painter.patch_radius,  # m
         "slenderness": shapes.ARROW_SLENDERNESS,
         "arrowLength": shapes.ARROW_LENGTH,  # m
         "leastForce": MIN_FORCE * painter.robot.weight,  # N
